@@ -12,8 +12,8 @@
 #include "bake/backend/make_backend.h"
 #include "mesh/mesh_solid.h"
 #include "packing/cover/cover.h"
-#include "spheres/cover_choice.h"
 #include "spheres/cover_proof.h"
+#include "spheres/cover_search.h"
 #include "spheres/offset_surface.h"
 #include "spheres/sampled_solid.h"
 

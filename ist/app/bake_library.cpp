@@ -23,9 +23,8 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/options.h"
-#include "app/summary_table.h"
+#include "app/progress_line.h"
 #include "library/asset_summary.h"
-#include "library/coarseness.h"
 #include "library/manifest.h"
 #include "library/run_jobs.h"
 #include "library/summary.h"
@@ -34,7 +33,6 @@
 namespace ist::app {
 namespace {
 
-constexpr const char* kWipe = "\r\033[K";
 constexpr double kWindow = 30;  // [s] over which the rate is taken
 
 double seconds(std::chrono::steady_clock::duration time) {

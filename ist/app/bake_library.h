@@ -7,6 +7,8 @@
 
 #include <ist/tree_view.h>
 
+#include "library/summary.h"
+
 namespace ist::app {
 
 /// What `ist bake` takes for a manifest alone.
@@ -34,5 +36,8 @@ void run_library(const LibraryRun& run);
 
 /// What is wrong with an asset that was baked: a missed target, coarse spheres, overlapping parts.
 std::vector<std::string> warnings_of(const TreeView& tree);
+
+/// On stdout, as JSON or as a table for a person; nothing where a person wants quiet.
+void print_summary(const Summary& summary, bool json, bool quiet);
 
 }  // namespace ist::app

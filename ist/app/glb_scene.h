@@ -35,7 +35,12 @@ class GlbScene {
  private:
   std::size_t add_material(const std::string& name, const std::array<double, 4>& colour);
   std::size_t add_view(const void* bytes, std::size_t count, int target);
-  std::size_t add_vertices(std::span<const std::array<float, 3>> vertices);
+  /// Accessors of the vertices and, after it, of the triangles: the first one's number.
+  template <class Index>
+  std::size_t add_triangles(std::span<const Eigen::Vector3d> vertices,
+                            std::span<const std::array<Index, 3>> triangles);
+  std::size_t add_mesh(const std::string& name, const std::array<double, 4>& colour,
+                       const Json& attributes, std::size_t indices);
 
   Json nodes_ = Json::array(), meshes_ = Json::array(), materials_ = Json::array(),
        accessors_ = Json::array(), views_ = Json::array();

@@ -15,8 +15,6 @@
 namespace ist::app {
 namespace {
 
-constexpr unsigned kMostCells = 1024;  ///< on a side: what the library takes
-
 struct MedialOptions {
   std::string mesh, output, device = "auto";
   MedialSettings settings;
@@ -61,7 +59,7 @@ void add_medial(CLI::App& app) {
              Dash::standard_output);
   add_whole(command, "--resolution", options->settings.resolution,
             "Grid cells along the longest side, each with at most one node; 0 = automatic", 0u,
-            kMostCells);
+            unsigned{kMostGridCells});
   add_whole(command, "--seed", options->settings.seed, "Random seed; each seed gives other points");
   add_device_option(command, options->device,
                     "Device; auto = the GPU if there is one, else the CPU");

@@ -8,9 +8,6 @@
 #include <string_view>
 
 namespace ist::app {
-namespace {
-constexpr const char* kWipe = "\r\033[K";
-}
 
 ProgressLine::ProgressLine(bool quiet, bool rounds)
     : active_(!quiet && isatty(STDERR_FILENO) == 1), whole_(rounds) {}

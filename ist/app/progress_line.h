@@ -8,6 +8,8 @@
 
 namespace ist::app {
 
+inline constexpr const char* kWipe = "\r\033[K";  ///< a line on a terminal
+
 /// One line on stderr that is written over and over, where stderr is a terminal; nothing elsewhere.
 class ProgressLine {
  public:

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <functional>
 #include <future>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,17 +19,25 @@
 
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
+#include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/tree_builder.h"
-#include "bake/mass_and_bounds.h"
 #include "packing/base/packing_settings.h"
 #include "packing/calibrate/calibration.h"
 #include "packing/cover/cover.h"
-#include "stage/aside.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
+
+std::vector<Ball> vertices_of(const MeshView& mesh) {
+  std::vector<Ball> points(mesh.vertex_count);
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    const double* p = mesh.vertices + 3 * v;
+    points[v] = {p[0], p[1], p[2], 0};
+  }
+  return points;
+}
 
 AssetHeader describe_bake(const ClosedMesh& mesh, const MeshSolid& solid,
                           const PackingSettings& settings, const SpherePacking& packing) {
@@ -141,6 +151,41 @@ class Aside {
 
 }  // namespace
 
+void describe_mass(const MeshMoments& moments, AssetHeader& header) {
+  header.volume = moments.volume;
+  header.volume_error = moments.volume_error;
+  for (int k = 0; k < 3; ++k) {
+    header.centre_of_mass[k] = moments.centre[k];
+    header.inertia[k] = moments.inertia(k, k);
+    header.inertia[3 + k] = k < 2 ? moments.inertia(0, 1 + k) : moments.inertia(1, 2);
+  }
+  header.centre_of_mass_error = moments.centre_error;
+  header.inertia_error = moments.inertia_error;
+}
+
+void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header) {
+  const UnitFrame& frame = solid.frame();
+  const std::vector<Ball> points = vertices_of(solid.arrays());
+  const Ball smallest = bounding_ball(points);
+  Eigen::Vector3d centre = frame.from_unit({smallest.x, smallest.y, smallest.z});
+  for (int k = 0; k < 3; ++k) {
+    const double low = solid.bounds().min()[k], high = solid.bounds().max()[k];
+    centre[k] = std::clamp(centre[k], low, high);
+    header.ball_centre[k] = centre[k];
+    // Rounding, in this frame or in the unit frame, brings nothing back inside.
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    const double further = (beyond + 1e-14) * frame.scale();
+    header.box_lower[k] = beyond > 0 ? std::nextafter(low - further, -kFar) : low;
+    header.box_upper[k] = beyond > 0 ? std::nextafter(high + further, kFar) : high;
+  }
+  // About the centre as it is written, which far from the origin is not quite the smallest ball's.
+  const Eigen::Vector3d from = frame.to_unit(centre);
+  double radius = 0;
+  for (const Ball& point : points)
+    radius = std::max(radius, reach(from.x(), from.y(), from.z(), point));
+  header.ball_radius = (radius + beyond) * (1 + 0x1p-49) * frame.scale();
+}
+
 AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress) {
@@ -246,15 +291,20 @@ Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& fie
                mesh.name);
 }
 
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
+                 const PackingSettings& settings, const ProgressCallback& progress) {
+  const auto backend = make_backend(solid, {settings.device, settings.gpu});
+  SolidField field(solid, resolution, settings.surface, settings.threads);
+  return bake_solid(mesh, solid, field, *backend, settings, progress);
+}
+
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
            const ProgressCallback& progress) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
     const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved.mesh);
-    const auto backend = make_backend(solid, {settings.device, settings.gpu});
-    SolidField field(solid, resolved.resolution, settings.surface, settings.threads);
-    return bake_solid(resolved.mesh, solid, field, *backend, settings, progress);
+    return bake_solid(resolved.mesh, solid, resolved.resolution, settings, progress);
   });
 }
 

@@ -12,9 +12,9 @@
 
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
-#include "bake/mass_and_bounds.h"
 #include "mesh/message_text.h"
 #include "mesh/polygonise.h"
+#include "numerics/hashing.h"
 #include "numerics/roots.h"
 #include "packing/backend/solid_backend.h"
 #include "packing/base/packing_settings.h"
@@ -29,10 +29,7 @@ constexpr double kRounding = 1e-9;  ///< of the coordinates: no double-precision
 
 /// A number in [0, 1) for every index: SplitMix64.
 double random_at(std::uint64_t index) {
-  std::uint64_t z = (index + 1) * 0x9e3779b97f4a7c15u;
-  z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ z >> 27) * 0x94d049bb133111ebu;
-  return static_cast<double>((z ^ z >> 31) >> 11) * 0x1p-53;
+  return static_cast<double>(mixed((index + 1) * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
 }
 
 /// Throws Error, naming a place, if a signed distance is not finite or, between two of some
@@ -95,6 +92,10 @@ class FramedSolid final : public Solid {
   const MeshSolid& mesh_;
 };
 
+/// The seam for a solid known by its signed distance, with a mesh in its place, on the host: packed
+/// and covered by the signed distance, calibrated by the mesh. Both lie in the mesh's unit frame.
+/// `error` [u]: the two surfaces lie within it of each other, and it counts into protrusions.
+/// Solid and mesh must outlive the backend.
 class PolygonisedBackend final : public SolidBackend {
  public:
   PolygonisedBackend(const Solid& solid, const MeshSolid& mesh, double error)
@@ -138,15 +139,6 @@ class PolygonisedBackend final : public SolidBackend {
   const std::unique_ptr<SolidBackend> of_mesh_;
 };
 
-/// The seam for a solid known by its signed distance, with a mesh in its place, on the host: packed
-/// and covered by the signed distance, calibrated by the mesh. Both lie in the mesh's unit frame.
-/// `error` [u]: the two surfaces lie within it of each other, and it counts into protrusions.
-/// Solid and mesh must outlive the backend.
-std::unique_ptr<SolidBackend> make_polygonised_backend(const Solid& solid, const MeshSolid& mesh,
-                                                       double error) {
-  return std::make_unique<PolygonisedBackend>(solid, mesh, error);
-}
-
 // Edge of a cell over the mean sphere radius: the error is then some 5 % of that radius.
 constexpr double kCellOverRadius = 0.4;
 constexpr unsigned kFewestByDefault = 32, kMostByDefault = 256;
@@ -160,16 +152,6 @@ unsigned cells_for(const Solid& solid, std::size_t spheres) {
   return std::max(kFewestByDefault, static_cast<unsigned>(std::ceil(cells)));
 }
 
-Asset bake_mesh_of(const MeshSolid& solid, const PackingSettings& settings, const std::string& name,
-                   const ProgressCallback& progress) {
-  ClosedMesh described;  // the solid holds its geometry
-  described.name = name;
-  const auto backend = make_backend(solid, {settings.device, settings.gpu});
-  const Resolution as_it_is;  // make_solid() has resolved it
-  SolidField field(solid, as_it_is, settings.surface, settings.threads);
-  return bake_solid(described, solid, field, *backend, settings, progress);
-}
-
 Asset bake_field(const Solid& solid, const PackingSettings& settings,
                  const PolygoniseSettings& meshing, const ProgressCallback& progress) {
   if (settings.grid != GridMode::banded)
@@ -181,11 +163,11 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   Polygonised made = polygonise(solid, cells, progress);
   const ClosedMesh mesh = close_mesh(std::move(made.mesh), meshing.name);
   const MeshSolid mesh_solid(mesh);
-  const auto backend = make_polygonised_backend(solid, mesh_solid, made.error);
+  PolygonisedBackend backend(solid, mesh_solid, made.error);
   Resolution as_made;  // the mesh is near the solid as it is
   if (mesh.report.meets_itself) as_made.how = Resolution::How::unresolved;
   SolidField field(mesh_solid, as_made, settings.surface, settings.threads);
-  AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, *backend, settings, progress);
+  AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
   // Field and mesh are the mesh's, and that is near the solid.
   if (arrays.field != nullptr) {
@@ -217,8 +199,10 @@ Asset bake(const Solid& solid, const PackingSettings& settings, const ProgressCa
            const PolygoniseSettings& meshing) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
-    return solid.mesh() != nullptr ? bake_mesh_of(*solid.mesh(), settings, meshing.name, progress)
-                                   : bake_field(solid, settings, meshing, progress);
+    if (solid.mesh() == nullptr) return bake_field(solid, settings, meshing, progress);
+    ClosedMesh described;  // the solid holds its geometry, which make_solid() has resolved
+    described.name = meshing.name;
+    return bake_solid(described, *solid.mesh(), Resolution(), settings, progress);
   });
 }
 

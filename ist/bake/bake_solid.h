@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ist/asset_layout.h>
 #include <ist/bake.h>
 
 #include "bake/asset/asset_writer.h"
@@ -15,8 +16,18 @@ Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& fie
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress);
 
+/// The same with field and backend as the settings ask for.
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
+                 const PackingSettings& settings, const ProgressCallback& progress);
+
 /// Frame, mesh, mass and what was found of the surface: all of a header that needs no spheres.
 AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid);
+
+/// Volume, centre of mass and inertia.
+void describe_mass(const MeshMoments& moments, AssetHeader& header);
+
+/// Box and ball around the mesh, each `beyond` further out, unit frame.
+void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header);
 
 /// Puts the surface into an asset.
 void keep(const KeptSurface& surface, AssetArrays& arrays);

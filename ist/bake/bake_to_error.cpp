@@ -29,7 +29,6 @@ constexpr std::uint32_t kNearPoses = 40;      // at the overlap that was asked a
 constexpr std::uint32_t kPartnerPoses = 24;   // likewise, of each partner but the copy
 constexpr std::uint32_t kFewTrials = 8;       // fewer say nothing of a partner
 constexpr std::uint32_t kPosesPerClass = 30;  // besides, for the prediction
-constexpr std::size_t kMost = 200'000;        // where the caller sets no limit
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -108,7 +107,7 @@ class TargetBake {
         mesh_(resolved_.mesh),
         target_(target),
         settings_(settings),
-        most_(settings.max_spheres == 0 ? kMost : settings.max_spheres),
+        most_(settings.max_spheres == 0 ? kMostCounted : settings.max_spheres),
         watch_(progress, settings.time_limit),
         solid_(mesh_),
         field_(solid_, resolved_.resolution, settings.surface, settings.threads,
@@ -342,7 +341,7 @@ TargetedAsset bake_to_error(const ClosedMesh& mesh, const ErrorTarget& target,
                             const PackingSettings& settings, const ProgressCallback& progress) {
   check_target(target);
   PackingSettings largest = settings;
-  if (largest.max_spheres == 0) largest.max_spheres = kMost;
+  if (largest.max_spheres == 0) largest.max_spheres = kMostCounted;
   packing::check_settings(largest);
   return thread_arena(settings.threads).execute([&] {
     return TargetBake(resolve(mesh, progress), target, settings, progress).run();

@@ -6,6 +6,8 @@
 
 namespace ist {
 
+constexpr std::size_t kMostCounted = 200'000;  ///< spheres, where the caller sets no limit
+
 /// Looks for about the fewest spheres whose error does, in few bakes: each answer is the next count
 /// to try. The error falls about as 1 / count.
 class CountSearch {

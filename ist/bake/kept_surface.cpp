@@ -5,26 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "bake/field/field.h"
-#include "bake/field/spatial_order.h"
 #include "bake/field/surface_patches.h"
+#include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
-#include "stage/aside.h"
+#include "mesh/triangle_frame.h"
+#include "numerics/rounding.h"
+#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
 
 constexpr std::uint32_t kNoVertex = ~0u;
-
-float rounded_down(double x) {
-  const auto f = static_cast<float>(x);
-  return double{f} > x ? std::nextafterf(f, -std::numeric_limits<float>::infinity()) : f;
-}
 
 struct Box {
   float low[3], high[3];
@@ -36,7 +31,7 @@ struct Box {
   void add(const double* x) {
     for (int k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], rounded_down(x[k]));
-      high[k] = std::max(high[k], -rounded_down(-x[k]));
+      high[k] = std::max(high[k], rounded_up(x[k]));
     }
   }
   void add(const Box& box) {
@@ -109,24 +104,19 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
 }
 
 void find_neighbours(MeshArrays& arrays) {
-  // The blocks around each vertex.
-  std::vector<std::uint32_t> first(arrays.header.vertex_count + 1);
-  for (const MeshBlock& block : arrays.blocks)
-    for (std::uint32_t i = 0; i < block.vertices; ++i) ++first[block.vertex[i] + 1];
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  std::vector<std::uint32_t> around(first.back());
-  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b)
-    for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
-      around[next[arrays.blocks[b].vertex[i]]++] = b;
-
+  const ItemGroups<> around(arrays.header.vertex_count,
+                            [&](const auto& visit) {  // blocks, vertices
+                              for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b)
+                                for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
+                                  visit(arrays.blocks[b].vertex[i], b);
+                            });
   std::vector<std::pair<std::uint32_t, std::uint32_t>> found;  // block, place of the vertex
   for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
     MeshBlock& block = arrays.blocks[b];
     found.clear();
     for (std::uint32_t i = 0; i < block.vertices; ++i)
-      for (std::uint32_t k = first[block.vertex[i]]; k < first[block.vertex[i] + 1]; ++k)
-        if (around[k] != b) found.emplace_back(around[k], i);
+      for (const std::uint32_t other : around[block.vertex[i]])
+        if (other != b) found.emplace_back(other, i);
     std::sort(found.begin(), found.end());
     block.first_neighbour = static_cast<std::uint32_t>(arrays.neighbours.size());
     for (std::size_t k = 0; k < found.size(); ++k)
@@ -186,15 +176,11 @@ void lay_out_boxes(std::vector<Box> below, MeshArrays& arrays) {
 
 /// Adds the integrals over a triangle, corners from the point that they are taken about.
 void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
-  double u[3], v[3], middle[3], n[3];
+  double middle[3], n[3];  // n: ∫ n dA
+  area_normal(p[0], p[1], p[2], n);
   for (int k = 0; k < 3; ++k) {
-    u[k] = p[1][k] - p[0][k];
-    v[k] = p[2][k] - p[0][k];
     middle[k] = ((p[0][k] + p[1][k]) + p[2][k]) / 3;
-  }
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    n[k] = (u[i] * v[j] - u[j] * v[i]) / 2;  // ∫ n dA
+    n[k] /= 2;
   }
   const double height = (middle[0] * n[0] + middle[1] * n[1]) + middle[2] * n[2];
   for (int i = 0; i < 3; ++i) {
@@ -254,7 +240,7 @@ void find_slabs(MeshArrays& arrays) {
           high = std::max(high, along);
         }
       box.slab_low[lane] = rounded_down(low - 1e-14);
-      box.slab_high[lane] = -rounded_down(-high - 1e-14);
+      box.slab_high[lane] = rounded_up(high + 1e-14);
     }
 }
 

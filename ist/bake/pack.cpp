@@ -6,17 +6,15 @@
 
 #include "bake/backend/make_backend.h"
 #include "packing/base/packing_settings.h"
-#include "packing/grids/grid_layout.h"
 #include "stage/thread_arena.h"
 
 namespace ist {
 
 std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings) {
   if (solid.mesh() == nullptr) throw Error("medial axis: the solid must be a mesh");
-  if (settings.resolution > packing::kMostCellsPerSide)
+  if (settings.resolution > kMostGridCells)
     throw Error("medial axis: resolution is " + std::to_string(settings.resolution) +
-                ", must be at most " + std::to_string(packing::kMostCellsPerSide) +
-                " (0 = automatic)");
+                ", must be at most " + std::to_string(kMostGridCells) + " (0 = automatic)");
   return thread_arena(settings.threads).execute([&] {
     return make_backend(solid, {settings.device, settings.gpu})->medial_nodes(settings);
   });

@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include "bake/count_search.h"
 #include "mesh/mesh_files.h"
 
 namespace ist {
@@ -69,7 +70,6 @@ std::uint64_t size_of(const std::string& path) {
 constexpr std::uint64_t kFixed = 48 << 20;
 constexpr std::uint64_t kPerTriangle = 600;
 constexpr std::uint64_t kPerSphere = 20'000;
-constexpr std::uint64_t kUnlimited = 200'000;  ///< spheres where no count is set
 
 /// The fewest bytes of a file that a triangle takes.
 std::uint64_t bytes_of_triangle(const std::string& path) {
@@ -93,7 +93,7 @@ std::uint64_t memory_of(const Job& job) {
     }
   }
   const std::uint64_t spheres =
-      job.settings.packing.max_spheres == 0 ? kUnlimited : job.settings.packing.max_spheres;
+      job.settings.packing.max_spheres == 0 ? kMostCounted : job.settings.packing.max_spheres;
   return kFixed + size / bytes_of_triangle(job.mesh) * kPerTriangle + spheres * kPerSphere;
 }
 

@@ -15,7 +15,6 @@
 
 #include <ist/error.h>
 
-#include "library/asset_name.h"
 #include "library/glob.h"
 #include "library/settings/numbers.h"
 #include "library/settings/spelling.h"

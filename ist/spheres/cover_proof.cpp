@@ -44,12 +44,12 @@ class SurfaceSearch {
       const CoverSphere& ball = balls_[i];
       double farthest = 0;
       for (const Vector3d& corner : t) farthest = std::max(farthest, distance(corner, ball.centre));
-      const double lacks = farthest + kMargin - ball.radius;
+      const double lacks = farthest + kDistanceMargin - ball.radius;
       gap = std::min(gap, distance(middle, ball.centre) - ball.radius);
       if (lacks < least) {
         least = lacks;
         part.ball = i;
-        part.radius = farthest + 4 * kMargin;
+        part.radius = farthest + 4 * kDistanceMargin;
       }
     }
     part.gap = std::max(0.0, gap);
@@ -60,7 +60,8 @@ class SurfaceSearch {
     }
     BallList list;
     for (const std::uint32_t i : from)
-      if (distance(middle, balls_[i].centre) - balls_[i].radius <= gap + 2 * reach + kMargin)
+      if (distance(middle, balls_[i].centre) - balls_[i].radius <=
+          gap + 2 * reach + kDistanceMargin)
         list.push_back(i);
     for (const HalvableTriangle& half : halves(t, longest_side(t).from))
       search(half, list, depth + 1);
@@ -68,7 +69,7 @@ class SurfaceSearch {
 
  private:
   static bool holds(const CoverSphere& ball, const std::array<Vector3d, 3>& t) {
-    const double within = ball.radius - 2 * kMargin;
+    const double within = ball.radius - 2 * kDistanceMargin;
     if (!(within > 0)) return false;
     for (const Vector3d& corner : t)
       if ((corner - ball.centre).squaredNorm() > within * within) return false;
@@ -102,9 +103,9 @@ class VoidSearch {
       const CoverSphere& ball = balls_[i];
       const Eigen::Array3d d = (cube.middle - ball.centre).array().abs();
       const double farthest = std::sqrt((d + cube.half).matrix().squaredNorm());
-      if (farthest + kMargin <= ball.radius) return Verdict::settled;
+      if (farthest + kDistanceMargin <= ball.radius) return Verdict::settled;
       const double nearest = std::sqrt((d - cube.half).max(0.0).matrix().squaredNorm());
-      if (nearest > ball.radius + kMargin) continue;
+      if (nearest > ball.radius + kDistanceMargin) continue;
       gap = std::min(gap, std::sqrt(d.matrix().squaredNorm()) - ball.radius);
       ++crossing;
       kept.push_back(i);
@@ -112,12 +113,13 @@ class VoidSearch {
     if (crossing < 3 || may_rise(cube, kept)) return Verdict::settled;
     // Where balls nearly coincide only this ends the division.
     if (gap > 0 || cube.half < kSmallCube) {
-      const double corner = 1.7320508075688774 * cube.half + kMargin;
+      const double corner = 1.7320508075688774 * cube.half + kDistanceMargin;
       if (!solid_.inside(cube.middle)) {
         if (solid_.closest_point(cube.middle, corner).triangle == kNoTriangle)
           return Verdict::settled;
-      } else if (gap > 0 && solid_.closest_point(cube.middle, kMargin).triangle == kNoTriangle &&
-                 gap > kMargin) {
+      } else if (gap > 0 &&
+                 solid_.closest_point(cube.middle, kDistanceMargin).triangle == kNoTriangle &&
+                 gap > kDistanceMargin) {
         open = {true, cube.middle, gap};
         return Verdict::open;
       }
@@ -152,11 +154,11 @@ class VoidSearch {
     Vector3d out = Vector3d::Zero();
     for (const std::uint32_t i : crossing) {
       const Vector3d d = cube.middle - balls_[i].centre;
-      out += d / std::max(std::sqrt(d.squaredNorm()), kMargin);
+      out += d / std::max(std::sqrt(d.squaredNorm()), kDistanceMargin);
     }
     Vector3d way = out - out.dot(up) * up;
     way += 1e-3 * std::sqrt(way.squaredNorm()) * up;
-    const double slack = cube.half * way.cwiseAbs().sum() + kMargin;
+    const double slack = cube.half * way.cwiseAbs().sum() + kDistanceMargin;
     return way.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
              return way.dot(cube.middle - balls_[i].centre) > slack;
            });
@@ -180,7 +182,7 @@ BallList outermost(std::span<const CoverSphere> balls) {
     const auto is_held = [&](std::uint32_t by) {
       const double reach = distance(balls[i].centre, balls[by].centre) + balls[i].radius;
       const bool same = balls[i].centre == balls[by].centre && balls[i].radius == balls[by].radius;
-      return same ? by < i : by != i && reach + kMargin <= balls[by].radius;
+      return same ? by < i : by != i && reach + kDistanceMargin <= balls[by].radius;
     };
     bool held = false;
     for (std::uint32_t by = 0; by < balls.size() && !held; ++by) held = is_held(by);

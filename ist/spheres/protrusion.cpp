@@ -31,7 +31,8 @@ class ProtrusionSearch {
     const ClosestPoint near = closest(ball_.centre);
     const bool inside = solid_.inside(ball_.centre);
     // No point of the ball is further out than its centre and its radius together.
-    whole_ = std::max(0.0, ball_.radius + (inside ? -near.distance : near.distance)) + kMargin;
+    whole_ =
+        std::max(0.0, ball_.radius + (inside ? -near.distance : near.distance)) + kDistanceMargin;
     // Where the solid is convex, this is the furthest.
     if (near.distance > 0)
       see(ball_.centre +
@@ -68,7 +69,7 @@ class ProtrusionSearch {
     double bound = std::min(whole_, near.distance + corner);
     if (bound <= threshold()) return settle(bound);
     // No surface is so near that a part of the cube could lie on its other side.
-    const bool one_sided = near.distance > corner + kMargin;
+    const bool one_sided = near.distance > corner + kDistanceMargin;
     if (!outside && solid_.inside(middle)) {
       if (one_sided) return;
       bound = std::min(bound, std::max(0.0, corner - near.distance));
@@ -112,7 +113,7 @@ class ProtrusionSearch {
         std::min(n.dot(ball_.centre - near.point) + ball_.radius, near.distance + corner);
     const double behind = near.distance - corner;
     const double along = std::max(std::abs(ahead), std::abs(behind));
-    return std::sqrt(along * along + corner * corner) + kMargin;
+    return std::sqrt(along * along + corner * corner) + kDistanceMargin;
   }
 
   static constexpr double kFinest = 1e-4;  ///< of the radius: less protrusion is not told apart

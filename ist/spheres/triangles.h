@@ -5,23 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mesh/mesh_view.h"
+#include "mesh/mesh_solid.h"
+#include "numerics/rounding.h"
 
 namespace ist {
-
-inline constexpr double kMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
-
-/// Unit frame.
-inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
-                                                       std::uint32_t triangle) {
-  std::array<Eigen::Vector3d, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const std::uint32_t vertex = mesh.triangles[3 * std::size_t{triangle} + k];
-    const double* const v = mesh.vertices + 3 * std::size_t{vertex};
-    corners[k] = {v[0], v[1], v[2]};
-  }
-  return corners;
-}
 
 /// The corners of a triangle that is cut into ever smaller ones.
 using HalvableTriangle = std::array<Eigen::Vector3d, 3>;

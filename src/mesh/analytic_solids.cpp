@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <numbers>
 #include <utility>
 
 namespace ist {
@@ -73,7 +74,7 @@ IntegratedVolume integrate_volume(const Solid& solid) {
   return {root * last[0], root * (change + chance)};
 }
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kPi = std::numbers::pi;
 
 /// A solid whose volume has no closed form: integrated when it is first asked for.
 class IntegratedSolid : public Solid {

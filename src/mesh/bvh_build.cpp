@@ -475,17 +475,9 @@ class TrianglesToSort {
     TriangleBlock block;
     for (int i = 0; i < kBvhWidth; ++i) {
       const std::uint32_t t = triangles[std::size_t(i)];
-      TriangleFrame<double> f = {{1e18, 1e18, 1e18}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
+      TriangleFrame<double> f = absent_frame();
       if (t != kNoTriangle) f = make_triangle_frame(corner(t, 0), corner(t, 1), corner(t, 2));
-      for (int k = 0; k < 3; ++k) {
-        block.origin[k][i] = static_cast<float>(f.origin[k]);
-        block.u[k][i] = static_cast<float>(f.u[k]);
-        block.v[k][i] = static_cast<float>(f.v[k]);
-        block.n[k][i] = static_cast<float>(f.n[k]);
-      }
-      block.length[i] = static_cast<float>(f.length);
-      block.apex[i] = static_cast<float>(f.apex);
-      block.height[i] = static_cast<float>(f.height);
+      write_frame(block, i, f);
       block.triangle[i] = t;
     }
     return block;

@@ -1,12 +1,9 @@
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
-#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -15,7 +12,6 @@
 #include <ist/error.h>
 #include <ist/mesh.h>
 
-#include "mesh/close_oriented.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
 #include "mesh/judge.h"
@@ -26,28 +22,17 @@
 #include "mesh/surface_reduction.h"
 #include "mesh/usable_mesh.h"
 #include "mesh/weld.h"
+#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
-
-/// How many of 0 … count − 1 are so.
-template <class IsSo>
-std::size_t count_if(const std::size_t count, const IsSo& is_so) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, count), std::size_t{0},
-      [&](const tbb::blocked_range<std::size_t>& range, std::size_t so) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) so += is_so(i) ? 1 : 0;
-        return so;
-      },
-      std::plus<>());
-}
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
   DisjointSets sets(mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
     for (const std::uint32_t side : edges.sides(e)) sets.unite(edges.sides(e)[0] / 3, side / 3);
   });
-  return count_if(mesh.triangles.size(), [&](const std::size_t t) {
+  return count_where(mesh.triangles.size(), [&](const std::size_t t) {
     return sets.find(static_cast<std::uint32_t>(t)) == t && !has_repeated_corner(mesh.triangles[t]);
   });
 }
@@ -73,7 +58,7 @@ std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable
       if (corners.find(static_cast<std::uint32_t>(c)) == c)
         std::atomic_ref<std::uint32_t>(fans[mesh.triangles[t][c % 3]]).fetch_add(1);
   });
-  return count_if(fans.size(), [&](const std::size_t v) { return fans[v] > 1; });
+  return count_where(fans.size(), [&](const std::size_t v) { return fans[v] > 1; });
 }
 
 /// All but self-intersections.
@@ -82,16 +67,16 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   report.vertices = mesh.vertices.size();
   report.triangles = mesh.triangles.size();
   report.bounds = bounds_of(mesh.vertices);
-  report.degenerate_triangles = count_if(mesh.triangles.size(), [&](const std::size_t t) {
+  report.degenerate_triangles = count_where(mesh.triangles.size(), [&](const std::size_t t) {
     return is_degenerate(mesh.vertices, mesh.triangles[t]);
   });
   report.components = count_components(mesh, edges);
   report.nonmanifold_vertices = count_nonmanifold_vertices(mesh, edges);
   report.boundary_edges =
-      count_if(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() == 1; });
+      count_where(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() == 1; });
   report.nonmanifold_edges =
-      count_if(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() >= 3; });
-  report.inconsistent_edges = count_if(edges.size(), [&](const std::size_t e) {
+      count_where(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() >= 3; });
+  report.inconsistent_edges = count_where(edges.size(), [&](const std::size_t e) {
     const auto sides = edges.sides(e);
     return sides.size() == 2 &&
            runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]);

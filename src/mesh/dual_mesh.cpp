@@ -9,7 +9,6 @@
 #include <string>
 
 #include "mesh/message_text.h"
-#include "mesh/polygonise_error.h"
 
 namespace ist {
 namespace {

@@ -20,6 +20,32 @@ constexpr double kOrient3dBound = (7 + 56 * kEpsilon) * kEpsilon;
 IST_HD inline int sign_of(double value) { return (value > 0) - (value < 0); }
 IST_HD inline double magnitude_of(double value) { return value < 0 ? -value : value; }
 
+/// a × b, and what bounds the rounding of its product with a third vector.
+struct BoundedCross {
+  double value[3], magnitude[3];
+
+  BoundedCross() = default;
+  BoundedCross(const double* a, const double* b) {
+    for (int k = 0; k < 3; ++k) {
+      const int i = (k + 1) % 3, j = (k + 2) % 3;
+      const double left = a[i] * b[j], right = a[j] * b[i];
+      value[k] = left - right;
+      magnitude[k] = magnitude_of(left) + magnitude_of(right);
+    }
+  }
+
+  /// Sign of the triple product with d; 0 where rounding may have decided it.
+  int side_of(const double* d) const {
+    constexpr double kUnderflow = 1e-290;
+    double product = 0, bound = 0;
+    for (int k = 0; k < 3; ++k) {
+      product += d[k] * value[k];
+      bound += magnitude_of(d[k]) * magnitude[k];
+    }
+    return magnitude_of(product) > kOrient3dBound * bound + kUnderflow ? sign_of(product) : 0;
+  }
+};
+
 /// A product of three doubles as a sum of four.
 struct ProductTerms {
   double term[4];

@@ -20,9 +20,13 @@ IST_HD inline Corners corners_of(const MeshView& mesh, std::uint32_t triangle) {
   return {{at(0), at(1), at(2)}};
 }
 
+IST_HD inline TriangleFrame<double> frame_of(const Corners& t) {
+  return make_triangle_frame(t.p[0], t.p[1], t.p[2]);
+}
+
 /// Closest point of a triangle by the double formula; returns the squared distance.
 IST_HD inline double exact_closest_in(const Corners& corners, const double p[3], double point[3]) {
-  const TriangleFrame<double> frame = make_triangle_frame(corners.p[0], corners.p[1], corners.p[2]);
+  const TriangleFrame<double> frame = frame_of(corners);
   const FramePoint<double> q = closest_in_frame(frame, p);
   for (int k = 0; k < 3; ++k) point[k] = frame.origin[k] + (q.x * frame.u[k] + q.y * frame.v[k]);
   return q.distance2;

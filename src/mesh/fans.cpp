@@ -1,4 +1,4 @@
-#include "mesh/fans.h"
+#include "mesh/self_intersections.h"
 
 #include <tbb/parallel_for.h>
 
@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <cstddef>
 #include <utility>
 
@@ -68,49 +67,27 @@ std::size_t ring_about(const std::uint32_t v, const Incidence& incidence,
   return 0;
 }
 
-/// a × b, and what bounds the rounding of its product with a third vector (exact_sign.h).
-struct Cross {
-  Eigen::Vector3d value, magnitude;
-
-  Cross(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-    for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      const double left = a[i] * b[j], right = a[j] * b[i];
-      value[k] = left - right;
-      magnitude[k] = std::abs(left) + std::abs(right);
-    }
-  }
-  Cross() = default;
-
-  /// Sign of the triple product with d; 0 where rounding may have decided it.
-  int side_of(const Eigen::Vector3d& d) const {
-    constexpr double kUnderflow = 1e-290;
-    const double product = value.dot(d);
-    const double rounding = exact_sign::kOrient3dBound * magnitude.dot(d.cwiseAbs()) + kUnderflow;
-    return std::abs(product) > rounding ? exact_sign::sign_of(product) : 0;
-  }
-};
-
 bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices,
                const std::array<std::uint32_t, kMostSpokes>& ring, const std::size_t count) {
   std::array<Eigen::Vector3d, kMostSpokes> spokes;
-  std::array<Cross, kMostSpokes> faces;
+  std::array<exact_sign::BoundedCross, kMostSpokes> faces;
   for (std::size_t i = 0; i < count; ++i) spokes[i] = vertices[ring[i]] - vertices[v];
   Eigen::Vector3d viewer = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < count; ++i) {
-    faces[i] = Cross(spokes[i], spokes[i + 1 < count ? i + 1 : 0]);
-    viewer += faces[i].value;
+    faces[i] = {spokes[i].data(), spokes[i + 1 < count ? i + 1 : 0].data()};
+    viewer += Eigen::Map<const Eigen::Vector3d>(faces[i].value);
   }
   const double length = viewer.cwiseAbs().maxCoeff();
   if (!(length > 0)) return false;
   viewer /= length;
   for (std::size_t i = 0; i < count; ++i)
-    if (faces[i].side_of(viewer) <= 0) return false;
+    if (faces[i].side_of(viewer.data()) <= 0) return false;
   // Each spoke is less than half a turn on from the one before. They go around once if they are
   // left of the first spoke, then perhaps one opposite to it, then right of it.
   int last = 1;
   for (std::size_t i = 2; i + 1 < count; ++i) {
-    const int side = Cross(spokes[0], spokes[i]).side_of(viewer);
+    const exact_sign::BoundedCross plane(spokes[0].data(), spokes[i].data());
+    const int side = plane.side_of(viewer.data());
     if (side > last || (side == 0 && last == 0)) return false;
     last = side;
   }

@@ -11,16 +11,6 @@
 namespace ist {
 namespace {
 
-/// Calls visit(line, crossing) for every crossing of a triangle with row j.
-template <class Visit>
-void for_row(const LineLattice& lattice, const Corners& t, std::uint32_t j, const Visit& visit) {
-  const LatticeRange lines = lines_of(lattice, t, j);
-  for (std::uint32_t i = lines.first; i < lines.last; ++i) {
-    const Crossing crossing = crossing_of(lattice, t, i, j);
-    if (crossing.sign != 0) visit(std::size_t{j} * lattice.ny + i, crossing);
-  }
-}
-
 /// Calls visit(line, crossing) for every crossing of the mesh, from many threads.
 template <class Visit>
 void for_crossings(const MeshView& mesh, const LineLattice& lattice, const Visit& visit) {

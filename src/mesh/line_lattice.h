@@ -95,4 +95,14 @@ struct LatticeCrossings {
 /// All crossings of a mesh (its arrays suffice) with a lattice. Runs on the caller's TBB threads.
 LatticeCrossings cross_lattice(const MeshView& mesh, const LineLattice& lattice);
 
+/// Calls visit(line, crossing) for every crossing of a triangle with row j.
+template <class Visit>
+void for_row(const LineLattice& lattice, const Corners& t, std::uint32_t j, const Visit& visit) {
+  const LatticeRange lines = lines_of(lattice, t, j);
+  for (std::uint32_t i = lines.first; i < lines.last; ++i) {
+    const Crossing crossing = crossing_of(lattice, t, i, j);
+    if (crossing.sign != 0) visit(std::size_t{j} * lattice.ny + i, crossing);
+  }
+}
+
 }  // namespace ist

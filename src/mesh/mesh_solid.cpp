@@ -185,7 +185,6 @@ double MeshSolid::volume_error() const {
 const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
 double MeshSolid::rounding() const { return impl_->rounding; }
 double MeshSolid::unit_volume() const { return impl_->with_moments().volume; }
-double MeshSolid::unit_volume_error() const { return impl_->with_moments().volume_error; }
 const MeshMoments& MeshSolid::unit_moments() const { return impl_->with_moments(); }
 bool MeshSolid::meets_itself() const { return impl_->meets_itself; }
 const std::vector<std::array<std::uint32_t, 2>>* MeshSolid::meeting_pairs() const {

@@ -20,6 +20,15 @@ struct ClosestPoint {
   std::uint32_t triangle = 0;                       ///< smallest index among equals
 };
 
+inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
+                                                       std::uint32_t triangle) {
+  std::array<Eigen::Vector3d, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k)
+    corners[k] = Eigen::Map<const Eigen::Vector3d>(
+        mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{triangle} + k]});
+  return corners;
+}
+
 /// The solid of a closed mesh. All internals live in the unit frame, in double; view() adds float
 /// copies for packing. Immutable; every function may be called from many threads at once. The
 /// hierarchy and the moments are made when they are first asked for, on the caller's TBB threads: a
@@ -36,9 +45,8 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   const MeshSolid* mesh() const noexcept override { return this; }
 
   const UnitFrame& frame() const;
-  double rounding() const;           ///< unit frame: no vertex was moved further on the way there
-  double unit_volume() const;        ///< unit frame³
-  double unit_volume_error() const;  ///< unit frame³
+  double rounding() const;     ///< unit frame: no vertex was moved further on the way there
+  double unit_volume() const;  ///< unit frame³
   const MeshMoments& unit_moments() const;
   /// Triangles of the mesh intersect, or may: they were not looked for.
   bool meets_itself() const;

@@ -14,6 +14,7 @@
 
 #include "mesh/edge_table.h"
 #include "mesh/exact_sign.h"
+#include "mesh/item_groups.h"
 #include "mesh/shells.h"
 #include "stage/raw_array.h"
 
@@ -58,7 +59,7 @@ class LineWinding {
       const double width = box.max()[k] - box.min()[k];
       cells_per_unit_[k] = width > 0 ? static_cast<double>(cells_) / width : 0;
     }
-    const auto for_each_cell = [&](const auto& visit) {
+    at_cells_ = ItemGroups<std::size_t>(cells_ * cells_, [&](const auto& visit) {
       for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
         Eigen::AlignedBox2d of_triangle;
         for (const std::uint32_t v : triangles_[i]) of_triangle.extend(vertices_[v].tail<2>());
@@ -67,14 +68,7 @@ class LineWinding {
         for (std::size_t y = first / cells_; y <= last / cells_; ++y)
           for (std::size_t z = first % cells_; z <= last % cells_; ++z) visit(y * cells_ + z, i);
       }
-    };
-    begin_.assign(cells_ * cells_ + 1, 0);
-    for_each_cell([&](const std::size_t cell, std::uint32_t) { ++begin_[cell + 1]; });
-    for (std::size_t c = 0; c + 1 < begin_.size(); ++c) begin_[c + 1] += begin_[c];
-    listed_.resize(begin_.back());
-    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-    for_each_cell(
-        [&](const std::size_t cell, const std::uint32_t i) { listed_[next[cell]++] = i; });
+    });
   }
 
   /// Sets numbers[s] to the winding number of shell s around p, for every shell in `shells_met`,
@@ -82,9 +76,8 @@ class LineWinding {
   void around(const Eigen::Vector3d& p, std::vector<int>& numbers,
               std::vector<std::uint32_t>& shells_met) const {
     shells_met.clear();
-    const std::size_t cell = column(p[1], p[2]);
-    for (std::size_t i = begin_[cell]; i < begin_[cell + 1]; ++i) {
-      const Triangle& t = triangles_[listed_[i]];
+    for (const std::uint32_t i : at_cells_[column(p[1], p[2])]) {
+      const Triangle& t = triangles_[i];
       const std::array<Eigen::Vector3d, 3> corners{vertices_[t[0]], vertices_[t[1]],
                                                    vertices_[t[2]]};
       const int turns = turns_around(corners, p);
@@ -92,7 +85,7 @@ class LineWinding {
       // Beyond p in the direction of +x? Then p lies behind a triangle that faces that way.
       if (orient3d_sign(corners[0].data(), corners[1].data(), corners[2].data(), p.data()) != turns)
         continue;
-      const std::uint32_t shell = shells_.of_triangle[listed_[i]];
+      const std::uint32_t shell = shells_.of_triangle[i];
       if (std::find(shells_met.begin(), shells_met.end(), shell) == shells_met.end())
         shells_met.push_back(shell);
       numbers[shell] += turns;
@@ -114,8 +107,7 @@ class LineWinding {
   // Triangles by the cells that their projection onto the yz plane may touch.
   Eigen::Vector2d low_ = Eigen::Vector2d::Zero(), cells_per_unit_ = Eigen::Vector2d::Zero();
   std::size_t cells_ = 1;  ///< in each direction
-  std::vector<std::size_t> begin_;
-  std::vector<std::uint32_t> listed_;
+  ItemGroups<std::size_t> at_cells_;
 };
 
 struct Shell {

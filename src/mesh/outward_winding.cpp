@@ -75,16 +75,11 @@ void look_along(const std::vector<std::array<double, 3>>& points,
     const auto corner = [&](std::size_t k) { return points[triangles[t][k]].data(); };
     const Corners corners = {{corner(0), corner(1), corner(2)}};
     const LatticeRange rows = rows_of(lattice, corners);
-    for (std::uint32_t j = rows.first; j < rows.last; ++j) {
-      const LatticeRange lines = lines_of(lattice, corners, j);
-      for (std::uint32_t i = lines.first; i < lines.last; ++i) {
-        const Crossing crossing = crossing_of(lattice, corners, i, j);
-        if (crossing.sign == 0) continue;
-        const std::size_t line = std::size_t{j} * lattice.ny + i;
+    for (std::uint32_t j = rows.first; j < rows.last; ++j)
+      for_row(lattice, corners, j, [&](std::size_t line, const Crossing& crossing) {
         low[line].offer({crossing.x, t, crossing.sign > 0});
         high[line].offer({-crossing.x, t, crossing.sign < 0});
-      }
-    }
+      });
   }
   for (const std::vector<Seen>* const end : {&low, &high})
     for (const Seen& seen : *end)
@@ -186,16 +181,11 @@ SoupWinding::Far SoupWinding::far_of_block(std::uint32_t block) const {
   for (const std::uint32_t triangle : mesh_.blocks[block].triangle) {
     if (triangle == kNoTriangle) continue;
     const Corners t = corners_of(mesh_, triangle);
-    double a[3], b[3];
-    for (int k = 0; k < 3; ++k) {
-      a[k] = t.p[1][k] - t.p[0][k];
-      b[k] = t.p[2][k] - t.p[0][k];
-      centroid[count][k] = (t.p[0][k] + t.p[1][k] + t.p[2][k]) / 3;
-    }
+    area_normal(t.p[0], t.p[1], t.p[2], normal[count]);
     double squares = 0;
     for (int k = 0; k < 3; ++k) {
-      const int i = (k + 1) % 3, j = (k + 2) % 3;
-      normal[count][k] = (a[i] * b[j] - a[j] * b[i]) / 2;
+      centroid[count][k] = (t.p[0][k] + t.p[1][k] + t.p[2][k]) / 3;
+      normal[count][k] /= 2;
       squares += normal[count][k] * normal[count][k];
     }
     const double area = std::sqrt(squares);

@@ -1,4 +1,4 @@
-#include "mesh/polygonise_error.h"
+#include "mesh/dual_mesh.h"
 
 #include <tbb/parallel_for.h>
 
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mesh/exact_triangle.h"
+#include "mesh/item_groups.h"
 
 namespace ist {
 namespace {
@@ -161,31 +162,16 @@ class CellError {
   const std::vector<TriangleFrame<double>> triangles_;
 };
 
-/// The triangles at every vertex.
-struct Fans {
-  std::vector<std::uint32_t> first, triangles;
-
-  explicit Fans(const TriangleMesh& mesh) : first(mesh.vertices.size() + 1, 0) {
-    for (const auto& t : mesh.triangles)
-      for (const std::uint32_t v : t) ++first[v + 1];
-    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) first[v + 1] += first[v];
-    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-    triangles.resize(first.back());
-    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-      for (const std::uint32_t v : mesh.triangles[t]) triangles[next[v]++] = t;
-  }
-};
-
 /// Triangles at the vertices of a cell and, where those are none or `around`, of its neighbours.
 std::vector<TriangleFrame<double>> triangles_near(const std::vector<SurfaceCell>& cells,
                                                   const SurfaceCell& cell, bool around,
-                                                  const Fans& fans, const TriangleMesh& mesh) {
+                                                  const ItemGroups<>& fans,
+                                                  const TriangleMesh& mesh) {
   std::vector<std::uint32_t> found;
   const auto take = [&](const SurfaceCell* from) {
     if (from == nullptr) return;
     for (std::uint32_t v = from->first_vertex; v < from->first_vertex + from->loops; ++v)
-      found.insert(found.end(), fans.triangles.begin() + fans.first[v],
-                   fans.triangles.begin() + fans.first[v + 1]);
+      found.insert(found.end(), fans[v].begin(), fans[v].end());
   };
   take(&cell);
   if (around)
@@ -231,7 +217,7 @@ double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleM
 
 double surface_to_mesh(const Solid& solid, const CellGrid& grid,
                        const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh) {
-  const Fans fans(mesh);
+  const ItemGroups<> fans = triangles_at_vertices(mesh);
   std::vector<double> bounds(cells.size());
   const double near = grid.edge * near_enough(bounds.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t c) {

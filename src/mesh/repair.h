@@ -1,6 +1,12 @@
 #pragma once
 
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include <ist/mesh.h>
+
+#include "mesh/edge_table.h"
 
 namespace ist {
 
@@ -8,5 +14,18 @@ namespace ist {
 /// of the diagonal, drops fins and open sheets, caps the holes that are left. Says in the report's
 /// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.
 TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report);
+
+/// A closed walk along edges that have an odd number of sides.
+struct BorderLoop {
+  std::vector<std::uint32_t> vertices;  ///< in order, each once
+  std::uint32_t edge = kNoIndex;        ///< one of its edges
+};
+
+/// Loops that together run along every odd edge once. (There are always such: the border of a
+/// surface has no end.)
+std::vector<BorderLoop> border_loops(const EdgeTable& edges);
+
+/// Triangles that span a loop, in its own plane where it has one.
+std::vector<Triangle> cap(const std::vector<Eigen::Vector3d>& vertices, const BorderLoop& loop);
 
 }  // namespace ist

@@ -12,9 +12,9 @@
 #include <numeric>
 #include <utility>
 
-#include "mesh/fans.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/usable_mesh.h"
+#include "numerics/hashing.h"
 #include "stage/raw_array.h"
 
 namespace ist {
@@ -122,16 +122,6 @@ constexpr std::uint64_t kLeftOut = UINT64_MAX;
 constexpr int kIndexBits = 21;
 constexpr float kCells = 1 << 14;  ///< of the curve, along each axis
 
-/// The lowest 21 bits, two zeros after each.
-std::uint64_t spread(std::uint64_t x) {
-  x = (x | x << 32) & 0x001f00000000ffffu;
-  x = (x | x << 16) & 0x001f0000ff0000ffu;
-  x = (x | x << 8) & 0x100f00f00f00f00fu;
-  x = (x | x << 4) & 0x10c30c30c30c30c3u;
-  x = (x | x << 2) & 0x1249249249249249u;
-  return x;
-}
-
 /// In [0, 1], with the order along each axis kept.
 RawArray<FloatPoint> placed(const std::vector<Eigen::Vector3d>& vertices) {
   const Eigen::AlignedBox3d bounds = bounds_of(vertices);
@@ -151,7 +141,7 @@ std::uint64_t key_of(const RawArray<FloatPoint>& points, const Triangle& t) {
   std::uint64_t key = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const float middle = (points[t[0]][k] + points[t[1]][k] + points[t[2]][k]) / 3;
-    key |= spread(static_cast<std::uint64_t>(std::min(middle * kCells, kCells - 1))) << k;
+    key |= spread_bits(static_cast<std::uint64_t>(std::min(middle * kCells, kCells - 1))) << k;
   }
   return key;
 }

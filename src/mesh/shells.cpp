@@ -1,7 +1,6 @@
 #include "mesh/shells.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
@@ -10,6 +9,8 @@
 #include <atomic>
 #include <cmath>
 #include <utility>
+
+#include "stage/thread_arena.h"
 
 namespace ist {
 
@@ -150,23 +151,6 @@ std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& t
   return first == kNoIndex ? std::nullopt : std::optional(first);
 }
 
-namespace {
-
-/// Edges of more than two sides, ascending.
-std::vector<std::uint32_t> crowded_edges(const EdgeTable& edges) {
-  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> of_threads;
-  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(edges.size()),
-                    [&](const std::uint32_t e) {
-                      if (edges.sides(e).size() > 2) of_threads.local().push_back(e);
-                    });
-  std::vector<std::uint32_t> crowded;
-  for (const auto& found : of_threads) crowded.insert(crowded.end(), found.begin(), found.end());
-  std::sort(crowded.begin(), crowded.end());
-  return crowded;
-}
-
-}  // namespace
-
 Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
   DisjointSets pieces(triangles.size());
   tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
@@ -174,7 +158,9 @@ Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edge
     if (sides.size() == 2) pieces.unite(sides[0] / 3, sides[1] / 3);
   });
   std::vector<std::pair<std::uint32_t, int>> sums;  // piece, balance at this edge
-  for (const std::uint32_t e : crowded_edges(edges)) {
+  const std::vector<std::uint32_t> crowded =
+      indices_where(edges.size(), [&](std::size_t e) { return edges.sides(e).size() > 2; });
+  for (const std::uint32_t e : crowded) {
     const auto sides = edges.sides(e);
     sums.clear();
     for (const std::uint32_t side : sides) {

@@ -7,19 +7,13 @@
 
 #include <ist/error.h>
 
+#include "numerics/hashing.h"
+
 namespace ist {
 namespace {
 
 // Where the box begins in the grid: off the planes that models like.
 constexpr double kBoxStart[3] = {1.3819, 1.4142, 1.3028};
-
-std::uint64_t spread_bits(std::uint64_t v) {
-  v = (v | v << 32) & 0x001f00000000ffffu;
-  v = (v | v << 16) & 0x001f0000ff0000ffu;
-  v = (v | v << 8) & 0x100f00f00f00f00fu;
-  v = (v | v << 4) & 0x10c30c30c30c30c3u;
-  return (v | v << 2) & 0x1249249249249249u;
-}
 
 }  // namespace
 

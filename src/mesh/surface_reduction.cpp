@@ -1,8 +1,6 @@
 #include "mesh/surface_reduction.h"
 
 #include <tbb/blocked_range.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include <Eigen/Geometry>
@@ -14,6 +12,7 @@
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/exact_sign.h"
+#include "stage/thread_arena.h"
 
 namespace ist {
 
@@ -32,13 +31,7 @@ bool is_degenerate(const std::vector<Eigen::Vector3d>& vertices, const Triangle&
 }
 
 std::size_t count_odd_edges(const EdgeTable& edges) {
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, edges.size()), std::size_t{0},
-      [&](const tbb::blocked_range<std::size_t>& range, std::size_t odd) {
-        for (std::size_t e = range.begin(); e < range.end(); ++e) odd += edges.sides(e).size() % 2;
-        return odd;
-      },
-      std::plus<>());
+  return count_where(edges.size(), [&](std::size_t e) { return edges.sides(e).size() % 2 == 1; });
 }
 
 namespace {
@@ -67,15 +60,8 @@ void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& tr
 std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
                                            std::vector<Triangle>& triangles,
                                            const EdgeTable& edges) {
-  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> of_threads;
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
-    if (is_degenerate(vertices, triangles[t]))
-      of_threads.local().push_back(static_cast<std::uint32_t>(t));
-  });
-  std::vector<std::uint32_t> degenerate;
-  for (const auto& found : of_threads)
-    degenerate.insert(degenerate.end(), found.begin(), found.end());
-  std::sort(degenerate.begin(), degenerate.end());
+  const std::vector<std::uint32_t> degenerate = indices_where(
+      triangles.size(), [&](std::size_t t) { return is_degenerate(vertices, triangles[t]); });
   std::vector<std::uint32_t> dropped, open;
   for (const std::uint32_t t : degenerate)
     (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);

@@ -44,6 +44,14 @@ IST_HD inline void cross3(const Real a[3], const Real b[3], Real out[3]) {
   }
 }
 
+/// (b − a) × (c − a): the normal of a triangle, twice its area long.
+template <class Real>
+IST_HD inline void area_normal(const Real a[3], const Real b[3], const Real c[3], Real out[3]) {
+  const Real u[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+  const Real v[3] = {c[0] - a[0], c[1] - a[1], c[2] - a[2]};
+  cross3(u, v, out);
+}
+
 template <class Real>
 IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3], const Real c[3]) {
   // Choices instead of indices: what is indexed at run time leaves a GPU's registers.
@@ -89,6 +97,25 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   }
   cross3(f.u, f.v, f.n);
   return f;
+}
+
+/// Of a lane without a triangle: far from everything.
+IST_HD inline TriangleFrame<double> absent_frame() {
+  return {{1e18, 1e18, 1e18}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
+}
+
+/// Rounds a frame into a lane of a hierarchy's block (TriangleBlock, WideBlock).
+template <class Block>
+IST_HD void write_frame(Block& block, int lane, const TriangleFrame<double>& f) {
+  for (int k = 0; k < 3; ++k) {
+    block.origin[k][lane] = static_cast<float>(f.origin[k]);
+    block.u[k][lane] = static_cast<float>(f.u[k]);
+    block.v[k][lane] = static_cast<float>(f.v[k]);
+    block.n[k][lane] = static_cast<float>(f.n[k]);
+  }
+  block.length[lane] = static_cast<float>(f.length);
+  block.apex[lane] = static_cast<float>(f.apex);
+  block.height[lane] = static_cast<float>(f.height);
 }
 
 /// Closest point of the triangle (0, 0), (length, 0), (apex, height) to (x, y), z off its plane.

@@ -28,23 +28,14 @@ struct Side {
 /// is in common lies in the plane, hence in shared corners and sides.
 bool plane_parts(const Side& of, const Side& other) {
   const Point &a = *of.corner[0], p = *of.corner[1] - a, q = *of.corner[2] - a;
-  Point normal, magnitude;
-  for (int k = 0; k < 3; ++k) {
-    const int i = (k + 1) % 3, j = (k + 2) % 3;
-    const double left = p[i] * q[j], right = p[j] * q[i];
-    normal[k] = left - right;
-    magnitude[k] = std::abs(left) + std::abs(right);
-  }
+  const exact_sign::BoundedCross normal(p.data(), q.data());
   bool above = false, below = false;
   for (std::size_t k = 0; k < 3; ++k) {
     if (other.shared[k]) continue;
     const Point r = *other.corner[k] - a;
-    const double volume = r[0] * normal[0] + r[1] * normal[1] + r[2] * normal[2];
-    const double bound = exact_sign::kOrient3dBound *
-                         (std::abs(r[0]) * magnitude[0] + std::abs(r[1]) * magnitude[1] +
-                          std::abs(r[2]) * magnitude[2]);
-    if (!(std::abs(volume) > bound)) return false;
-    (volume > 0 ? above : below) = true;
+    const int side = normal.side_of(r.data());
+    if (side == 0) return false;
+    (side > 0 ? above : below) = true;
   }
   return above != below;
 }
@@ -72,9 +63,9 @@ bool line_parts(const Side& of, const Side& other, const int x, const int y) {
   return false;
 }
 
-using Corners = std::array<Point, 3>;
+using CornerPoints = std::array<Point, 3>;
 
-int side_of(const Corners& t, const Point& p) {
+int side_of(const CornerPoints& t, const Point& p) {
   // The usual case in machine parts, decided without exact arithmetic.
   for (int k = 0; k < 3; ++k)
     if (t[0][k] == p[k] && t[1][k] == p[k] && t[2][k] == p[k]) return 0;
@@ -84,7 +75,7 @@ int side_of(const Corners& t, const Point& p) {
 /// Signs of areas in a coordinate plane in which a triangle keeps its area.
 class FlatView {
  public:
-  explicit FlatView(const Corners& t) {
+  explicit FlatView(const CornerPoints& t) {
     while (skip_ < 2 && turn(t[0], t[1], t[2]) == 0) ++skip_;
   }
   int turn(const Point& a, const Point& b, const Point& c) const {
@@ -118,7 +109,7 @@ bool all_on_one_side(const int a, const int b, const int c) {
 }
 
 /// Closed segment and closed triangle.
-bool segment_meets_triangle(const Point& p, const Point& q, const Corners& t) {
+bool segment_meets_triangle(const Point& p, const Point& q, const CornerPoints& t) {
   const int side_p = side_of(t, p), side_q = side_of(t, q);
   if (side_p * side_q > 0) return false;
   if (side_p != 0 ||
@@ -141,12 +132,12 @@ Triangle rotated(const Triangle& t, const std::size_t k) {
   return {t[k], t[(k + 1) % 3], t[(k + 2) % 3]};
 }
 
-Corners corners_of(const std::vector<Point>& vertices, const Triangle& t) {
+CornerPoints corners_of(const std::vector<Point>& vertices, const Triangle& t) {
   return {vertices[t[0]], vertices[t[1]], vertices[t[2]]};
 }
 
-bool disjoint_pair_meets(const Corners& a, const Corners& b) {
-  const auto apart = [](const Corners& t, const Corners& of) {
+bool disjoint_pair_meets(const CornerPoints& a, const CornerPoints& b) {
+  const auto apart = [](const CornerPoints& t, const CornerPoints& of) {
     const int first = side_of(t, of[0]);
     return first != 0 && side_of(t, of[1]) == first && side_of(t, of[2]) == first;
   };
@@ -180,17 +171,17 @@ bool meet_elsewhere(const std::vector<Point>& vertices, const Triangle& a, const
     (in_a ? shared_in_b : lone_in_b) = i;
   }
   if (shared == 3) return true;
-  const Corners corners_a = corners_of(vertices, a), corners_b = corners_of(vertices, b);
+  const CornerPoints corners_a = corners_of(vertices, a), corners_b = corners_of(vertices, b);
   if (shared == 2) {  // folded flat onto each other?
     if (side_of(corners_a, corners_b[lone_in_b]) != 0) return false;
     const FlatView view(corners_a);
-    const Corners hinge = corners_of(vertices, rotated(a, lone_in_a));
+    const CornerPoints hinge = corners_of(vertices, rotated(a, lone_in_a));
     return view.turn(hinge[1], hinge[2], hinge[0]) ==
            view.turn(hinge[1], hinge[2], corners_b[lone_in_b]);
   }
   if (shared == 1) {  // what they have in common beyond the corner reaches one's opposite side
-    const Corners from_a = corners_of(vertices, rotated(a, shared_in_a));
-    const Corners from_b = corners_of(vertices, rotated(b, shared_in_b));
+    const CornerPoints from_a = corners_of(vertices, rotated(a, shared_in_a));
+    const CornerPoints from_b = corners_of(vertices, rotated(b, shared_in_b));
     return segment_meets_triangle(from_a[1], from_a[2], corners_b) ||
            segment_meets_triangle(from_b[1], from_b[2], corners_a);
   }

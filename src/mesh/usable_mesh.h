@@ -18,4 +18,8 @@ Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
 /// The largest magnitude of a coordinate.
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 
+/// As close_mesh(), of a closed surface whose triangles face outward already: none is turned.
+/// Shells that face inward count as cavities.
+ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
+
 }  // namespace ist

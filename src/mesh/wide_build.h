@@ -57,12 +57,8 @@ struct WideMoments {
       }
       count += 1;
     }
-    float ab[3], ac[3], area[3];
-    for (int k = 0; k < 3; ++k) {
-      ab[k] = e[1][k] - e[0][k];
-      ac[k] = e[2][k] - e[0][k];
-    }
-    cross3(ab, ac, area);
+    float area[3];
+    area_normal(e[0], e[1], e[2], area);
     for (int k = 0; k < 3; ++k) normal[k] += area[k];
   }
 
@@ -154,21 +150,13 @@ struct WideOrientedBox {
 /// Writes a lane of a block; its corners are looked up in `vertices`. kNoTriangle: an empty lane.
 IST_HD inline void write_lane(WideBlock& block, int lane, const double* vertices,
                               std::uint32_t triangle, const std::uint32_t corner[3]) {
-  TriangleFrame<double> f = {{1e18, 1e18, 1e18}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
+  TriangleFrame<double> f = absent_frame();
   if (triangle != kNoTriangle)
     f = make_triangle_frame(vertices + 3 * std::size_t{corner[0]},
                             vertices + 3 * std::size_t{corner[1]},
                             vertices + 3 * std::size_t{corner[2]});
-  for (int k = 0; k < 3; ++k) {
-    block.origin[k][lane] = static_cast<float>(f.origin[k]);
-    block.u[k][lane] = static_cast<float>(f.u[k]);
-    block.v[k][lane] = static_cast<float>(f.v[k]);
-    block.n[k][lane] = static_cast<float>(f.n[k]);
-    block.corner[k][lane] = triangle != kNoTriangle ? corner[k] : 0;
-  }
-  block.length[lane] = static_cast<float>(f.length);
-  block.apex[lane] = static_cast<float>(f.apex);
-  block.height[lane] = static_cast<float>(f.height);
+  write_frame(block, lane, f);
+  for (int k = 0; k < 3; ++k) block.corner[k][lane] = triangle != kNoTriangle ? corner[k] : 0;
   block.triangle[lane] = triangle;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "numerics/host_device.h"
 
@@ -9,7 +10,7 @@ namespace ist {
 /// atan2(y, x) [rad] within 1e-15, 0 for the origin. The C library's may differ between processors;
 /// this is of + − × ÷ and square roots alone.
 IST_HD inline double angle_of(double y, double x) {
-  constexpr double kHalfTurn = 3.141592653589793;
+  constexpr double kHalfTurn = std::numbers::pi;
   const double ax = x < 0 ? -x : x, ay = y < 0 ? -y : y;
   const bool steep = ay > ax;
   const double larger = steep ? ay : ax;

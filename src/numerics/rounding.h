@@ -6,6 +6,9 @@
 
 namespace ist {
 
+/// Above the rounding of any distance in the unit frame, in double.
+constexpr double kDistanceMargin = 1e-12;
+
 /// Largest float not above x.
 IST_HD inline float rounded_down(double x) {
   const auto nearest = static_cast<float>(x);

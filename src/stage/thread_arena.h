@@ -1,11 +1,20 @@
 #pragma once
 
 #include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/concurrent_vector.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <future>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace ist {
 
@@ -26,6 +35,45 @@ void for_each_index(std::size_t from, std::size_t to, std::size_t grain, const W
                             [&](const oneapi::tbb::blocked_range<std::size_t>& range) {
                               for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
                             });
+}
+
+/// How many of 0 … count − 1 are so.
+template <class IsSo>
+std::size_t count_where(std::size_t count, const IsSo& is_so) {
+  return oneapi::tbb::parallel_reduce(
+      oneapi::tbb::blocked_range<std::size_t>(0, count), std::size_t{0},
+      [&](const oneapi::tbb::blocked_range<std::size_t>& range, std::size_t so) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) so += is_so(i) ? 1 : 0;
+        return so;
+      },
+      std::plus<>());
+}
+
+/// Which of 0 … count − 1 are so: few.
+template <class IsSo>
+std::vector<std::uint32_t> indices_where(std::size_t count, const IsSo& is_so) {
+  oneapi::tbb::concurrent_vector<std::uint32_t> found;
+  oneapi::tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    if (is_so(i)) found.push_back(static_cast<std::uint32_t>(i));
+  });
+  std::vector<std::uint32_t> sorted(found.begin(), found.end());
+  std::sort(sorted.begin(), sorted.end());
+  return sorted;
+}
+
+/// Does work on a thread of its own, whose loops have `threads` threads of theirs. Waits for it
+/// where the future is dropped.
+template <class Work>
+std::future<std::invoke_result_t<Work>> do_aside(unsigned threads, Work work) {
+  return std::async(std::launch::async, [threads, work = std::move(work)] {
+    return thread_arena(threads).execute(work);
+  });
+}
+
+/// Asks `meanwhile` twenty times a second until a result is there.
+template <class Future, class Meanwhile>
+void wait_for(const Future& future, const Meanwhile& meanwhile) {
+  while (future.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) meanwhile();
 }
 
 }  // namespace ist

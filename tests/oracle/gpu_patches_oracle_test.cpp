@@ -16,7 +16,7 @@ TEST(GpuPatchesOracle, AreThoseOfTheCpu) {
   ContactSettings settings;
   settings.field = FieldUse::never;
   constexpr std::uint32_t kMost = 8;
-  for (const std::string& key : kPairKeys) {
+  for (const std::string key : {"eledino", "ico1k"}) {  // spheres do not know the size of a mesh
     constexpr std::size_t kSpheres = 1500;
     const std::vector<OracleRow> rows = read_oracle_rows(key);
     std::vector<BatchPair> pairs;

@@ -11,7 +11,7 @@ namespace {
 TEST(GpuSeparationOracle, IntervalsHoldTheSolidsDistance) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   Workspace workspace;
-  for (const std::string& key : kPairKeys) {
+  for (const std::string key : {"eledino", "ico1k"}) {  // spheres do not know the size of a mesh
     constexpr std::size_t kSpheres = 1500;
     const std::vector<OracleRow> rows = read_oracle_rows(key);
     std::vector<BatchPair> pairs;

@@ -9,7 +9,7 @@
 #include <ist/mesh.h>
 
 #include "mesh/edge_table.h"
-#include "mesh/fill_holes.h"
+#include "mesh/repair.h"
 #include "support/test_meshes.h"
 
 namespace ist {

@@ -10,7 +10,6 @@
 #include <ist/error.h>
 #include <ist/mesh.h>
 
-#include "mesh/fans.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/weld.h"

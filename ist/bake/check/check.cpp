@@ -12,7 +12,6 @@
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tally.h"
-#include "bake/check/checked_solid.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/polygonise.h"
@@ -139,7 +138,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
       turning.named("inertia",
                     "difference of the header's inertia and the mesh's, above 1e-12, of the "
                     "trace")};
-  for (Invariant& one : sampled(asset, solid)) out.push_back(std::move(one));
+  append(out, sampled(asset, solid));
   return out;
 }
 
@@ -188,10 +187,6 @@ class DistanceSolid final : public CheckedSolid {
   UnitFrame frame_;
   Eigen::AlignedBox3d bounds_;
 };
-
-void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
-  for (Invariant& one : more) all.push_back(std::move(one));
-}
 
 Bounding bounding_of(const ClosedMesh& mesh) {
   if (mesh.report.meets_itself) return Bounding::parts;

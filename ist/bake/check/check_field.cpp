@@ -13,14 +13,14 @@
 namespace ist {
 namespace {
 
-using Corners = CheckSurface::Corners;
+using CheckCorners = CheckSurface::Corners;
 using Point = Eigen::Vector3d;
 
 /// Every edge is run as often one way as the other.
-Invariant closed(const std::vector<Corners>& triangles) {
+Invariant closed(const std::vector<CheckCorners>& triangles) {
   using Key = std::array<double, 6>;
   std::map<Key, std::ptrdiff_t> balance;
-  for (const Corners& t : triangles)
+  for (const CheckCorners& t : triangles)
     for (std::size_t k = 0; k < 3; ++k) {
       const Point &a = t[k], &b = t[(k + 1) % 3];
       const bool up = std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
@@ -82,7 +82,7 @@ class NearProof {
   NearProof(const CheckSurface& to, double error)
       : to_(to), error_(error * (1 + 1e-6) + 1e-11), smallest_(std::max(1e-3 * error, 1e-9)) {}
 
-  void prove(const Corners& part, std::size_t index, Tally& tally) const {
+  void prove(const CheckCorners& part, std::size_t index, Tally& tally) const {
     int left = kMostParts;
     tally.add(beyond({part.begin(), part.end()}, left) - error_, index);
   }
@@ -113,7 +113,7 @@ class NearProof {
   }
 
   /// The part over the triangle, and those beyond its sides; halves where there is only one.
-  static std::vector<Polygon> pieces(const Polygon& part, const Corners& t) {
+  static std::vector<Polygon> pieces(const Polygon& part, const CheckCorners& t) {
     const Point normal = (t[1] - t[0]).cross(t[2] - t[0]);
     std::vector<Polygon> pieces;
     Polygon over = part;
@@ -137,7 +137,7 @@ class NearProof {
 };
 
 Invariant near(const std::string& name, const std::string& of,
-               const std::vector<Corners>& triangles, const CheckSurface& to, double error) {
+               const std::vector<CheckCorners>& triangles, const CheckSurface& to, double error) {
   const NearProof proof(to, error);
   return tally_all(triangles.size(),
                    [&](std::size_t i, Tally& tally) { proof.prove(triangles[i], i, tally); })
@@ -145,20 +145,20 @@ Invariant near(const std::string& name, const std::string& of,
 }
 
 /// Whether a point of a triangle is between inside and outside, not between shells of the solid.
-bool bounds_at(const CheckSurface& surface, const Corners& triangle, const Point& p) {
+bool bounds_at(const CheckSurface& surface, const CheckCorners& triangle, const Point& p) {
   const Point step =
       (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized() * 1e-9;
   return surface.winding(p + step) <= 0 && surface.winding(p - step) >= 1;
 }
 
 /// Those triangles that bound the solid as a whole.
-std::vector<Corners> boundary(const CheckSurface& surface) {
-  const std::vector<Corners>& all = surface.triangles();
+std::vector<CheckCorners> boundary(const CheckSurface& surface) {
+  const std::vector<CheckCorners>& all = surface.triangles();
   std::vector<char> bounds(all.size());
   tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
     bounds[i] = bounds_at(surface, all[i], (all[i][0] + all[i][1] + all[i][2]) / 3);
   });
-  std::vector<Corners> kept;
+  std::vector<CheckCorners> kept;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (bounds[i] != 0) kept.push_back(all[i]);
   return kept;
@@ -174,7 +174,7 @@ Invariant parts_near(const std::string& name, const CheckSurface& mesh, const Ch
   while (rows < 16 && 4 * static_cast<std::size_t>(rows * rows) * count <= kPoints) rows *= 2;
   return tally_all(count,
                    [&](std::size_t i, Tally& tally) {
-                     const Corners& t = mesh.triangles()[i];
+                     const CheckCorners& t = mesh.triangles()[i];
                      double worst = -error;
                      for (int j = 0; j < rows; ++j)
                        for (int k = 0; j + k < rows; ++k) {
@@ -240,8 +240,7 @@ std::vector<Invariant> check_field(const AssetHeader& asset, const CheckSurface&
   std::vector<Invariant> out = check_near("field", of_field, solid, field.error, bounding);
   out.push_back(closed(of_field.triangles()));
   if (field.level_count > 1) out.push_back(balls(asset, field, triangles));
-  for (Invariant& one : check_field_cells(asset, field, of_field, solid))
-    out.push_back(std::move(one));
+  append(out, check_field_cells(asset, field, of_field, solid));
   return out;
 }
 

@@ -13,7 +13,7 @@
 namespace ist {
 namespace {
 
-using Corners = CheckSurface::Corners;
+using CheckCorners = CheckSurface::Corners;
 using Point = Eigen::Vector3d;
 using Edge = std::array<std::uint32_t, 2>;
 
@@ -32,8 +32,8 @@ class KeptMesh {
   std::uint32_t corner(std::size_t block, std::uint32_t lane, std::size_t k) const {
     return blocks[block].vertex[blocks[block].corner[k][lane]];
   }
-  std::vector<Corners> triangles() const {
-    std::vector<Corners> all;
+  std::vector<CheckCorners> triangles() const {
+    std::vector<CheckCorners> all;
     for (std::size_t b = 0; b < count; ++b)
       for (std::uint32_t l = 0; l < blocks[b].triangles; ++l)
         all.push_back({vertex(corner(b, l, 0)), vertex(corner(b, l, 1)), vertex(corner(b, l, 2))});
@@ -77,9 +77,9 @@ class LaneGroups {
 using Key = std::array<double, 9>;
 
 /// Triangles by their corners, the least corner first, in order.
-std::vector<Key> keys_of(const std::vector<Corners>& triangles) {
+std::vector<Key> keys_of(const std::vector<CheckCorners>& triangles) {
   std::vector<Key> keys;
-  for (const Corners& t : triangles) {
+  for (const CheckCorners& t : triangles) {
     const auto less = [&](std::size_t a, std::size_t b) {
       return std::lexicographical_compare(t[a].begin(), t[a].end(), t[b].begin(), t[b].end());
     };
@@ -94,7 +94,8 @@ std::vector<Key> keys_of(const std::vector<Corners>& triangles) {
 }
 
 /// The same triangles, corner for corner.
-Invariant same_triangles(const std::vector<Corners>& kept, const std::vector<Corners>& baked) {
+Invariant same_triangles(const std::vector<CheckCorners>& kept,
+                         const std::vector<CheckCorners>& baked) {
   const std::vector<Key> ours = keys_of(kept), theirs = keys_of(baked);
   std::vector<Key> missing, added;
   std::set_difference(theirs.begin(), theirs.end(), ours.begin(), ours.end(),
@@ -260,9 +261,7 @@ std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMes
     out = check_near("kept mesh", CheckSurface(mesh.triangles()), boundary_of(surface, bounding),
                      mesh.header.error, bounding);
   }
-  for (Invariant& one : std::vector<Invariant>{closed(mesh), blocks(mesh), neighbours(mesh),
-                                               boxes(asset, mesh), shells(mesh)})
-    out.push_back(std::move(one));
+  append(out, {closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh), shells(mesh)});
   return out;
 }
 

@@ -8,9 +8,25 @@
 #include <ist/mesh.h>
 #include <ist/solid.h>
 
-#include "bake/check/checked_solid.h"
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace ist {
+
+/// A solid as `check` asks it, unit frame. Immutable.
+class CheckedSolid {
+ public:
+  virtual ~CheckedSolid() = default;
+
+  /// Distance to the surface, or less where that is not known exactly; once nothing is nearer than
+  /// `limit`, any value ≥ limit.
+  virtual double distance(const Eigen::Vector3d& p, double limit) const = 0;
+
+  /// Winding number of a point off the surface: ≥ 1 inside.
+  virtual int winding(const Eigen::Vector3d& p) const = 0;
+
+  virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< holds the whole solid
+};
 
 /// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
 /// in the solid that packing asked is not repeated here. Immutable.

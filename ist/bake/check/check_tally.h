@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ist/bake.h>
@@ -41,6 +42,10 @@ struct Tally {
             violations};
   }
 };
+
+inline void append(std::vector<Invariant>& all, std::vector<Invariant> more) {
+  for (Invariant& one : more) all.push_back(std::move(one));
+}
 
 /// Runs visit(i, tally) for i < count on all threads; the sum does not depend on how many.
 template <class Visit>

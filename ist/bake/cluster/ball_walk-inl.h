@@ -38,6 +38,15 @@ HWY_INLINE BallVector distances(BallVector dx, BallVector dy, BallVector dz) {
   return hn::Sqrt((dx * dx + dy * dy) + dz * dz);
 }
 
+/// How far the balls from lane i on reach from the centre of another.
+HWY_INLINE BallVector reaches_from(const Ball& centre, const BallLanes& balls, std::size_t i) {
+  const BallTag d;
+  return distances(hn::Load(d, balls.x.data() + i) - hn::Set(d, centre.x),
+                   hn::Load(d, balls.y.data() + i) - hn::Set(d, centre.y),
+                   hn::Load(d, balls.z.data() + i) - hn::Set(d, centre.z)) +
+         hn::Load(d, balls.r.data() + i);
+}
+
 /// The place of the ball that reaches farthest from a centre; of equals the first.
 struct Farthest {
   std::size_t place = 0;
@@ -51,10 +60,7 @@ HWY_INLINE Farthest farthest_from(const Ball& centre, const BallLanes& balls, do
   alignas(64) double reaches[kLanes];
   BallVector most = hn::Set(d, worst);
   for (std::size_t i = 0; i < kLanes; i += hn::Lanes(d)) {
-    const BallVector far = distances(hn::Load(d, balls.x.data() + i) - hn::Set(d, centre.x),
-                                     hn::Load(d, balls.y.data() + i) - hn::Set(d, centre.y),
-                                     hn::Load(d, balls.z.data() + i) - hn::Set(d, centre.z)) +
-                           hn::Load(d, balls.r.data() + i);
+    const BallVector far = reaches_from(centre, balls, i);
     hn::Store(far, d, reaches + i);
     most = hn::Max(most, far);
   }

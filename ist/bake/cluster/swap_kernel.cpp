@@ -54,11 +54,7 @@ struct Fit {
     const BallVector half = hn::Set(d, 0.5), none = hn::Zero(d);
     BallVector most = none;
     for (std::size_t i = 0; i < kWidth; i += hn::Lanes(d)) {
-      const BallVector across = distances(hn::Load(d, members.x.data() + i) - hn::Set(d, added.x),
-                                          hn::Load(d, members.y.data() + i) - hn::Set(d, added.y),
-                                          hn::Load(d, members.z.data() + i) - hn::Set(d, added.z)) +
-                                hn::Load(d, members.r.data() + i);
-      BallVector radii = (across + hn::Set(d, added.r)) * half;
+      BallVector radii = (reaches_from(added, members, i) + hn::Set(d, added.r)) * half;
       if (i + hn::Lanes(d) > members.count)
         radii = i < members.count ? hn::IfThenElse(hn::FirstN(d, members.count - i), radii, none)
                                   : none;
@@ -123,11 +119,7 @@ class JoinCosts {
     const BallVector r = hn::Set(d, rest.r),
                      least = hn::Set(d, rest.r > kSmallest ? rest.r : kSmallest);
     for (std::size_t i = 0; i < kWidth; i += hn::Lanes(d)) {
-      const BallVector away = distances(hn::Load(d, added.x.data() + i) - hn::Set(d, rest.x),
-                                        hn::Load(d, added.y.data() + i) - hn::Set(d, rest.y),
-                                        hn::Load(d, added.z.data() + i) - hn::Set(d, rest.z)) +
-                              hn::Load(d, added.r.data() + i);
-      const BallVector far = hn::Max(away, least);
+      const BallVector far = hn::Max(reaches_from(rest, added, i), least);
       const BallVector radius = (far + r * (r / far)) * hn::Set(d, 0.5 * kRoom);
       const BallVector with_reach = radius + hn::Set(d, reach);
       hn::StoreU(with_reach * with_reach * with_reach, d, costs.data() + i);

@@ -11,7 +11,7 @@ namespace ist {
 /// The order in which spheres lie in a tree: every 16^(k+1) consecutive ones from the start are a
 /// node of level k. Groups of 16 are formed first, then groups of their balls, and so on up, by
 /// neural gas.
-/// With `swaps`, near groups of a level then trade members (tree_swaps.h). Deterministic for any
+/// With `swaps`, near groups of a level then trade members. Deterministic for any
 /// number of threads.
 std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps);
 

@@ -19,7 +19,6 @@
 #include "bake/field/field_mesh.h"
 #include "bake/field/sign_grid.h"
 #include "bake/field/solid_surface.h"
-#include "bake/field/spatial_order.h"
 #include "bake/field/surface_area.h"
 #include "bake/field/surface_patches.h"
 #include "bake/field/vertex_clusters.h"

@@ -12,7 +12,7 @@
 
 #include "bake/field/hull_cuts.h"
 #include "mesh/exact_closest_point.h"
-#include "mesh/triangle_frame.h"
+#include "mesh/exact_triangle.h"
 
 namespace ist {
 namespace {
@@ -87,9 +87,7 @@ class FieldNearMesh {
 
   /// The distance to a triangle is convex: it is largest at a corner.
   double from_triangle(const HullPart& part, std::uint32_t triangle) const {
-    const std::uint32_t* t = mesh_.triangles + 3 * std::size_t{triangle};
-    const auto vertex = [&](int i) { return mesh_.vertices + 3 * std::size_t{t[i]}; };
-    const TriangleFrame<double> frame = make_triangle_frame(vertex(0), vertex(1), vertex(2));
+    const TriangleFrame<double> frame = frame_of(corners_of(mesh_, triangle));
     double most2 = 0;
     for (const HullPoint& p : part.corner)
       most2 = std::max(most2, closest_in_frame(frame, p.data()).distance2);

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 
-#include "bake/field/triangles_in_box.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/exact_sign.h"
+#include "mesh/triangles_in_box.h"
 #include "mesh/winding.h"
 #include "numerics/rounding.h"
 
@@ -46,12 +46,8 @@ struct MovedHull {
     const double height[3] = {dot3(p[0], direction), dot3(p[1], direction), dot3(p[2], direction)};
     if (std::max({height[0], height[1], height[2]}) < least - kHeightRounding) return true;
     if (std::min({height[0], height[1], height[2]}) > most + kHeightRounding) return true;
-    double u[3], v[3], n[3];
-    for (int k = 0; k < 3; ++k) {
-      u[k] = p[1][k] - p[0][k];
-      v[k] = p[2][k] - p[0][k];
-    }
-    cross3(u, v, n);
+    double n[3];
+    area_normal(p[0], p[1], p[2], n);
     const double room = kHeightRounding * (std::fabs(n[0]) + std::fabs(n[1]) + std::fabs(n[2]));
     bool above = room > 0, below = room > 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -154,9 +150,7 @@ struct HullCuts::Task {
 
 HullCuts::Frame HullCuts::frame(std::uint32_t triangle) const {
   if (!frames_.empty()) return frames_[triangle];
-  const std::uint32_t* t = surface_.triangles + 3 * std::size_t{triangle};
-  const auto vertex = [&](int i) { return surface_.vertices + 3 * std::size_t{t[i]}; };
-  return make_triangle_frame(vertex(0), vertex(1), vertex(2));
+  return frame_of(corners_of(surface_, triangle));
 }
 
 bool HullCuts::is_within(const Hull& hull, const Frame& triangle, const Known& known,

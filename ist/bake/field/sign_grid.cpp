@@ -15,10 +15,10 @@
 #include "bake/field/brick_grid.h"
 #include "bake/field/cell_entries.h"
 #include "bake/field/surface_area.h"
-#include "bake/field/triangles_in_box.h"
 #include "mesh/exact_sign.h"
 #include "mesh/ray_crossing.h"
 #include "mesh/triangle_frame.h"
+#include "mesh/triangles_in_box.h"
 
 namespace ist {
 namespace {
@@ -58,13 +58,9 @@ bool references_are_clear(const BrickGrid& grid, const std::vector<SurfaceBlock>
     const LaneCorners t =
         corners_of(blocks[entries[i].triangle / kWidth], entries[i].triangle % kWidth);
     // Nearly always the plane is far enough to say so.
-    double u[3], v[3], n[3], w[3];
-    for (int k = 0; k < 3; ++k) {
-      u[k] = t.p[1][k] - t.p[0][k];
-      v[k] = t.p[2][k] - t.p[0][k];
-      w[k] = p[static_cast<std::size_t>(k)] - t.p[0][k];
-    }
-    cross3(u, v, n);
+    double n[3];
+    area_normal(t.p[0], t.p[1], t.p[2], n);
+    const double w[3] = {p[0] - t.p[0][0], p[1] - t.p[0][1], p[2] - t.p[0][2]};
     const double height = dot3(n, w);
     clear[i] = height * height > kSurely * least2 * dot3(n, n);
     if (clear[i] != 0) return;

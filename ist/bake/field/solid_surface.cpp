@@ -31,14 +31,6 @@ struct Groups {
   std::vector<std::uint32_t> representative;  ///< [group] a triangle of largest area
 };
 
-std::array<Eigen::Vector3d, 3> corners_in(const MeshView& mesh, std::uint32_t triangle) {
-  std::array<Point, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k)
-    corners[k] = Eigen::Map<const Point>(
-        mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{triangle} + k]});
-  return corners;
-}
-
 Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart) {
   RawArray<Triangle> triangles(mesh.triangle_count);
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
@@ -57,7 +49,7 @@ Groups find_groups(const MeshView& mesh, const std::vector<std::uint8_t>& apart)
   RawArray<double> area(triangles.size());
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
     groups.of_triangle[t] = sets.find(t);
-    const auto [a, b, c] = corners_in(mesh, t);
+    const auto [a, b, c] = triangle_corners(mesh, t);
     area[t] = (b - a).cross(c - a).squaredNorm();
   });
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
@@ -95,7 +87,7 @@ std::vector<std::optional<int>> windings_outside(const MeshSolid& solid,
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
     const std::uint32_t of = groups.representative[t];
     if (of != kNoTriangle && apart[of] == 0)
-      outside[t] = winding_outside(solid, of, corners_in(mesh, of));
+      outside[t] = winding_outside(solid, of, triangle_corners(mesh, of));
   });
   // Groups are named by their first triangle.
   tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t t) {
@@ -199,7 +191,7 @@ double half_width(const MeshView& mesh, const Overlaps& overlaps,
   for (const auto& [a, b] : overlaps.pairs) sets.unite(corner(a, 0), corner(b, 0));
   std::map<std::uint32_t, std::vector<Point>> clusters;
   for (const std::uint32_t t : others)
-    for (const Point& p : corners_in(mesh, t)) clusters[sets.find(corner(t, 0))].push_back(p);
+    for (const Point& p : triangle_corners(mesh, t)) clusters[sets.find(corner(t, 0))].push_back(p);
   double most = 0;
   for (const auto& [name, points] : clusters) most = std::max(most, width(points) / 2);
   return most;

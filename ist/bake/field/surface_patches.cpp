@@ -4,18 +4,77 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <span>
 #include <tuple>
 #include <utility>
 
 #include <ist/asset_layout.h>
 
-#include "bake/field/spatial_order.h"
+#include <tbb/parallel_invoke.h>
+#include "mesh/item_groups.h"
 
 namespace ist {
 namespace {
 
 using FloatPoint = std::array<float, 3>;
+
+std::size_t longest_axis(std::span<const FloatPoint> points, std::span<const std::uint32_t> order) {
+  FloatPoint low = points[order.front()], high = low;
+  for (const std::uint32_t i : order)
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], points[i][k]);
+      high[k] = std::max(high[k], points[i][k]);
+    }
+  std::size_t longest = 0;
+  for (std::size_t k = 1; k < 3; ++k)
+    if (high[k] - low[k] > high[longest] - low[longest]) longest = k;
+  return longest;
+}
+
+/// Of n > 16: about half, in whole groups of the largest size that leaves a choice.
+std::size_t first_half(std::size_t n) {
+  std::size_t group = kWidth;
+  while (group * kWidth < n) group *= kWidth;
+  return std::max<std::size_t>(1, (n + group) / (2 * group)) * group;
+}
+
+void halve(std::span<const FloatPoint> points, std::span<std::uint32_t> order) {
+  if (order.size() <= kWidth) return;
+  const std::size_t axis = longest_axis(points, order);
+  const std::size_t half = first_half(order.size());
+  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     return std::pair(points[a][axis], a) < std::pair(points[b][axis], b);
+                   });
+  const std::span<std::uint32_t> first = order.first(half), second = order.subspan(half);
+  if (order.size() < 4096) {
+    halve(points, first);
+    halve(points, second);
+  } else {
+    tbb::parallel_invoke([&] { halve(points, first); }, [&] { halve(points, second); });
+  }
+}
+
+/// Sorts each last group by index: what nth_element leaves is no library's promise.
+void settle(std::span<std::uint32_t> order) {
+  for (std::size_t begin = 0; begin < order.size(); begin += kWidth)
+    std::sort(order.begin() + static_cast<std::ptrdiff_t>(begin),
+              order.begin() +
+                  static_cast<std::ptrdiff_t>(std::min<std::size_t>(begin + kWidth, order.size())));
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  halve(points, order);
+  settle(order);
+  return order;
+}
+
+namespace {
 
 constexpr std::uint32_t kNone = ~0u;
 /// Patches are joined where the result is not larger than this, in radii of the larger.
@@ -30,35 +89,18 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
   return sum;
 }
 
-/// The triangles around each vertex, and how many of them are in no patch yet.
-struct Stars {
-  std::vector<std::uint32_t> first, triangle, left;
-
-  explicit Stars(const FieldMesh& mesh)
-      : first(mesh.vertices.size() + 1), triangle(3 * mesh.triangles.size()) {
-    for (const FieldMesh::Triangle& t : mesh.triangles)
-      for (const std::uint32_t v : t) ++first[v + 1];
-    left.assign(first.begin() + 1, first.end());
-    for (std::size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
-    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-      for (const std::uint32_t v : mesh.triangles[t]) triangle[next[v]++] = t;
-  }
-
-  std::span<const std::uint32_t> around(std::uint32_t v) const {
-    return {triangle.data() + first[v], triangle.data() + first[v + 1]};
-  }
-};
-
 /// Grows patches one after the other.
 class Growth {
  public:
   explicit Growth(const FieldMesh& mesh)
       : mesh_(mesh),
-        stars_(mesh),
+        stars_(triangles_at_vertices(mesh)),
+        left_(mesh.vertices.size()),
         taken_(mesh.triangles.size()),
         last_patch_(mesh.vertices.size()),
         middle_(mesh.triangles.size()) {
+    for (std::size_t v = 0; v < left_.size(); ++v)
+      left_[v] = static_cast<std::uint32_t>(stars_[v].size());
     for (std::size_t t = 0; t < middle_.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
         const FieldMesh::Triangle& corners = mesh.triangles[t];
@@ -93,7 +135,7 @@ class Growth {
     taken_[t] = 1;
     patch.triangles.push_back(t);
     for (const std::uint32_t v : mesh_.triangles[t]) {
-      --stars_.left[v];
+      --left_[v];
       if (!is_in_patch(v)) patch.vertices.push_back(v);
       last_patch_[v] = patches_;
     }
@@ -113,13 +155,13 @@ class Growth {
     using Score = std::tuple<int, double, std::uint32_t>;
     Score best{4, 0, kNone};
     for (const std::uint32_t v : patch.vertices) {
-      if (stars_.left[v] == 0) continue;
-      for (const std::uint32_t t : stars_.around(v)) {
+      if (left_[v] == 0) continue;
+      for (const std::uint32_t t : stars_[v]) {
         if (taken_[t] != 0) continue;
         int added = 0, last = 0;
         for (const std::uint32_t corner : mesh_.triangles[t]) {
           added += is_in_patch(corner) ? 0 : 1;
-          last |= stars_.left[corner] == 1 ? 1 : 0;
+          last |= left_[corner] == 1 ? 1 : 0;
         }
         if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
         best = std::min(best, Score{std::max(0, added - last), distance2(middle_[t], middle), t});
@@ -134,10 +176,10 @@ class Growth {
     using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
     Score best{kNone, 0, kNone};
     for (const std::uint32_t v : patch.vertices)
-      for (const std::uint32_t t : stars_.around(v)) {
+      for (const std::uint32_t t : stars_[v]) {
         if (taken_[t] != 0) continue;
         std::uint32_t left = 0;
-        for (const std::uint32_t corner : mesh_.triangles[t]) left += stars_.left[corner];
+        for (const std::uint32_t corner : mesh_.triangles[t]) left += left_[corner];
         best =
             std::min(best, Score{left, distance2(middle_[t], middle_[patch.triangles.front()]), t});
       }
@@ -145,7 +187,8 @@ class Growth {
   }
 
   const FieldMesh& mesh_;
-  Stars stars_;
+  const ItemGroups<> stars_;         ///< the triangles around each vertex
+  std::vector<std::uint32_t> left_;  ///< of them in no patch yet
   std::vector<std::uint8_t> taken_;
   std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last that took it, from 1
   std::uint32_t patches_ = 0;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bake/field/field_mesh.h"
@@ -18,5 +20,10 @@ struct BlockPatch {
 /// it is near, or, where patches are to be `connected`, where they share a vertex besides. Every
 /// triangle is in one patch. Deterministic.
 std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh, bool connected = false);
+
+/// An order of points in which neighbours are near each other: their box is halved across its
+/// longest side, again and again, so that every group of 16, 256, … from the start is compact. Ties
+/// go by index. The same for any number of threads.
+std::vector<std::uint32_t> spatial_order(std::span<const std::array<float, 3>> points);
 
 }  // namespace ist

@@ -9,6 +9,7 @@
 
 #include "bake/field/hull.h"
 #include "mesh/exact_closest_point.h"
+#include "mesh/exact_triangle.h"
 
 namespace ist {
 namespace {
@@ -20,12 +21,8 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
   std::vector<TriangleFrame<double>> frames(surface.triangle_count);
-  tbb::parallel_for(std::size_t{0}, frames.size(), [&](std::size_t t) {
-    const auto vertex = [&](std::size_t i) {
-      return surface.vertices + 3 * std::size_t{surface.triangles[3 * t + i]};
-    };
-    frames[t] = make_triangle_frame(vertex(0), vertex(1), vertex(2));
-  });
+  tbb::parallel_for(std::uint32_t{0}, surface.triangle_count,
+                    [&](std::uint32_t t) { frames[t] = frame_of(corners_of(surface, t)); });
   return frames;
 }
 
@@ -76,21 +73,9 @@ SweptError::SweptError(const MeshView& mesh, const Clustered& field,
       field_(field),
       hierarchy_(hierarchy),
       cuts_(hierarchy.view(), frames_of(hierarchy.view())),
-      first_(field.mesh.vertices.size() + 1),
-      around_(3 * field.mesh.triangles.size()),
+      stars_(triangles_at_vertices(field.mesh)),
       near_(mesh.vertex_count, kNoTriangle),
-      last_near_(field.vertex_of.size(), kNoTriangle) {
-  for (const FieldMesh::Triangle& t : field.mesh.triangles)
-    for (const std::uint32_t v : t) ++first_[v + 1];
-  for (std::size_t v = 1; v < first_.size(); ++v) first_[v] += first_[v - 1];
-  std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-  for (std::uint32_t t = 0; t < field.mesh.triangles.size(); ++t)
-    for (const std::uint32_t v : field.mesh.triangles[t]) around_[next[v]++] = t;
-}
-
-std::span<const std::uint32_t> SweptError::star(std::uint32_t field_vertex) const {
-  return {around_.data() + first_[field_vertex], around_.data() + first_[field_vertex + 1]};
-}
+      last_near_(field.vertex_of.size(), kNoTriangle) {}
 
 double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) {
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
@@ -107,7 +92,7 @@ double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) 
   const std::atomic_ref<std::uint32_t> last(last_near_[field_.cluster_of[vertex]]);
   const std::uint32_t first = last.load(std::memory_order_relaxed);
   if (first != kNoTriangle && is_near(first)) return known;
-  for (const std::uint32_t t : star(field_.image(vertex)))
+  for (const std::uint32_t t : stars_[field_.image(vertex)])
     if (t != first && is_near(t)) {
       last.store(t, std::memory_order_relaxed);
       return known;
@@ -144,7 +129,7 @@ bool SweptError::is_within(std::uint32_t triangle, double distance) const {
     bool tried = false;
     for (int j = 0; j < i; ++j) tried |= to[j] == to[i];
     if (tried) continue;
-    for (const std::uint32_t t : star(to[i]))
+    for (const std::uint32_t t : stars_[to[i]])
       if (holds_all(t)) return true;
   }
   return false;
@@ -221,7 +206,7 @@ double SweptError::bound(std::uint32_t triangle, double target, bool one_may_do)
     bool seen = false;
     for (std::size_t j = 0; j < i; ++j)
       seen |= field_.image(mesh_.triangles[3 * std::size_t{triangle} + j]) == to;
-    if (!seen) candidates.insert(candidates.end(), star(to).begin(), star(to).end());
+    if (!seen) candidates.insert(candidates.end(), stars_[to].begin(), stars_[to].end());
   }
   return bound(prism, candidates, target, one_may_do);
 }

@@ -8,6 +8,7 @@
 #include "bake/field/field_hierarchy.h"
 #include "bake/field/hull_cuts.h"
 #include "bake/field/vertex_clusters.h"
+#include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
 
@@ -56,13 +57,12 @@ class SweptError {
     const FieldMesh::Vertex& x = field_.mesh.vertices[field_vertex];
     return {x[0], x[1], x[2]};
   }
-  std::span<const std::uint32_t> star(std::uint32_t field_vertex) const;
 
   const MeshView& mesh_;
   const Clustered& field_;
   const FieldHierarchy& hierarchy_;
-  HullCuts cuts_;                              ///< of the field
-  std::vector<std::uint32_t> first_, around_;  ///< the triangles around each field vertex
+  HullCuts cuts_;                         ///< of the field
+  const ItemGroups<> stars_;              ///< the triangles around each field vertex
   std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
   std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone
 };

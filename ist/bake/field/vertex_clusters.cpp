@@ -10,7 +10,7 @@
 #include <limits>
 #include <numeric>
 
-#include "mesh/triangle_frame.h"
+#include "mesh/exact_triangle.h"
 
 namespace ist {
 namespace {
@@ -99,18 +99,32 @@ void for_chunks(std::size_t count, const Visit& visit) {
 }
 
 AreaVector area_vector(const MeshView& mesh, std::size_t triangle) {
-  const std::uint32_t* t = mesh.triangles + 3 * triangle;
-  const double* p[3];
-  for (int k = 0; k < 3; ++k) p[k] = mesh.vertices + 3 * std::size_t{t[k]};
-  double u[3], v[3];
-  for (int k = 0; k < 3; ++k) {
-    u[k] = p[1][k] - p[0][k];
-    v[k] = p[2][k] - p[0][k];
-  }
+  const Corners t = corners_of(mesh, static_cast<std::uint32_t>(triangle));
   AreaVector area;
-  cross3(u, v, area.n);
+  area_normal(t.p[0], t.p[1], t.p[2], area.n);
   area.length = std::sqrt(dot3(area.n, area.n));
   return area;
+}
+
+/// For each key from 0 the places at which it stands, ascending: few of each. By all threads.
+ItemGroups<> places_of(std::size_t keys, std::span<const std::uint32_t> key_at) {
+  const auto fetch_and_add_one = [](std::uint32_t& count) {
+    return std::atomic_ref(count).fetch_add(1, std::memory_order_relaxed);
+  };
+  ItemGroups<> lists;
+  lists.first.resize(keys + 1);
+  lists.items.resize(key_at.size());
+  tbb::parallel_for(std::size_t{0}, key_at.size(),
+                    [&](std::size_t i) { fetch_and_add_one(lists.first[key_at[i] + 1]); });
+  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
+  std::vector<std::uint32_t> next(lists.first.begin(), lists.first.end() - 1);
+  tbb::parallel_for(std::size_t{0}, key_at.size(), [&](std::size_t i) {
+    lists.items[fetch_and_add_one(next[key_at[i]])] = static_cast<std::uint32_t>(i);
+  });
+  tbb::parallel_for(std::size_t{0}, keys, [&](std::size_t key) {
+    std::sort(lists.items.begin() + lists.first[key], lists.items.begin() + lists.first[key + 1]);
+  });
+  return lists;
 }
 
 /// Sorts numbers; `work` is overwritten.
@@ -212,8 +226,8 @@ VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels
     : mesh_(mesh), areas_(mesh.triangle_count), levels_(static_cast<std::size_t>(levels)) {
   tbb::parallel_invoke(
       [&] {
-        corners_ = IndexLists::of_short_lists(
-            {mesh.triangles, 3 * std::size_t{mesh.triangle_count}}, mesh.vertex_count);
+        corners_ =
+            places_of(mesh.vertex_count, {mesh.triangles, 3 * std::size_t{mesh.triangle_count}});
       },
       [&] {
         tbb::parallel_for(std::size_t{0}, levels_.size(), [&](std::size_t l) {
@@ -233,7 +247,9 @@ VertexClusters::Level VertexClusters::level_of(double cell) const {
   CellNumbers numbers;
   for (std::size_t v = 0; v < level.of_vertex.size(); ++v)
     level.of_vertex[v] = numbers.of(cell_of(mesh_.vertices + 3 * v, cell));
-  level.vertices = IndexLists(level.of_vertex, numbers.count());
+  level.vertices = ItemGroups<>(numbers.count(), [&](const auto& visit) {
+    for (std::uint32_t v = 0; v < level.of_vertex.size(); ++v) visit(level.of_vertex[v], v);
+  });
   level.place.resize(numbers.count());
   level.off.resize(numbers.count());
   level.known.resize(numbers.count());

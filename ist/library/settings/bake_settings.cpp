@@ -12,9 +12,7 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kMostSpheres = 0x7fffffff;  // these three: what the library takes
-constexpr unsigned kMostCells = 1024;             // on a side
-constexpr int kMostRefinements = 10;
+constexpr std::size_t kMostSpheres = 0x7fffffff;  // what the library takes
 
 // What follows makes a setting from the member that it sets: `of(settings)` is that member.
 
@@ -217,14 +215,15 @@ std::vector<Setting> make_settings() {
           "only"),
       grid(),
       whole("grid-resolution", member_of(&PackingSettings::grids, &GridSettings::resolution), 0,
-            kMostCells,
+            kMostGridCells,
             "Cells along the longest side of the fixed grid (uniform, implicit) or of the first "
             "distance grid (hybrid); 0 = automatic"),
-      whole("grid-start", member_of(&PackingSettings::grids, &GridSettings::start), 0, kMostCells,
+      whole("grid-start", member_of(&PackingSettings::grids, &GridSettings::start), 0,
+            kMostGridCells,
             "Cells along the longest side of the first grid of prototypes (all but banded); 0 = "
             "automatic"),
       whole("grid-refinements", member_of(&PackingSettings::grids, &GridSettings::refinements), -1,
-            kMostRefinements,
+            kMostGridRefinements,
             "Number of refinements; each splits the cells of that grid into 8 (explicit, implicit, "
             "hybrid); -1 = automatic"),
       whole("grid-rounds", member_of(&PackingSettings::grids, &GridSettings::rounds_per_level), 0,

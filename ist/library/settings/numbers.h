@@ -1,12 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <charconv>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
+
+#include "mesh/import/text_scanner.h"
 
 // Numbers as people write them, on a command line or in a file, under one rule: digits are decimal,
 // whatever zeros come first, and what is no number or out of range (NaN is) is refused.
@@ -32,15 +33,6 @@ std::optional<Eigen::Vector3d> parse_factors(std::string_view text);
 
 /// Bytes as people write them: 4096, 512M, 10G; units K, M, G and T are powers of 1024.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
-
-/// A whole number in decimal digits.
-template <class T>
-std::optional<T> parse_whole(std::string_view text) {
-  T value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 10);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 std::string number_in_words(const Range& range);  ///< "a number from 0 to below 1"
 std::string share_in_words(const Range& range);   ///< the same, and in percent

@@ -1,22 +1,11 @@
 #include "mesh/import/collada_document.h"
 
 #include <algorithm>
-#include <charconv>
 #include <string>
 
 #include "mesh/import/text_scanner.h"
 
 namespace ist {
-namespace {
-
-std::optional<std::uint64_t> parse_whole(const std::string_view text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
-
-}  // namespace
 
 ColladaDocument::ColladaDocument(const SourceFile& file)
     : xml_(file), most_(12'000'000 + file.bytes.size()) {
@@ -43,7 +32,7 @@ std::uint64_t ColladaDocument::whole(const Index element, const std::string_view
                                      const std::optional<std::uint64_t> fallback) const {
   const std::string_view text = xml_.attribute(element, attribute);
   if (text.empty() && fallback) return *fallback;
-  const std::optional<std::uint64_t> value = parse_whole(text);
+  const std::optional<std::uint64_t> value = parse_whole<std::uint64_t>(text);
   if (!value)
     xml_.fail(element,
               "its " + std::string(attribute) + " is not a whole number: " + in_quotes(text));
@@ -71,7 +60,7 @@ std::vector<double> ColladaDocument::reals(const Index element, const std::size_
 std::vector<std::uint64_t> ColladaDocument::wholes(const Index element) const {
   std::vector<std::uint64_t> values;
   for_words(xml_[element].text, [&](const std::string_view word) {
-    const std::optional<std::uint64_t> value = parse_whole(word);
+    const std::optional<std::uint64_t> value = parse_whole<std::uint64_t>(word);
     if (!value) xml_.fail(element, in_quotes(word) + " is not a whole number ≥ 0");
     values.push_back(*value);
   });

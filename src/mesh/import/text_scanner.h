@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -49,6 +50,15 @@ void for_words(std::string_view text, const Visit& visit) {
     visit(text.substr(at, end - at));
     at = text.find_first_not_of(kSpace, end);
   }
+}
+
+/// All of a text as a number, whose digits are decimal, or nothing.
+template <class T>
+std::optional<T> parse_whole(std::string_view text) {
+  T value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
 }
 
 /// The whole word as a number, or nothing. What is too large for double is infinite, too small 0.

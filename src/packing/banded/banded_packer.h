@@ -6,8 +6,8 @@
 #include <ist/packing.h>
 
 #include "packing/banded/band_schedule.h"
+#include "packing/banded/candidate.h"
 #include "packing/banded/prototype.h"
-#include "packing/banded/selection.h"
 #include "packing/base/packing_settings.h"
 #include "packing/base/sphere_grid.h"
 #include "stage/stage.h"

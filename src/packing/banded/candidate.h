@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "numerics/hashing.h"
 
 namespace ist::packing {
@@ -62,5 +64,14 @@ IST_HD inline CandidateBuckets candidate_buckets(float largest, std::uint64_t co
     buckets.mask = 2 * buckets.mask + 1;
   return buckets;
 }
+
+/// A candidate that none before it overlaps.
+struct Winner {
+  std::uint32_t index = 0;  ///< among the candidates
+  double gap = 0;           ///< to the winners that go before it, see gap_to_sphere()
+};
+
+/// The candidates that no candidate that goes before them overlaps, in that order.
+std::vector<Winner> select_independent(const std::vector<Candidate>& candidates);
 
 }  // namespace ist::packing

@@ -6,14 +6,9 @@
 
 namespace ist::packing {
 
-/// The surface of a mesh on the host, as packing asks it. Features are triangles, named by their
-/// place in the hierarchy's blocks; no answer depends on the hierarchy. A surface's functions that
-/// take a team are called by all its lanes and answer the same to each.
-class MeshSurface {
+/// The surface of a mesh on the host, as packing asks it.
+class MeshSurface : public TriangleSurface<MeshSurface> {
  public:
-  using Feature = std::uint32_t;
-  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
-
   explicit MeshSurface(const MeshSolid& solid) : solid_(solid), view_(solid.view()) {}
 
   /// Unsigned distance to the surface, and the feature there, if it is less than `limit` or just
@@ -40,11 +35,6 @@ class MeshSurface {
     return triangle_of(view_.blocks[feature / kBvhWidth], feature % kBvhWidth);
   }
 
-  /// Where x stands to a remembered feature; a lane's own.
-  FeatureOffset offset(Feature feature, Float3 x) const {
-    return triangle_offset(triangle(feature), x);
-  }
-
   /// All triangles whose distance² is at most radius2; returns how many, −1 if more than `most`.
   template <class Team>
   int triangles_within(const Team& team, Float3 x, float radius2, Feature* out, int most) const {
@@ -68,21 +58,8 @@ class MeshSurface {
   }
 
   template <class Team>
-  bool inside(const Team&, Float3 x) const {
-    return solid_.inside(exact(x));
-  }
-
-  /// Inside by a winding number of 1: no other shell of the solid holds x.
-  template <class Team>
-  bool inside_once(const Team&, Float3 x) const {
-    return solid_.winding_number(exact(x)) == 1;
-  }
-
-  /// Exact clearance of a point for certification: distance to the surface, `limit` if it is not
-  /// less, negative outside.
-  template <class Team>
-  double clearance(const Team& team, Float3 x, double limit) const {
-    return inside(team, x) ? exact_distance(team, x, limit) : -1.0;
+  int winding_number(const Team&, Float3 x) const {
+    return solid_.winding_number(exact(x));
   }
 
   /// Exact unsigned distance, `limit` if it is not less.

@@ -1,7 +1,8 @@
-#include "packing/banded/selection.h"
+#include "packing/banded/candidate.h"
 
 #include <algorithm>
 
+#include "mesh/item_groups.h"
 #include "packing/base/certificate.h"
 #include "stage/thread_arena.h"
 
@@ -15,17 +16,10 @@ class Buckets {
     float largest = 0;
     for (const Candidate& c : candidates) largest = std::max(largest, c.radius);
     buckets_ = candidate_buckets(largest, candidates.size());
-    start_.assign(std::size_t{buckets_.mask} + 2, 0);
-    std::vector<std::uint32_t> bucket(candidates.size());
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      bucket[i] = buckets_.bucket_of(candidates[i].centre, 0, 0, 0);
-      ++start_[bucket[i] + 1];
-    }
-    for (std::size_t b = 0; b + 1 < start_.size(); ++b) start_[b + 1] += start_[b];
-    std::vector<std::uint32_t> fill(start_.begin(), start_.end() - 1);
-    members_.resize(candidates.size());
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-      members_[fill[bucket[i]]++] = static_cast<std::uint32_t>(i);
+    members_ = ItemGroups<>(std::size_t{buckets_.mask} + 1, [&](const auto& visit) {
+      for (std::size_t i = 0; i < candidates.size(); ++i)
+        visit(buckets_.bucket_of(candidates[i].centre, 0, 0, 0), static_cast<std::uint32_t>(i));
+    });
   }
 
   /// Calls visit(other) for candidates about the i-th, itself included, until it returns true.
@@ -35,9 +29,8 @@ class Buckets {
     for (int dz = -1; dz <= 1; ++dz)
       for (int dy = -1; dy <= 1; ++dy)
         for (int dx = -1; dx <= 1; ++dx) {
-          const std::uint32_t b = buckets_.bucket_of(a.centre, dx, dy, dz);
-          for (std::uint32_t m = start_[b]; m < start_[b + 1]; ++m)
-            if (visit(members_[m])) return true;
+          for (const std::uint32_t m : members_[buckets_.bucket_of(a.centre, dx, dy, dz)])
+            if (visit(m)) return true;
         }
     return false;
   }
@@ -52,7 +45,7 @@ class Buckets {
  private:
   const std::vector<Candidate>& candidates_;
   CandidateBuckets buckets_;
-  std::vector<std::uint32_t> start_, members_;
+  ItemGroups<> members_;
 };
 
 }  // namespace

@@ -87,4 +87,40 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
   return written;
 }
 
+/// What MeshSurface and WideMeshSurface have in common. Features are triangles, named by their
+/// places in the hierarchy's blocks; no answer depends on the hierarchy. A surface's functions that
+/// take a team are called by all its lanes and answer the same to each.
+template <class Surface>
+class TriangleSurface {
+ public:
+  using Feature = std::uint32_t;
+  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
+
+  /// Where x stands to a remembered feature; a lane's own.
+  IST_HD FeatureOffset offset(Feature feature, Float3 x) const {
+    return triangle_offset(self().triangle(feature), x);
+  }
+
+  template <class Team>
+  IST_HD bool inside(const Team& team, Float3 x) const {
+    return self().winding_number(team, x) >= 1;
+  }
+
+  /// Inside by a winding number of 1: no other shell of the solid holds x.
+  template <class Team>
+  IST_HD bool inside_once(const Team& team, Float3 x) const {
+    return self().winding_number(team, x) == 1;
+  }
+
+  /// Exact clearance of a point for certification: distance to the surface, `limit` if it is not
+  /// less, negative outside.
+  template <class Team>
+  IST_HD double clearance(const Team& team, Float3 x, double limit) const {
+    return inside(team, x) ? self().exact_distance(team, x, limit) : -1.0;
+  }
+
+ private:
+  IST_HD const Surface& self() const { return static_cast<const Surface&>(*this); }
+};
+
 }  // namespace ist::packing

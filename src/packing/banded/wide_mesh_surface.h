@@ -7,12 +7,9 @@
 namespace ist::packing {
 
 /// The surface of a mesh as the GPU asks it: MeshSurface over a WideTree, with the same answers bit
-/// for bit. Features are triangles, named by their slots.
-class WideMeshSurface {
+/// for bit.
+class WideMeshSurface : public TriangleSurface<WideMeshSurface> {
  public:
-  using Feature = std::uint32_t;
-  static constexpr int kAscentSteps = 5;  ///< more cover no more (docs/packing_notes.md)
-
   IST_HD explicit WideMeshSurface(const WideTree& tree) : tree_(tree) {}
 
   template <class Team>
@@ -25,10 +22,6 @@ class WideMeshSurface {
 
   IST_HD SurfaceTriangle triangle(Feature feature) const {
     return triangle_of(tree_.block(feature / kWideWidth), feature % kWideWidth);
-  }
-
-  IST_HD FeatureOffset offset(Feature feature, Float3 x) const {
-    return triangle_offset(triangle(feature), x);
   }
 
   template <class Team>
@@ -52,14 +45,6 @@ class WideMeshSurface {
     const double p[3] = {x.x, x.y, x.z};
     return ist::winding_number(team, tree, p);
   }
-  template <class Team>
-  IST_HD bool inside(const Team& team, Float3 x) const {
-    return winding_number(team, x) >= 1;
-  }
-  template <class Team>
-  IST_HD bool inside_once(const Team& team, Float3 x) const {
-    return winding_number(team, x) == 1;
-  }
 
   /// Exact unsigned distance, `limit` if it is not less.
   template <class Team>
@@ -67,11 +52,6 @@ class WideMeshSurface {
     const WideTree tree = tree_;
     const double p[3] = {x.x, x.y, x.z};
     return exact_nearest(team, tree, p, limit).distance;
-  }
-
-  template <class Team>
-  IST_HD double clearance(const Team& team, Float3 x, double limit) const {
-    return inside(team, x) ? exact_distance(team, x, limit) : -1;
   }
 
  private:

@@ -36,10 +36,11 @@ void check_settings(const PackingSettings& s) {
           "finite and not negative (0 = no limit)");
   require(s.epsilon >= 0 && s.epsilon < 1, "epsilon", s.epsilon, "in [0, 1) (0 = automatic)");
   require(s.grid <= GridMode::hybrid, "grid", static_cast<double>(s.grid), "a GridMode (0 … 4)");
-  require(s.grids.start <= 1024, "grids.start", s.grids.start, "at most 1024 (0 = automatic)");
-  require(s.grids.resolution <= 1024, "grids.resolution", s.grids.resolution,
+  require(s.grids.start <= kMostGridCells, "grids.start", s.grids.start,
           "at most 1024 (0 = automatic)");
-  require(s.grids.refinements <= 10, "grids.refinements", s.grids.refinements,
+  require(s.grids.resolution <= kMostGridCells, "grids.resolution", s.grids.resolution,
+          "at most 1024 (0 = automatic)");
+  require(s.grids.refinements <= kMostGridRefinements, "grids.refinements", s.grids.refinements,
           "at most 10 (negative = automatic)");
   check_settings(s.surface);
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <numbers>
 #include <vector>
 
 #include "numerics/roots.h"
@@ -27,7 +28,7 @@ IST_HD inline bool columns_measure(double seen, double volume) {
 
 /// Radius of the ball of a volume.
 IST_HD inline double radius_of(double volume) {
-  return cube_root(3 * volume / (4 * 3.14159265358979323846));
+  return cube_root(3 * volume / (4 * std::numbers::pi));
 }
 
 /// Part of the solid's volume that a cell holds, [0, 1]; `total`: the length of all cells.

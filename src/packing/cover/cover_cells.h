@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "numerics/host_device.h"
-#include "numerics/team.h"
+#include "numerics/rounding.h"
 #include "packing/backend/tasks.h"
 
 // The subdivision that proves cover radii (cover.h), cell by cell, for host and device. It goes
@@ -18,7 +18,6 @@ namespace ist {
 constexpr double kCoverSlack = 0.1;
 // A cell is small enough once its half-diagonal is this part of the extension that it asks for.
 constexpr double kCoverRefinement = 0.2;
-constexpr double kCoverMargin = 1e-12;  ///< unit frame, above the rounding of any distance here
 
 /// A cube that is not yet proven covered, and the balls that may be nearest somewhere in it.
 struct CoverCell {
@@ -36,7 +35,7 @@ struct CoverLevel {
   const double* extension = nullptr;  ///< of every ball, as the levels before have it
 
   /// Half-diagonal, rounded up.
-  IST_HD double reach() const { return 1.7320508075688774 * half + kCoverMargin; }
+  IST_HD double reach() const { return 1.7320508075688774 * half + kDistanceMargin; }
 };
 
 IST_HD inline double distance_to(const CoverBall& ball, double x, double y, double z) {
@@ -137,7 +136,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
     return farthest_from(ball, cell.x, cell.y, cell.z, level.half);
   };
   const CoverBest whole = best_ball(team, level, keep, kept, farthest);
-  if (whole.lacks + kCoverMargin <= 0) return verdict;  // one ball holds the cell
+  if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball holds the cell
 
   // A point of the solid in the cell or beside it: its middle, or the surface's nearest.
   double point[3] = {cell.x, cell.y, cell.z};
@@ -153,7 +152,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
   }
   if (reach <= level.smallest || reach <= kCoverRefinement * (plain - reach)) {
     const CoverBall& ball = level.balls[whole.ball];
-    verdict.demand = {farthest(ball) - ball.radius + kCoverMargin, whole.ball};
+    verdict.demand = {farthest(ball) - ball.radius + kDistanceMargin, whole.ball};
     return verdict;
   }
   verdict.divide = true;

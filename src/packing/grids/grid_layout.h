@@ -54,8 +54,7 @@ struct GridLayout {
 };
 
 /// A grid over a box, `start` ≥ 1 cells on its longest side, that can be refined `refinements` ≥ 0
-/// times; start · 2^refinements ≤ kMostCellsPerSide.
-constexpr int kMostCellsPerSide = 1024;
+/// times; start · 2^refinements ≤ kMostGridCells.
 GridLayout make_grid_layout(const double lower[3], const double upper[3], int start,
                             int refinements);
 

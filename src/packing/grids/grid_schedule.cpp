@@ -32,10 +32,9 @@ int affordable(const GridLayout& first, int wanted, std::size_t memory) {
 }
 
 void require_size(int start, int levels) {
-  if ((std::int64_t{start} << levels) <= kMostCellsPerSide) return;
+  if ((std::int64_t{start} << levels) <= kMostGridCells) return;
   throw Error("packing: a grid of " + std::to_string(start) + " cells on the longest side, split " +
-              std::to_string(levels) + " times, has more than " +
-              std::to_string(kMostCellsPerSide) +
+              std::to_string(levels) + " times, has more than " + std::to_string(kMostGridCells) +
               " on a side: set a smaller grid start, resolution or fewer refinements");
 }
 
@@ -70,7 +69,7 @@ GridSchedule grid_schedule(GridMode mode, const GridSettings& settings, const Gr
   const int asked = resolution > 0 ? levels_to(start, resolution) : -1;
   require_size(start, std::max(refinements, asked));
   int levels = 0;  // that there can be
-  while ((start << (levels + 1)) <= kMostCellsPerSide) ++levels;
+  while ((start << (levels + 1)) <= kMostGridCells) ++levels;
   s.first = make_grid_layout(solid.lower, solid.upper, start, levels);
   s.finest_prototypes = refinements;
   const int fine = levels_to(start, distance_resolution(solid));

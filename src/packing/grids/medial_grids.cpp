@@ -20,7 +20,7 @@ MedialGrids medial_grids(const MeshSolid& mesh, unsigned resolution) {
     grids.start = resolution;
     grids.refinements = 0;
     const int wanted = distance_resolution(figures);
-    const int most = kMostCellsPerSide / 2;
+    const int most = kMostGridCells / 2;
     grids.resolution = std::max(resolution, static_cast<unsigned>(std::min(wanted, most)));
   }
   const GridSchedule schedule = grid_schedule(GridMode::implicit_refinement, grids, figures);
