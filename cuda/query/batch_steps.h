@@ -51,8 +51,9 @@ IST_HD inline const SolidRef& solid_of(const SolidPairs& batch, const GpuPlacedS
 /// Places B of pair i as A sees it; false if it cannot be.
 IST_HD inline bool place_pair(const SolidPairs& batch, const GpuPlacedSolids& a,
                               const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {
-  return place.place(solid_of(batch, a, i).frame, pose_of(a, i), scale_of(a, i),
-                     solid_of(batch, b, i).frame, pose_of(b, i), scale_of(b, i));
+  return place.place<Quotients::by_reciprocal>(solid_of(batch, a, i).frame, pose_of(a, i),
+                                               scale_of(a, i), solid_of(batch, b, i).frame,
+                                               pose_of(b, i), scale_of(b, i));
 }
 IST_HD inline bool place_pair(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
   return place_pair(batch, batch.pairs.a, batch.pairs.b, i, place);

@@ -71,17 +71,28 @@ struct PoseSlope {
   Vec3 by_rotation = {0, 0, 0};  ///< about B's unit-frame origin
 };
 
+/// How quotients by one number are formed: the CPU divides; the GPU, to which a division is a dozen
+/// instructions, divides once.
+enum class Quotients { divided, by_reciprocal };
+
+template <Quotients kBy>
+IST_HD inline Vec3 over(const Vec3& x, double y) noexcept {
+  if constexpr (kBy == Quotients::divided) return x / y;
+  return (1 / y) * x;
+}
+
 /// A rotation as a unit quaternion. Sums are in Eigen's order.
 struct Rotation {
   double w;
   Vec3 v;
 
   /// Normalises. NaN if the length is out of range.
+  template <Quotients kBy = Quotients::divided>
   IST_HD static Rotation of(const double (&q)[4]) noexcept {
     const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
     if (!(norm >= kShortestDirection) || !(norm <= kLongestDirection))
       return {NAN, {NAN, NAN, NAN}};
-    return {q[0] / norm, Vec3{q[1], q[2], q[3]} / norm};
+    return {over<kBy>(Vec3{q[0], 0, 0}, norm).x, over<kBy>(Vec3{q[1], q[2], q[3]}, norm)};
   }
   IST_HD Rotation back() const { return {w, -v}; }
   IST_HD Vec3 operator*(const Vec3& x) const {
@@ -132,9 +143,10 @@ struct PairPlace {
   double unit_a;         ///< [u] length of one unit of A's unit frame
 
   /// False where a pose or scale cannot be used (QueryStatus::invalid_input).
+  template <Quotients kBy = Quotients::divided>
   IST_HD bool place(const AssetFrame& a, const Pose& pose_a, double scale_a, const AssetFrame& b,
                     const Pose& pose_b, double scale_b) noexcept {
-    const Rotation turn_a = Rotation::of(pose_a.q), turn_b = Rotation::of(pose_b.q);
+    const Rotation turn_a = Rotation::of<kBy>(pose_a.q), turn_b = Rotation::of<kBy>(pose_b.q);
     if (!usable(turn_a, pose_a.t, scale_a) || !usable(turn_b, pose_b.t, scale_b)) return false;
     unit_a = scale_a * a.unit;
     const double scale = scale_b * b.unit / unit_a;
@@ -142,7 +154,7 @@ struct PairPlace {
     const Vec3 off_a = scale_a * a.centre, off_b = scale_b * b.centre;
     double r[9];
     (turn_a.back() * turn_b).matrix(r);
-    const Vec3 t = (turn_a.back() * (t_b - t_a) + (turned(r, off_b) - off_a)) / unit_a;
+    const Vec3 t = over<kBy>(turn_a.back() * (t_b - t_a) + (turned(r, off_b) - off_a), unit_a);
     if (!in_pose_range(t) || !ratio_in_range(scale)) return false;
     a_from_b.scale = scale;
     b_from_a.scale = 1 / scale;
@@ -152,8 +164,12 @@ struct PairPlace {
         b_from_a.m[3 * i + j] = b_from_a.scale * r[3 * j + i];
       }
       a_from_b.t[i] = t[i];
-      b_from_a.t[i] = -((r[i] * t.x + r[3 + i] * t.y) + r[6 + i] * t.z) / scale;
     }
+    const Vec3 back = {(r[0] * t.x + r[3] * t.y) + r[6] * t.z,
+                       (r[1] * t.x + r[4] * t.y) + r[7] * t.z,
+                       (r[2] * t.x + r[5] * t.y) + r[8] * t.z};
+    const Vec3 t_back = over<kBy>(-back, scale);
+    for (int i = 0; i < 3; ++i) b_from_a.t[i] = t_back[i];
     turn_a.matrix(rotation_a);
     origin_a = t_a + turn_a * off_a;
     offset_b = turn_b * off_b;
