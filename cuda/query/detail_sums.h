@@ -117,6 +117,7 @@ class QuickLooker {
 struct DetailMemory {
   PairMemory pair;
   DetailChain chain;
+  DetailWeight share[DetailChain::kMost];  ///< of the pairs of levels, by the coarse sum
   FilledMemory filled;
   LensTotals coarse, part, result;
   std::uint32_t spheres, visits;  ///< of all that was asked
@@ -173,12 +174,18 @@ class DetailSums {
     if (team_.lane() == 0) {
       m_.coarse = m_.pair.totals;
       m_.result.clear();
+      m_.chain.share(
+          volume_of(m_.coarse), budget,
+          [](std::size_t i) {
+            return DetailWeight{i == 0 ? 1.0 : 0.0, 0};
+          },
+          [&](std::size_t i, const DetailWeight& weight) { m_.share[i] = weight; });
     }
     team_.sync();
     double slope = 0, sure_slope = 0;       // of the blend by the coarse sum, and by the quick look
     for (std::size_t i = size; i-- > 0;) {  // the order of the CPU's additions
       const DetailPair& levels = m_.chain[i];
-      const DetailWeight share = share_of(i, budget);
+      const DetailWeight share = m_.share[i];
       const double alone = i == 0 ? 1 : 0;
       const double weight = sure.weight * alone + (1 - sure.weight) * share.weight;
       if (weight == 0 && share.slope == 0) continue;
@@ -202,20 +209,6 @@ class DetailSums {
   }
 
  private:
-  /// Of pair i of levels by the coarse sum.
-  IST_HD DetailWeight share_of(std::size_t i, double budget) const {
-    DetailWeight found;
-    m_.chain.share(
-        volume_of(m_.coarse), budget,
-        [](std::size_t k) {
-          return DetailWeight{k == 0 ? 1.0 : 0.0, 0};
-        },
-        [&](std::size_t k, const DetailWeight& weight) {
-          if (k == i) found = weight;
-        });
-    return found;
-  }
-
   IST_HD static double volume_of(const LensTotals& totals) { return kPi / 3 * totals.term[kCaps]; }
 
   IST_HD static void add_part(const LensTotals& part, double weight, LensTotals& sum) {

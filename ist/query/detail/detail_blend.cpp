@@ -169,7 +169,7 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   if (!with_error && chain.size() == 1) return queries.ask(chain[0], false, most);
   const SphereTree coarse_a(a.tree.header(), matched_tree(a.tree.header(), chain.coarsest().a));
   const SphereTree coarse_b(b.tree.header(), matched_tree(b.tree.header(), chain.coarsest().b));
-  DetailWeight sure;
+  DetailWeight sure = {};
   if (!with_error) {
     const QuickLook look = quick_look(coarse_a, coarse_b, pose.a_from_b, false);
     sure = chain.quick_weight(look.volume, settings.pair_budget);

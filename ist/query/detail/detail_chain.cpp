@@ -10,7 +10,7 @@ DetailChain::DetailChain(const AssetHeader& a, const AssetHeader& b, double scal
 
 DetailChain::Weights DetailChain::weights(double coarse, double budget,
                                           const Weights& wanted) const noexcept {
-  Weights weights;
+  Weights weights = {};
   share(
       coarse, budget, [&](std::size_t i) { return wanted[i]; },
       [&](std::size_t i, const DetailWeight& weight) { weights[i] = weight; });

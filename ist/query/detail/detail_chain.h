@@ -58,7 +58,7 @@ class DetailChain {
   template <class Wanted, class Visit>
   IST_HD void share(double coarse, double budget, const Wanted& wanted,
                     const Visit& visit) const noexcept {
-    DetailWeight rest;
+    DetailWeight rest = {};
     for (std::uint32_t i = 0; i + 1 < size_; ++i) {
       const DetailWeight part = affordable(pairs_[i], coarse, budget, kLevelAlone, kLevelNone);
       rest = rest + wanted(i);

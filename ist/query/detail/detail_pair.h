@@ -35,8 +35,8 @@ struct DetailPair {
 
 /// Part of an answer that one pair of levels gives.
 struct DetailWeight {
-  double weight = 0;  ///< [0, 1]
-  double slope = 0;   ///< d weight / d estimate of the overlap
+  double weight;  ///< [0, 1]
+  double slope;   ///< d weight / d estimate of the overlap
 
   IST_HD friend DetailWeight operator*(const DetailWeight& x, const DetailWeight& y) noexcept {
     return {x.weight * y.weight, x.slope * y.weight + x.weight * y.slope};
