@@ -11,19 +11,19 @@ namespace ist::gpu {
 IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:
-      return field.half_space.look(x).distance;
+      return field.half_space.sample(x).distance;
     case FieldKind::ball:
-      return field.ball.look(x).distance;
+      return field.ball.sample(x).distance;
     case FieldKind::capsule:
-      return field.capsule.look(x).distance;
+      return field.capsule.sample(x).distance;
     case FieldKind::cylinder:
-      return field.cylinder.look(x).distance;
+      return field.cylinder.sample(x).distance;
     case FieldKind::grid:
-      return field.grid.look(x, sound).distance;
+      return field.grid.sample(x, sound).distance;
     case FieldKind::box:
-      return field.box.look(x).distance;
+      return field.box.sample(x).distance;
     case FieldKind::height:
-      return field.height.look(x).distance;
+      return field.height.sample(x).distance;
     default:
       return 0;
   }
@@ -38,15 +38,15 @@ IST_HD inline double distance_error(const FieldRef& field) {
 IST_HD inline BallPart part_in(const FieldRef& field, const double (&x)[3], double r, bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:
-      return flat_part(field.half_space.look(x), r);
+      return flat_part(field.half_space.sample(x), r);
     case FieldKind::ball:
       return field.ball.part(x, r);
     case FieldKind::capsule:
-      return flat_part(field.capsule.look(x), r);
+      return flat_part(field.capsule.sample(x), r);
     case FieldKind::cylinder:
       return field.cylinder.part(x, r);
     case FieldKind::grid:
-      return flat_part(field.grid.look(x, sound), r);
+      return flat_part(field.grid.sample(x, sound), r);
     default:
       return {};
   }

@@ -54,7 +54,7 @@ int main(int argc, char** argv) try {
                                  .highest = 0.3};
 
   const ist::BoxField wall{{0.1, 4, 2}};
-  const ist::FunctionField water{.look = waves};
+  const ist::FunctionField water{.sample = waves};
 
   const ist::Pose at_floor{.t = {0, 0, 0.45}}, at_wall{.t = {-0.55, 0, 0}};
   bool met = tell("floor", {floor, {}}, {tree, at_floor}, scratch);

@@ -83,8 +83,8 @@ struct FieldSample {
 /// visited, on the thread of the query. It must be 1-Lipschitz and never exceed the true distance
 /// by more than `error`. A sample that is not finite gives QueryStatus::invalid_input.
 struct FunctionField {
-  FieldSample (*look)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
-  const void* context = nullptr;  ///< passed to `look`
+  FieldSample (*sample)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
+  const void* context = nullptr;  ///< passed to `sample`
   double error = 0;               ///< [u] bound on the error of distances
 };
 

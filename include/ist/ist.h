@@ -314,8 +314,8 @@ typedef struct ist_field {
     } distance_grid;
     /* a function of the caller's, called on the thread of the query; it may not throw */
     struct {
-      void (*look)(const void* context, const double x[3], ist_field_sample_t* sample);
-      const void* context; /* passed to `look` */
+      void (*sample)(const void* context, const double x[3], ist_field_sample_t* answer);
+      const void* context; /* passed to `sample` */
       double error;        /* [u] bound on the error of distances */
     } function;
     /* the stored surface of an asset, without its spheres */

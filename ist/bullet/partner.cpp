@@ -38,7 +38,7 @@ Vector on_segment(const Vector& x, const Vector& a, const Vector& b) {
 }
 
 /// A cone about the z axis, its base below: in the half-plane of distance from the axis and height.
-FieldSample look_at_cone(const void* context, const Eigen::Vector3d& x) noexcept {
+FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& cone = *static_cast<const btConeShape*>(context);
   const double radius = cone.getRadius(), height = cone.getHeight();
   const double out = std::hypot(x.x(), x.y());
@@ -65,11 +65,11 @@ FieldSample look_at_cone(const void* context, const Eigen::Vector3d& x) noexcept
   return sample;
 }
 
-FieldSample look_at_mesh(const void* context, const Eigen::Vector3d& x) noexcept {
+FieldSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const MeshDistance*>(context)->at(x);
 }
 
-FieldSample look_at_hull(const void* context, const Eigen::Vector3d& x) noexcept {
+FieldSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const HullDistance*>(context)->at(x);
 }
 
@@ -301,7 +301,7 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
       return partner;
     }
     case CONE_SHAPE_PROXYTYPE:
-      partner.field_.field = FunctionField{look_at_cone, &shape, 0};
+      partner.field_.field = FunctionField{cone_sample, &shape, 0};
       partner.in_shape_ = from_z_to(static_cast<const btConeShape&>(shape).getConeUpIndex());
       return partner;
     case CONVEX_HULL_SHAPE_PROXYTYPE:
@@ -315,7 +315,7 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
       }
       partner.hull_ = std::make_shared<const HullDistance>(points);
       if (partner.hull_->faces() < 4) return std::nullopt;
-      partner.field_.field = FunctionField{look_at_hull, partner.hull_.get(), 0};
+      partner.field_.field = FunctionField{hull_sample, partner.hull_.get(), 0};
       return partner;
     }
     case TERRAIN_SHAPE_PROXYTYPE: {
@@ -345,7 +345,7 @@ PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
   if (mesh_ != nullptr) {
     thread_local MeshDistance near;
     near.gather(*mesh_, lower, upper, thickness);
-    placed.field = FunctionField{look_at_mesh, &near, 0};
+    placed.field = FunctionField{mesh_sample, &near, 0};
   }
   return placed;
 }

@@ -243,31 +243,32 @@ class PlacedShape {
   }
 
   SurfacePoint answer(const Vector3d& given, SurfacePoint) const noexcept {
-    return look<SurfacePoint>(given, [&](const Vector3d& x, const FieldSample& at, double error) {
-      // Where all directions are alike one of them serves.
-      const double slope = at.gradient.norm();
-      const Vector3d gradient =
-          slope > 0 ? Vector3d(-at.gradient / slope) : Vector3d::UnitX().eval();
-      const double rounding = 1e-15 * (x.norm() + std::abs(at.distance)) +
-                              1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
-      return SurfacePoint{-at.distance * frame_->unit,
-                          frame_->unit * (error + rounding),
-                          frame_->world(x + at.distance * gradient),
-                          frame_->rotation * gradient,
-                          ~0u,
-                          QueryStatus::ok};
-    });
+    return with_sample<SurfacePoint>(
+        given, [&](const Vector3d& x, const FieldSample& at, double error) {
+          // Where all directions are alike one of them serves.
+          const double slope = at.gradient.norm();
+          const Vector3d gradient =
+              slope > 0 ? Vector3d(-at.gradient / slope) : Vector3d::UnitX().eval();
+          const double rounding = 1e-15 * (x.norm() + std::abs(at.distance)) +
+                                  1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
+          return SurfacePoint{-at.distance * frame_->unit,
+                              frame_->unit * (error + rounding),
+                              frame_->world(x + at.distance * gradient),
+                              frame_->rotation * gradient,
+                              ~0u,
+                              QueryStatus::ok};
+        });
   }
 
   Containment answer(const Vector3d& given, Containment) const noexcept {
-    return look<Containment>(given, [](const Vector3d&, const FieldSample& at, double) {
+    return with_sample<Containment>(given, [](const Vector3d&, const FieldSample& at, double) {
       return Containment{at.distance > 0, QueryStatus::ok};
     });
   }
 
  private:
   template <class Answer, class Use>
-  Answer look(const Vector3d& given, const Use& use) const noexcept {
+  Answer with_sample(const Vector3d& given, const Use& use) const noexcept {
     const auto refuse = [] { return refused<Answer>(QueryStatus::invalid_input); };
     if (!frame_) return refuse();
     const std::optional<Vector3d> x = frame_->own(given);

@@ -344,9 +344,9 @@ int outlines_answer(scene_t* s) {
 /* --- Fields ----------------------------------------------------------------------------------- */
 
 /* The half-space z ≤ offset, as a function. */
-static void look(const void* context, const double x[3], ist_field_sample_t* sample) {
-  sample->distance = *(const double*)context - x[2];
-  sample->gradient[2] = -1;
+static void sample(const void* context, const double x[3], ist_field_sample_t* answer) {
+  answer->distance = *(const double*)context - x[2];
+  answer->gradient[2] = -1;
 }
 
 int fields_answer(scene_t* s) {
@@ -391,7 +391,7 @@ int fields_answer(scene_t* s) {
       for (i = 0; i < 3; ++i) field.as.distance_grid.origin[i] = -1;
       field.as.distance_grid.spacing = 0.5;
     } else if (kind == IST_FUNCTION) {
-      field.as.function.look = look;
+      field.as.function.sample = sample;
       field.as.function.context = &offset;
     } else {
       field.as.mesh.tree = &s->tree_a;

@@ -124,7 +124,7 @@ inline std::vector<std::pair<const char*, Field>> fields() {
   HeightField terrain = terrain_of(heights, 9);
   terrain.lowest = -0.11, terrain.highest = 0.11;
   FunctionField function;
-  function.look = [](const void*, const Vector3d& x) noexcept {
+  function.sample = [](const void*, const Vector3d& x) noexcept {
     const double d = x.norm();
     return FieldSample{0.5 - d, d > 0 ? Vector3d(-x / d) : Vector3d::Zero().eval()};
   };

@@ -87,7 +87,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
   std::uniform_real_distribution<double> draw(-1, 1);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d x(draw(random), draw(random), draw(random));
-    const FieldSample sample = field.look(field.context, x);
+    const FieldSample sample = field.sample(field.context, x);
     // The nearest of many points of mantle and base, in the half-plane of x.
     const double out = x.head<2>().norm();
     double nearest = 10;
@@ -99,7 +99,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
     const bool inside = x.z() > -0.5 && out < 0.4 * (0.5 - x.z());
     EXPECT_NEAR(sample.distance, inside ? nearest : -nearest, 1e-3) << x.transpose();
     EXPECT_NEAR(sample.gradient.norm(), 1, 1e-9);
-    EXPECT_NEAR(field.look(field.context, x + 1e-6 * sample.gradient).distance,
+    EXPECT_NEAR(field.sample(field.context, x + 1e-6 * sample.gradient).distance,
                 sample.distance + 1e-6, 1e-9);
   }
 }

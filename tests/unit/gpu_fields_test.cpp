@@ -553,7 +553,7 @@ TEST(GpuFields, WhatABatchCannotHoldIsNamed) {
     return "nothing";
   };
   FunctionField function;
-  function.look = [](const void*, const Eigen::Vector3d&) noexcept { return FieldSample{}; };
+  function.sample = [](const void*, const Eigen::Vector3d&) noexcept { return FieldSample{}; };
   EXPECT_EQ(said(Field(function)).find("GPU: solid 1 is a FunctionField"), 0u);
   EXPECT_EQ(said(TreeView{}), "GPU: solid 1 is an empty asset");
 }

@@ -92,7 +92,7 @@ class RealTime : public ::testing::Test {
     }
   }
 
-  static FieldSample look(const void*, const Eigen::Vector3d& x) noexcept {
+  static FieldSample sample(const void*, const Eigen::Vector3d& x) noexcept {
     return {0.2 - x.z(), -Eigen::Vector3d::UnitZ()};
   }
 
@@ -110,7 +110,7 @@ class RealTime : public ::testing::Test {
       CylinderField{0.4, 0.4},
       HeightField{numbers_.data(), 5, 5, {0.3, 0.3}},
       DistanceGridField{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
-      FunctionField{look, nullptr, 0},
+      FunctionField{sample, nullptr, 0},
       MeshField{box_.view()}};
   Workspace workspaces_[1], small_{16};
   ist_workspace_t c_workspace_ = {};

@@ -36,11 +36,11 @@ ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) 
 
 namespace {
 
-FieldSample look(const void* context, const Eigen::Vector3d& x) noexcept {
+FieldSample sample(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& function = static_cast<const ist_field_t*>(context)->as.function;
-  ist_field_sample_t sample = {};
-  function.look(function.context, x.data(), &sample);
-  return {sample.distance, vector(sample.gradient)};
+  ist_field_sample_t answer = {};
+  function.sample(function.context, x.data(), &answer);
+  return {answer.distance, vector(answer.gradient)};
 }
 
 ist_status_t read(const ist_field_t& given, Field& field) noexcept {
@@ -83,8 +83,8 @@ ist_status_t read(const ist_field_t& given, Field& field) noexcept {
       return IST_OK;
     }
     case IST_FUNCTION:
-      if (given.as.function.look == nullptr) return IST_NULL_POINTER;
-      field = FunctionField{look, &given, given.as.function.error};
+      if (given.as.function.sample == nullptr) return IST_NULL_POINTER;
+      field = FunctionField{sample, &given, given.as.function.error};
       return IST_OK;
     case IST_MESH: {
       MeshField mesh;

@@ -94,7 +94,7 @@ void write(const From& from, To& to) noexcept {
       from, to);
 }
 
-/// Of a function the caller's struct is looked into at every look.
+/// The field of a function points to the caller's struct and reads it for every sample.
 ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
 /// An asset: IST_NOT_HELD for a field.
 ist_status_t read(const ist_placed_t* given, PlacedTree& placed) noexcept;

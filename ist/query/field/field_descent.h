@@ -68,7 +68,7 @@ class FieldDescent {
       for (std::uint32_t lane = 0; lane < used; ++lane) {
         const Eigen::Vector3d x(balls.origin[0] + balls.x[lane], balls.origin[1] + balls.y[lane],
                                 balls.origin[2] + balls.z[lane]);
-        const double d = shape_.look(x).distance;
+        const double d = shape_.sample(x).distance;
         const double reach = sure_reach(balls.r[lane], shape_.error());
         const std::uint32_t child = kWidth * block + lane;
         if (d <= -reach) continue;

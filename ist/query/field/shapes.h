@@ -8,7 +8,7 @@
 #include "query/field/plain_shapes.h"
 #include "query/field/sound_fields.h"
 
-// The fields of ist/field.h as the descents on the CPU look at them.
+// The fields of ist/field.h as the descents on the CPU sample them.
 
 namespace ist {
 
@@ -38,13 +38,13 @@ template <class Plain>
 struct ShapeOf : Plain {
   explicit ShapeOf(const auto& field) noexcept : Plain(plain(field)), sound(is_sound(field)) {}
 
-  FieldSample look(const Eigen::Vector3d& x) noexcept { return sample(seen({x[0], x[1], x[2]})); }
+  FieldSample sample(const Eigen::Vector3d& x) noexcept { return eigen(seen({x[0], x[1], x[2]})); }
   FieldSample nearest(const Eigen::Vector3d& x) noexcept {
     const double at[3] = {x[0], x[1], x[2]};
     if constexpr (requires { Plain::nearest(at); })
-      return sample(Plain::nearest(at));
+      return eigen(Plain::nearest(at));
     else
-      return sample(seen(at));
+      return eigen(seen(at));
   }
   BallPart part(const Eigen::Vector3d& x, double r) noexcept {
     const double at[3] = {x[0], x[1], x[2]};
@@ -63,13 +63,13 @@ struct ShapeOf : Plain {
   bool sound;  ///< no longer once the field gives what is no number: the query's input is invalid
 
  private:
-  DistanceLook seen(const double (&x)[3]) noexcept {
-    if constexpr (requires { Plain::look(x, sound); })
-      return Plain::look(x, sound);
+  DistanceSample seen(const double (&x)[3]) noexcept {
+    if constexpr (requires { Plain::sample(x, sound); })
+      return Plain::sample(x, sound);
     else
-      return Plain::look(x);
+      return Plain::sample(x);
   }
-  static FieldSample sample(const DistanceLook& at) noexcept {
+  static FieldSample eigen(const DistanceSample& at) noexcept {
     return {at.distance, Eigen::Vector3d(at.gradient)};
   }
 };
@@ -83,17 +83,17 @@ using GridShape = ShapeOf<PlainGrid>;
 /// A caller's function. What it says that is no number makes the query's input invalid.
 struct FunctionShape {
   explicit FunctionShape(const FunctionField& f) noexcept : field(f), sound(is_sound(f)) {}
-  FieldSample look(const Eigen::Vector3d& x) noexcept {
-    FieldSample at = field.look(field.context, x);
+  FieldSample sample(const Eigen::Vector3d& x) noexcept {
+    FieldSample at = field.sample(field.context, x);
     if (!(std::abs(at.distance) <= kLongestLength) || !(at.gradient.squaredNorm() <= 1e6)) {
       sound = false;
       at = FieldSample{-kLongestLength, Eigen::Vector3d::Zero()};
     }
     return at;
   }
-  FieldSample nearest(const Eigen::Vector3d& x) noexcept { return look(x); }
+  FieldSample nearest(const Eigen::Vector3d& x) noexcept { return sample(x); }
   BallPart part(const Eigen::Vector3d& x, double r) noexcept {
-    const FieldSample at = look(x);
+    const FieldSample at = sample(x);
     return flat_part({at.distance, {at.gradient[0], at.gradient[1], at.gradient[2]}}, r);
   }
   double error() const noexcept { return field.error; }

@@ -40,7 +40,7 @@ inline bool is_sound(const DistanceGridField& f) noexcept {
          f.origin.allFinite() && is_side(f.size[0]) && is_side(f.size[1]) && is_side(f.size[2]);
 }
 inline bool is_sound(const FunctionField& f) noexcept {
-  return f.look != nullptr && is_extent(f.error);
+  return f.sample != nullptr && is_extent(f.error);
 }
 inline bool is_sound(const MeshField& f) noexcept { return f.tree.has_field(); }
 
