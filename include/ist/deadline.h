@@ -9,7 +9,7 @@ namespace IST_API ist {
 
 /// Keeps the queries of one pair of bodies within a time: it chooses their pair budget.
 ///
-/// No query reads a clock, so the loop measures them:
+/// The loop measures the time of each query:
 ///
 ///     ist::Deadline deadline(80);  // [µs]
 ///     for (;;) {

@@ -481,8 +481,7 @@ ist_status_t ist_separation(const ist_placed_t* a, const ist_placed_t* b,
                             ist_separation_t* answer);
 
 /* Deadline (deadline.h): chooses the pair budget that keeps the queries of one pair of bodies
- * within a time. No query reads a clock: the loop measures them. May be copied; all zero: no
- * deadline. */
+ * within a time, which the caller measures. May be copied; all zero: no deadline. */
 typedef struct ist_deadline {
   double opaque[8];
 } ist_deadline_t;

@@ -19,9 +19,8 @@
 // Units: [u] the meshes' length, [s] time, [force], and [mass] = [force·s²/u]. With u = m and force
 // = N mass is kg; with u = mm and force = mN mass is kg too.
 //
-// A force of k · −translation_gradient is not a contact law: it is k · area at any depth
-// (docs/engines.md, *What a volume provides*). Here the *pressure* grows with depth, as on a bed of
-// springs.
+// A force of k · −translation_gradient is not a contact law (docs/engines.md, *What a volume
+// provides*). Here the pressure grows with depth.
 
 namespace IST_API ist {
 

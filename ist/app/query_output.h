@@ -29,7 +29,8 @@ struct Answer {
   std::uint64_t sphere_pairs() const;
 };
 
-// The columns of docs/design.md 9, 17 digits; other tools read them: new ones only at the end.
+// The columns of docs/user_guide.md (*Query*), 17 digits; other tools read them: new ones only at
+// the end.
 std::string answers_csv(std::span<const Answer> answers);
 std::string answers_json(std::span<const Answer> answers);
 
