@@ -44,7 +44,7 @@ class PairPatches {
     ContactBins& bins = scratch_.contact;
     if (!method_.lenses) {
       start_probed();
-      return whole_ = both_.exact(method_.b_probes, limits, &bins);
+      return whole_ = both_.by_surface(method_.b_probes, limits, &bins);
     }
     of_b_ = divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
                       tree_b_.header->root[3] * pose_.a_from_b.scale);
@@ -54,14 +54,14 @@ class PairPatches {
     filled_ = bins.collect(descent.precision());
     const Penetration lenses = descent.penetration();
     const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-    const ExactWeight weight = exact_weight(method_, lenses, unit3);
+    const SurfaceWeight weight = surface_weight(method_, lenses, unit3);
     const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits);
     // The patches are those of the larger part.
     probed_ = left && weight.weight >= 0.5;
     if (probed_) start_probed();
     whole_ = weight.most == 0 ? lenses
-             : left ? both_.with_exact(method_, lenses, weight, *left, probed_ ? &bins : nullptr)
-                    : both_.without_exact(method_, lenses);
+             : left ? both_.with_surface(method_, lenses, weight, *left, probed_ ? &bins : nullptr)
+                    : both_.without_surface(method_, lenses);
     return whole_;
   }
 

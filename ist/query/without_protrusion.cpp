@@ -85,7 +85,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
   // What meets a surface is exact.
   if (pair_method(a, a.tree.header().matched_tree, b, b.tree.header().matched_tree, *pose,
                   settings.field)
-          .exact)
+          .surface)
     return;
   const double skin = skin_of(a, b);
   const auto is_light = [&](const ContactPatch& patch) {

@@ -64,7 +64,7 @@ class DetailQueries {
   /// Whether asking a pair of levels is no more than its coarse estimate.
   bool is_estimate(const DetailPair& pair) const noexcept {
     return coincidence_weight_of(pair).weight == 0 &&
-           (by_error(settings_) || !method_of(pair).exact);
+           (by_error(settings_) || !method_of(pair).surface);
   }
 
   /// The exact measure within what is left of the visits.

@@ -20,7 +20,7 @@ namespace ist {
 namespace {
 
 // Ratio of grains up to which trees are summed by lenses alone, however light the contact; from
-// which on light ones are summed exactly; and from which on all are.
+// which on light ones are summed by the surface; and from which on all are.
 constexpr double kAlike = 1.25, kOther = 2, kUnlike = 4;
 // A contact is light up to an overlap of so many spheres of the coarser grain: there lenses are 2 %
 // and more in error, and few spheres meet the surface …
@@ -63,7 +63,7 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
   const bool has_field = (method.b_probes ? a : b).tree.header().field != 0;
   if (use == FieldUse::never || !has_field) return method;
   if (use == FieldUse::always || ratio >= kUnlike) {
-    method.exact = true;
+    method.surface = true;
     method.lenses = false;
     return method;
   }
@@ -75,7 +75,7 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
                       : triangles_met(b.tree.header(), tree_a.mean_radius / pose.a_from_b.scale);
   const double worth =
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
-  method.exact = worth > 0;
+  method.surface = worth > 0;
   method.share = smooth_step((ratio - kAlike) / (kOther - kAlike));
   method.full =
       worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) / (1 - unlike);
@@ -104,7 +104,7 @@ namespace {
 
 /// Weight and slope where lenses say `volume`, A's unit frame.
 std::pair<double, double> weight_at(const PairMethod& method, double volume) noexcept {
-  if (!method.exact) return {0, 0};
+  if (!method.surface) return {0, 0};
   if (!method.lenses || !(volume > method.full)) return {method.share, 0};
   const double width = method.none - method.full;
   const double t = (volume - method.full) / width;
@@ -114,15 +114,15 @@ std::pair<double, double> weight_at(const PairMethod& method, double volume) noe
 
 }  // namespace
 
-ExactWeight exact_weight(const PairMethod& method, const Penetration& lenses,
-                         double unit3) noexcept {
+SurfaceWeight surface_weight(const PairMethod& method, const Penetration& lenses,
+                             double unit3) noexcept {
   const auto [weight, slope] = weight_at(method, lenses.volume / unit3);
   // It falls with the volume.
   return {weight, slope, weight_at(method, lenses.volume_max / unit3).first,
           weight_at(method, lenses.volume_min / unit3).first};
 }
 
-Penetration blended(const Penetration& lenses, Penetration sum, const ExactWeight& weight,
+Penetration blended(const Penetration& lenses, Penetration sum, const SurfaceWeight& weight,
                     double unit3) noexcept {
   if (weight.least == 1) return sum;
   const double w = weight.weight;
@@ -154,8 +154,8 @@ Penetration PairOverlap::by_lenses(const DescentLimits& limits) noexcept {
   return descent.penetration();
 }
 
-Penetration PairOverlap::exact(bool b_probes, const DescentLimits& limits,
-                               ContactBins* bins) noexcept {
+Penetration PairOverlap::by_surface(bool b_probes, const DescentLimits& limits,
+                                    ContactBins* bins) noexcept {
   const PlacedTree& owner = b_probes ? a_ : b_;
   const PlacedTree& prober = b_probes ? b_ : a_;
   const SurfaceTree surface = surface_tree(owner.tree);
@@ -184,19 +184,19 @@ std::optional<DescentLimits> PairOverlap::left_by(const Penetration& lenses,
   return limits;
 }
 
-Penetration PairOverlap::with_exact(const PairMethod& method, const Penetration& lenses,
-                                    const ExactWeight& weight, const DescentLimits& left,
-                                    ContactBins* bins) noexcept {
-  Penetration sum = exact(method.b_probes, left, bins);
+Penetration PairOverlap::with_surface(const PairMethod& method, const Penetration& lenses,
+                                      const SurfaceWeight& weight, const DescentLimits& left,
+                                      ContactBins* bins) noexcept {
+  Penetration sum = by_surface(method.b_probes, left, bins);
   sum.node_visits += lenses.node_visits;
   sum.sphere_pairs += lenses.sphere_pairs;
   sum.status = std::max(sum.status, lenses.status);
   return blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a);
 }
 
-Penetration PairOverlap::without_exact(const PairMethod& method,
-                                       Penetration lenses) const noexcept {
-  // Of the exact sum nothing is known but that it is no more than all that probes.
+Penetration PairOverlap::without_surface(const PairMethod& method,
+                                         Penetration lenses) const noexcept {
+  // Of the surface's sum nothing is known but that it is no more than all that probes.
   const double scale = pose_.unit_a * (method.b_probes ? pose_.a_from_b.scale : 1.0);
   const double most = (method.b_probes ? tree_b_ : tree_a_).volume_sum * (scale * scale * scale);
   lenses.volume_min = 0;
@@ -206,15 +206,15 @@ Penetration PairOverlap::without_exact(const PairMethod& method,
 }
 
 Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limits) noexcept {
-  if (!method.exact) return by_lenses(limits);
-  if (!method.lenses) return exact(method.b_probes, limits);
+  if (!method.surface) return by_lenses(limits);
+  if (!method.lenses) return by_surface(method.b_probes, limits);
   const Penetration lenses = by_lenses(limits);
   const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-  const ExactWeight weight = exact_weight(method, lenses, unit3);
+  const SurfaceWeight weight = surface_weight(method, lenses, unit3);
   if (weight.most == 0) return lenses;
   const std::optional<DescentLimits> left = left_by(lenses, limits);
-  if (!left) return without_exact(method, lenses);
-  return with_exact(method, lenses, weight, *left);
+  if (!left) return without_surface(method, lenses);
+  return with_surface(method, lenses, weight, *left);
 }
 
 }  // namespace ist
