@@ -158,21 +158,20 @@ HWY_INLINE void child_gaps_to(const GapSide& side, int level_x, std::uint32_t bl
   }
 }
 
-void child_float32(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                   std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
-  child_gaps_to<float>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
+void child(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
+           std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
+           ChildGaps& out) {
+  precision == Precision::float32
+      ? child_gaps_to<float>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out)
+      : child_gaps_to<double>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit,
+                              out);
 }
-void child_float64(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                   std::uint32_t block_y, double gap_limit, double cover_limit, ChildGaps& out) {
-  child_gaps_to<double>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
-}
-LeafGap leaf_float32(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
-                     double gap_limit, double cover_limit) {
-  return leaf_gap_as<float>(side, block_x, block_y, gap_limit, cover_limit);
-}
-LeafGap leaf_float64(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
-                     double gap_limit, double cover_limit) {
-  return leaf_gap_as<double>(side, block_x, block_y, gap_limit, cover_limit);
+
+LeafGap leaf(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y, double gap_limit,
+             double cover_limit, Precision precision) {
+  return precision == Precision::float32
+             ? leaf_gap_as<float>(side, block_x, block_y, gap_limit, cover_limit)
+             : leaf_gap_as<double>(side, block_x, block_y, gap_limit, cover_limit);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -181,28 +180,19 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(child_float32);
-HWY_EXPORT(child_float64);
-HWY_EXPORT(leaf_float32);
-HWY_EXPORT(leaf_float64);
+HWY_EXPORT(child);
+HWY_EXPORT(leaf);
 
 void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
                 std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
                 ChildGaps& out) noexcept {
-  if (precision == Precision::float32) {
-    HWY_DYNAMIC_DISPATCH(child_float32)
-    (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
-  } else {
-    HWY_DYNAMIC_DISPATCH(child_float64)
-    (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out);
-  }
+  HWY_DYNAMIC_DISPATCH(child)
+  (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, precision, out);
 }
 
 LeafGap leaf_gap(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
                  double gap_limit, double cover_limit, Precision precision) noexcept {
-  return precision == Precision::float32
-             ? HWY_DYNAMIC_DISPATCH(leaf_float32)(side, block_x, block_y, gap_limit, cover_limit)
-             : HWY_DYNAMIC_DISPATCH(leaf_float64)(side, block_x, block_y, gap_limit, cover_limit);
+  return HWY_DYNAMIC_DISPATCH(leaf)(side, block_x, block_y, gap_limit, cover_limit, precision);
 }
 
 }  // namespace ist

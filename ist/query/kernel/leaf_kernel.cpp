@@ -180,14 +180,10 @@ void add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t
   sum_last_lenses(list, sums, bins);
 }
 
-void add_float32(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                 const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  add_as<float>(stage, scratch.float32, a, b, n, sums);
-}
-
-void add_float64(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
-                 const std::uint32_t* b, std::size_t n, LeafSums& sums) {
-  add_as<double>(stage, scratch.float64, a, b, n, sums);
+void add_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
+               const std::uint32_t* b, std::size_t n, LeafSums& sums) {
+  stage.precision == Precision::float32 ? add_as<float>(stage, scratch.float32, a, b, n, sums)
+                                        : add_as<double>(stage, scratch.float64, a, b, n, sums);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -196,16 +192,11 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(add_float32);
-HWY_EXPORT(add_float64);
+HWY_EXPORT(add_pairs);
 
 void add_leaf_pairs(const LeafStage& stage, LeafScratch& scratch, const std::uint32_t* a,
                     const std::uint32_t* b, std::size_t n, LeafSums& sums) noexcept {
-  if (stage.precision == Precision::float32) {
-    HWY_DYNAMIC_DISPATCH(add_float32)(stage, scratch, a, b, n, sums);
-  } else {
-    HWY_DYNAMIC_DISPATCH(add_float64)(stage, scratch, a, b, n, sums);
-  }
+  HWY_DYNAMIC_DISPATCH(add_pairs)(stage, scratch, a, b, n, sums);
 }
 
 }  // namespace ist

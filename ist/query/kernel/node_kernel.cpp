@@ -144,36 +144,30 @@ HWY_INLINE void masks_as(const NodeStage& stage, const std::uint32_t* x, const s
   }
 }
 
-void masks_float32(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                   std::size_t n, std::uint16_t* masks) {
-  masks_as<float>(stage, x, y, n, masks);
+void masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y, std::size_t n,
+           std::uint16_t* masks) {
+  stage.precision == Precision::float32 ? masks_as<float>(stage, x, y, n, masks)
+                                        : masks_as<double>(stage, x, y, n, masks);
 }
 
-void masks_float64(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                   std::size_t n, std::uint16_t* masks) {
-  masks_as<double>(stage, x, y, n, masks);
+template <bool kContained>
+HWY_INLINE std::size_t open_either(const NodeStage& stage, const std::uint32_t* x,
+                                   const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
+                                   std::uint32_t* out_y, ContainedNodes* contained) {
+  return stage.precision == Precision::float32
+             ? open_as<float, kContained>(stage, x, y, n, out_x, out_y, contained)
+             : open_as<double, kContained>(stage, x, y, n, out_x, out_y, contained);
 }
 
-std::size_t open_float32(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
-  return open_as<float, false>(stage, x, y, n, out_x, out_y, nullptr);
+std::size_t open(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                 std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
+  return open_either<false>(stage, x, y, n, out_x, out_y, nullptr);
 }
 
-std::size_t open_float64(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
-  return open_as<double, false>(stage, x, y, n, out_x, out_y, nullptr);
-}
-
-std::size_t open_holding_float32(const NodeStage& stage, const std::uint32_t* x,
-                                 const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                                 std::uint32_t* out_y, ContainedNodes& contained) {
-  return open_as<float, true>(stage, x, y, n, out_x, out_y, &contained);
-}
-
-std::size_t open_holding_float64(const NodeStage& stage, const std::uint32_t* x,
-                                 const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                                 std::uint32_t* out_y, ContainedNodes& contained) {
-  return open_as<double, true>(stage, x, y, n, out_x, out_y, &contained);
+std::size_t open_holding(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                         ContainedNodes& contained) {
+  return open_either<true>(stage, x, y, n, out_x, out_y, &contained);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -182,33 +176,24 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
-HWY_EXPORT(open_float32);
-HWY_EXPORT(open_float64);
-HWY_EXPORT(open_holding_float32);
-HWY_EXPORT(open_holding_float64);
-HWY_EXPORT(masks_float32);
-HWY_EXPORT(masks_float64);
+HWY_EXPORT(open);
+HWY_EXPORT(open_holding);
+HWY_EXPORT(masks);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
-  return stage.precision == Precision::float32
-             ? HWY_DYNAMIC_DISPATCH(open_float32)(stage, x, y, n, out_x, out_y)
-             : HWY_DYNAMIC_DISPATCH(open_float64)(stage, x, y, n, out_x, out_y);
+  return HWY_DYNAMIC_DISPATCH(open)(stage, x, y, n, out_x, out_y);
 }
 
 std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
                                std::uint32_t* out_y, ContainedNodes& contained) noexcept {
-  return stage.precision == Precision::float32
-             ? HWY_DYNAMIC_DISPATCH(open_holding_float32)(stage, x, y, n, out_x, out_y, contained)
-             : HWY_DYNAMIC_DISPATCH(open_holding_float64)(stage, x, y, n, out_x, out_y, contained);
+  return HWY_DYNAMIC_DISPATCH(open_holding)(stage, x, y, n, out_x, out_y, contained);
 }
 
 void reach_masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                  std::size_t n, std::uint16_t* masks) noexcept {
-  stage.precision == Precision::float32
-      ? HWY_DYNAMIC_DISPATCH(masks_float32)(stage, x, y, n, masks)
-      : HWY_DYNAMIC_DISPATCH(masks_float64)(stage, x, y, n, masks);
+  HWY_DYNAMIC_DISPATCH(masks)(stage, x, y, n, masks);
 }
 
 }  // namespace ist
