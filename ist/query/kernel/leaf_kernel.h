@@ -12,16 +12,23 @@ namespace ist {
 /// up.
 inline constexpr std::size_t kSumLanes = 8;
 
-/// Running sums over leaf pairs, in A's unit frame, positions relative to B's unit-frame origin.
-/// Factors of π are left to the end. Lanes keep the order of additions the same for every vector
-/// width, and thus the bits.
-struct alignas(64) LeafSums {
-  double caps[kSumLanes] = {};       ///< 3/π · volume
-  double force[3][kSumLanes] = {};   ///< −1/2π · dV/d(translation of B)
-  double torque[3][kSumLanes] = {};  ///< likewise about B's unit-frame origin
-  double moment[3][kSumLanes] = {};  ///< 3/π · ∫ x dV
-  double error[kSumLanes] = {};      ///< 1/2π · bound on what rounded distances change in V
-  std::uint32_t lenses = 0;          ///< that are not empty
+/// What is summed of lenses, in A's unit frame, positions relative to B's unit-frame origin.
+/// Factors of π are left to the end.
+template <class Sum>
+struct LensSums {
+  Sum caps;       ///< 3/π · volume
+  Sum force[3];   ///< −1/2π · dV/d(translation of B)
+  Sum torque[3];  ///< likewise about B's unit-frame origin
+  Sum moment[3];  ///< 3/π · ∫ x dV
+  Sum error;      ///< 1/2π · bound on what rounded distances change in V
+};
+
+/// Running sums over leaf pairs. Lanes keep the order of additions the same for every vector width,
+/// and thus the bits.
+struct alignas(64) LeafSums : LensSums<double[kSumLanes]> {
+  LeafSums() noexcept : LensSums{} {}
+
+  std::uint32_t lenses = 0;  ///< that are not empty
 };
 
 /// Where the sums of single pairs go besides the whole's: pair i to sums[node[i] >> shift].

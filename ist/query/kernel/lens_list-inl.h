@@ -33,11 +33,19 @@ struct alignas(64) LensList {
 
 /// Sums of one list, sixteen lanes each.
 template <class T>
-struct alignas(64) LaneSums {
-  T caps[kWidth];
-  T force[3][kWidth], torque[3][kWidth], moment[3][kWidth];
-  T error[kWidth];
-};
+struct alignas(64) LaneSums : LensSums<T[kWidth]> {};
+
+/// visit(sum of each) for every member of LensSums.
+template <class Visit, class... Sums>
+HWY_INLINE void for_each_sum(const Visit& visit, Sums&... sums) {
+  visit(sums.caps...);
+  visit(sums.error...);
+  for (int k = 0; k < 3; ++k) {
+    visit(sums.force[k]...);
+    visit(sums.torque[k]...);
+    visit(sums.moment[k]...);
+  }
+}
 
 /// total[l] += from[l] + from[l + 8], the last additions in double.
 template <class T>
@@ -55,50 +63,16 @@ HWY_INLINE void fold(const T* from, double* total) {
   }
 }
 
-template <class T>
-HWY_INLINE void add_lanes(const LaneSums<T>& lanes, LeafSums& sums) {
-  fold(lanes.caps, sums.caps);
-  fold(lanes.error, sums.error);
-  for (int k = 0; k < 3; ++k) {
-    fold(lanes.force[k], sums.force[k]);
-    fold(lanes.torque[k], sums.torque[k]);
-    fold(lanes.moment[k], sums.moment[k]);
-  }
-}
-
-/// Adds lens `lane` of the sixteen to the sums of its bin.
-template <class T>
-HWY_INLINE void add_lens(const LaneSums<T>& lenses, std::size_t lane, LeafSums& bin) {
-  bin.caps[0] += static_cast<double>(lenses.caps[lane]);
-  bin.error[0] += static_cast<double>(lenses.error[lane]);
-  for (int k = 0; k < 3; ++k) {
-    bin.force[k][0] += static_cast<double>(lenses.force[k][lane]);
-    bin.torque[k][0] += static_cast<double>(lenses.torque[k][lane]);
-    bin.moment[k][0] += static_cast<double>(lenses.moment[k][lane]);
-  }
-}
-
-/// The quantities of LeafSums for a vector of lenses, or of many added up.
-template <class V>
-struct LensVectors {
-  V caps, error, force[3], torque[3], moment[3];
-};
-
+/// Vectors of lenses as lanes [lane, …) of the sums.
 template <class T, class D, class V>
-HWY_INLINE void store(const LensVectors<V>& from, D d, std::size_t lane, LaneSums<T>& to) {
-  hn::Store(from.caps, d, to.caps + lane);
-  hn::Store(from.error, d, to.error + lane);
-  for (int k = 0; k < 3; ++k) {
-    hn::Store(from.force[k], d, to.force[k] + lane);
-    hn::Store(from.torque[k], d, to.torque[k] + lane);
-    hn::Store(from.moment[k], d, to.moment[k] + lane);
-  }
+HWY_INLINE void store(const LensSums<V>& from, D d, std::size_t lane, LaneSums<T>& to) {
+  for_each_sum([&](const V& v, T* lanes) { hn::Store(v, d, lanes + lane); }, from, to);
 }
 
 /// lens() of lens.h, a vector at a time and without branches. Counts those that are not empty.
 template <class T, class D, class V = hn::Vec<D>>
-HWY_INLINE LensVectors<V> lens_vectors(const LensList<T>& list, D d, std::size_t at,
-                                       std::uint32_t& lenses) {
+HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at,
+                                    std::uint32_t& lenses) {
   const V zero = hn::Zero(d);
   const V two = hn::Set(d, T(2));
   const V three = hn::Set(d, T(3));
@@ -134,7 +108,7 @@ HWY_INLINE LensVectors<V> lens_vectors(const LensList<T>& list, D d, std::size_t
   const V lx = hn::Load(d, list.lx + at);
   const V ly = hn::Load(d, list.ly + at);
   const V lz = hn::Load(d, list.lz + at);
-  LensVectors<V> lens;
+  LensSums<V> lens;
   lens.caps = large + small;
   lens.error = error * hn::IfThenElse(near < error, b * b, circle);
   lens.force[0] = pull * dx;
@@ -161,7 +135,8 @@ HWY_INLINE void bin_lenses(const LensList<T>& list, std::size_t batches, LeafSum
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
       store<T>(lens_vectors<T>(list, d, at + lane, counted), d, lane, lenses);
     for (std::size_t lane = 0; lane < kWidth; ++lane)
-      add_lens(lenses, lane, bins[list.bin[at + lane]]);
+      for_each_sum([&](const T* from, double* bin) { *bin += static_cast<double>(from[lane]); },
+                   lenses, bins[list.bin[at + lane]]);
   }
 }
 
@@ -174,22 +149,15 @@ HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSum
   using V = hn::Vec<decltype(d)>;
   LaneSums<T> lanes;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const V zero = hn::Zero(d);
-    LensVectors<V> total{zero, zero, {zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}};
+    LensSums<V> total;
+    for_each_sum([&](V& sum) { sum = hn::Zero(d); }, total);
     for (std::size_t i = 0; i < batches; ++i) {
-      const std::size_t at = kWidth * i + lane;
-      const LensVectors<V> lens = lens_vectors<T>(list, d, at, sums.lenses);
-      total.caps = total.caps + lens.caps;
-      total.error = total.error + lens.error;
-      for (int k = 0; k < 3; ++k) {
-        total.force[k] = total.force[k] + lens.force[k];
-        total.torque[k] = total.torque[k] + lens.torque[k];
-        total.moment[k] = total.moment[k] + lens.moment[k];
-      }
+      const LensSums<V> lens = lens_vectors<T>(list, d, kWidth * i + lane, sums.lenses);
+      for_each_sum([](V& sum, const V& x) { sum = sum + x; }, total, lens);
     }
     store<T>(total, d, lane, lanes);
   }
-  add_lanes(lanes, sums);
+  for_each_sum([](const T* from, double* to) { fold(from, to); }, lanes, sums);
   if (bins != nullptr) bin_lenses(list, batches, bins);
 }
 
