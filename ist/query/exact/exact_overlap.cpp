@@ -27,8 +27,6 @@ Point map_vector(const Similarity& map, const Point& x) {
           (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
 }
 
-void add(Point& sum, double factor, const Point& p) { sum = sum + factor * p; }
-
 }  // namespace
 
 /// Triangles that are so near count as near, whichever search found them: far more than rounding.
@@ -126,7 +124,6 @@ bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
     crossings.opposite(e)[i] = opposite ? (end.enters ? 1.0 : -1.0) : 0.0;
     note_piercing(side(end.of_b), block, end, crossings.end(e, Crossings::kT)[i],
                   crossings.end(e, Crossings::kTError)[i]);
-    if (checked_) add_gap(side(end.of_b), block, i, e);
   }
   return true;
 }
@@ -161,17 +158,6 @@ void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const Crossings
     crossed.first_error[edge] = t_error;
   }
   if (end.from_first) crossed.middle[edge] = static_cast<std::int8_t>(crossed.middle[edge] + sign);
-}
-
-/// What the surface lacks to be closed: the way from the nearer end of a pierced edge.
-void ExactQuery::add_gap(const Side& own, const CrossedBlock& crossed, std::uint32_t i,
-                         int e) noexcept {
-  const Crossings::End end = scratch_.crossings.end_of(i, e);
-  const std::uint32_t k = end.from_first ? end.edge : (end.edge + 1) % 3;
-  const double half = own.is_b == end.enters ? -0.5 : 0.5;
-  add(out_.gap, half,
-      cross(scratch_.crossings.place_of(i, e, out_.origin),
-            crossed.at(own.mesh.blocks[crossed.block].corner[k][end.triangle % kWidth])));
 }
 
 /// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
@@ -276,10 +262,6 @@ void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed)
     triangle_terms(crossed, whole, h, terms);
     slots_.add_triangles(terms);
   }
-  for (std::uint32_t t = 0; t < mesh.triangles && checked_; ++t)
-    for (std::uint32_t k = 0; k < 3; ++k)
-      add(out_.gap, middle_of(mesh, crossed, 3 * t + k) * (own.is_b ? -0.5 : 0.5),
-          cross(crossed.at(mesh.corner[k][t]), crossed.at(mesh.corner[(k + 1) % 3][t])));
 }
 
 ExactQuery::LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint32_t i,
@@ -340,31 +322,6 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
   into.moment = into.moment + sums.moment;
   rounding_ += 64 * kHalfUnit * sums.area * (sums.reach + sums.width);
   add_layer(own, sums.area, sums.width);
-  if (checked_) add(out_.gap, own.is_b ? -1 : 1, sums.normal);
-}
-
-/// Sums the blocks that lie inside as a whole, as few lanes as hold them.
-void ExactQuery::sum_insides(const Side& own, int level, std::uint32_t i) noexcept {
-  const std::uint32_t shift = 4 * (static_cast<std::uint32_t>(level) - 1);
-  const std::uint32_t blocks = own.mesh.level[0].count;
-  const std::uint32_t used = std::min(kWidth, own.mesh.level[level - 1].count - kWidth * i);
-  const std::uint64_t* const words = own.marks.inside.get();
-  for (std::uint32_t lane = 0; lane < used; ++lane) {
-    const std::uint32_t first = (kWidth * i + lane) << shift;
-    const std::uint32_t end = std::min(blocks, first + (1u << shift));
-    bool all = true, none = true;
-    for (std::uint32_t b = first; b < end; b += 64 - b % 64) {
-      const std::uint32_t stop = std::min(end, b + (64 - b % 64));
-      const std::uint64_t mask = (~std::uint64_t{0} >> (64 - (stop - b))) << b % 64;
-      all = all && (words[b / 64] & mask) == mask;
-      none = none && (words[b / 64] & mask) == 0;
-    }
-    if (none) continue;
-    if (all)
-      sum_lane(own, level, i, lane, out_.sums);
-    else
-      sum_insides(own, level - 1, kWidth * i + lane);
-  }
 }
 
 /// A surface that moves changes the volume by no more than a layer as thick over its faces, edges
@@ -461,9 +418,7 @@ CrossingsFound ExactQuery::search(std::uint32_t max_visits, std::uint32_t pair_i
   return found;
 }
 
-ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id,
-                             bool checked) noexcept {
-  checked_ = checked;
+ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
   for (const Side& side : sides_)
     if (side.mesh.level[0].count > scratch_.most_blocks) {
       out_.complete = false;
@@ -490,12 +445,12 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id,
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
     // In the order of the mesh, whichever was found first.
-    for (std::uint32_t w = 0; w < (side.mesh.level[0].count + 63) / 64; ++w)
-      for (std::uint64_t left = side.marks.pierced[w]; left != 0; left &= left - 1)
-        sum_crossed_block(
-            side, side.marks.blocks[side.marks.place[64 * w + static_cast<std::uint32_t>(
-                                                                  std::countr_zero(left))]]);
-    sum_insides(side, side.mesh.top, 0);
+    for_each_block(side.marks.pierced, side.mesh.level[0].count, [&](std::uint32_t b) {
+      sum_crossed_block(side, side.marks.blocks[side.marks.place[b]]);
+    });
+    for_each_inside(side, side.mesh.top, 0, [&](int level, std::uint32_t i, std::uint32_t lane) {
+      sum_lane(side, level, i, lane, out_.sums);
+    });
     bound_near(side);
   }
   out_.sums.add(slots_.total());

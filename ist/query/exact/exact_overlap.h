@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 
 #include <ist/query.h>
@@ -21,8 +23,6 @@ struct ExactOverlap {
   /// No limit or room was short, and it is consistent; else nothing above is of use.
   bool complete = true;
   bool consistent = true;  ///< signs agree with each other, as exact ones do
-  /// How far the surface of the overlap is from closed, an area vector: rounding, if all is well.
-  exact::Point gap = {};
 };
 
 /// Volume and gradients of the overlap. Allocates, locks and throws nothing. The answer depends on
@@ -39,9 +39,8 @@ class ExactQuery {
         scratch_(scratch) {}
 
   /// `max_visits`: 0: no limit. `pair_id`: of the caller's pair, whose calls are steps of one
-  /// motion; 0: of none. `checked`: finds the gap too.
-  ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0,
-                   bool checked = false) noexcept;
+  /// motion; 0: of none.
+  ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0) noexcept;
 
  protected:
   struct Side {
@@ -78,6 +77,40 @@ class ExactQuery {
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
                 ExactSums& sums) noexcept;
 
+  template <class Visit>
+  static void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
+                             const Visit& visit) {
+    for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
+      for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
+        visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+  }
+
+  /// visit(level, box block, lane) for the blocks that lie inside as a whole: as few lanes as hold
+  /// those below box block i of a level.
+  template <class Visit>
+  static void for_each_inside(const Side& own, int level, std::uint32_t i, const Visit& visit) {
+    const std::uint32_t shift = 4 * (static_cast<std::uint32_t>(level) - 1);
+    const std::uint32_t blocks = own.mesh.level[0].count;
+    const std::uint32_t used = std::min(kWidth, own.mesh.level[level - 1].count - kWidth * i);
+    const std::uint64_t* const words = own.marks.inside.get();
+    for (std::uint32_t lane = 0; lane < used; ++lane) {
+      const std::uint32_t first = (kWidth * i + lane) << shift;
+      const std::uint32_t end = std::min(blocks, first + (1u << shift));
+      bool all = true, none = true;
+      for (std::uint32_t b = first; b < end; b += 64 - b % 64) {
+        const std::uint32_t stop = std::min(end, b + (64 - b % 64));
+        const std::uint64_t mask = (~std::uint64_t{0} >> (64 - (stop - b))) << b % 64;
+        all = all && (words[b / 64] & mask) == mask;
+        none = none && (words[b / 64] & mask) == 0;
+      }
+      if (none) continue;
+      if (all)
+        visit(level, i, lane);
+      else
+        for_each_inside(own, level - 1, kWidth * i + lane, visit);
+    }
+  }
+
   Side sides_[2];
   const Similarity& a_from_b_;
   const Similarity& b_from_a_;
@@ -92,12 +125,10 @@ class ExactQuery {
   bool add_crossing(std::uint32_t i) noexcept;
   void note_piercing(Side& side, CrossedBlock& crossed, const Crossings::End& end, double t,
                      double t_error) noexcept;
-  void add_gap(const Side& side, const CrossedBlock& crossed, std::uint32_t i, int e) noexcept;
   void settle(Side& side, CrossedBlock& crossed) noexcept;
   bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;
   void find_insides(Side& side) noexcept;
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
-  void sum_insides(const Side& side, int level, std::uint32_t i) noexcept;
   double nearness() const noexcept;
   bool is_near(std::uint32_t a, std::uint32_t b, double distance) const noexcept;
   void mark_near(std::uint32_t unsure) noexcept;
@@ -106,7 +137,6 @@ class ExactQuery {
 
   CrossingSearch search_ = {&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_};
   SlotSums slots_;
-  bool checked_ = false;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double layers_ = 0;    ///< what surfaces may miss by having moved
 };

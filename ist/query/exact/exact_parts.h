@@ -1,6 +1,5 @@
 #pragma once
 
-#include <bit>
 #include <cstdint>
 
 #include "query/exact/exact_overlap.h"
@@ -24,14 +23,6 @@ class ExactParts : public ExactQuery {
 
  protected:
   std::uint32_t part_of(std::uint32_t element) noexcept;
-
-  template <class Visit>
-  static void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
-                             const Visit& visit) {
-    for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-      for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
-        visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
-  }
 
   static constexpr std::uint32_t kNoPart = ~0u;
   std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
