@@ -111,10 +111,10 @@ class BlockSearch {
   }
 
   const PlacedBoxes& placed_a(int level, std::uint32_t i) {
-    return placed_boxes(a_, level, i, search_.b_from_a, pad_a_, *scratch_.boxes_a);
+    return placed_boxes(a_, level, i, search_.b_from_a, pad_a_, *scratch_.placed_a);
   }
   const PlacedBoxes& placed_b(int level, std::uint32_t i) {
-    return placed_boxes(b_, level, i, search_.a_from_b, pad_b_, *scratch_.boxes_b);
+    return placed_boxes(b_, level, i, search_.a_from_b, pad_b_, *scratch_.placed_b);
   }
 
   void open_both(const BoxPair& pair) {
@@ -236,7 +236,7 @@ class BlockSearch {
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;
-  PlacedPair placed_;
+  PlacedMeshes placed_;
   float pad_a_, pad_b_, room_b_, scale_, slack_, turn_[9];
   float size_a_[kMaxLevels], size_b_[kMaxLevels];  ///< of a level's nodes
   std::uint32_t waiting_ = 0;

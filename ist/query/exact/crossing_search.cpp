@@ -139,7 +139,7 @@ class TriangleSearch {
     std::uint32_t rows = meeting(a.low, a.high, all.low, all.high);
     const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
     const PlacedBoxes& box_b =
-        placed_boxes(b_, 1, number_b / kWidth, search_.a_from_b, pad_b_, *scratch_.boxes_b);
+        placed_boxes(b_, 1, number_b / kWidth, search_.a_from_b, pad_b_, *scratch_.placed_b);
     const std::uint32_t lane_a = number_a % kWidth, lane_b = number_b % kWidth;
     const float normal_a[3] = {box_a.normal[0][lane_a], box_a.normal[1][lane_a],
                                box_a.normal[2][lane_a]};
@@ -462,7 +462,7 @@ class TriangleSearch {
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;
-  PlacedPair placed_;
+  PlacedMeshes placed_;
   float pad_b_, reach_, slack_;
   KeptPairs* keep_ = nullptr;   ///< what is near is kept, and not tested yet
   std::uint32_t gathered_ = 0;  ///< for it
@@ -481,7 +481,7 @@ CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
 
 const PlacedVertices& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
                                 ExactScratch& scratch) {
-  return PlacedPair(search, scratch).vertices(of_b, number);
+  return PlacedMeshes(search, scratch).vertices(of_b, number);
 }
 
 }  // namespace ist::HWY_NAMESPACE

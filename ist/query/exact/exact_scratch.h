@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include <ist/asset_layout.h>
 
@@ -46,6 +47,24 @@ struct PlacedCache {
 
   void forget() noexcept {
     for (std::uint32_t& n : number) n = ~0u;
+  }
+
+  /// The place of a number, and whether it holds what was placed with it.
+  std::pair<T&, bool> find(std::uint32_t n) noexcept {
+    return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
+  }
+};
+
+/// What was placed of a mesh lately.
+struct PlacedMesh {
+  PlacedCache<PlacedBoxes, 256> boxes;
+  PlacedCache<PlacedVertices, 256> vertices;
+  PlacedCache<PlacedTriangles, 256> triangles;
+
+  void forget() noexcept {
+    boxes.forget();
+    vertices.forget();
+    triangles.forget();
   }
 };
 
@@ -252,12 +271,8 @@ struct ExactScratch {
       : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
         most_crossed(most_blocks / 256 + 8),
         most_crossings(most_blocks / 16 + 128),
-        boxes_a(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
-        boxes_b(hooked<PlacedCache<PlacedBoxes, 256>>(hooks)),
-        vertices_a(hooked<PlacedCache<PlacedVertices, 256>>(hooks)),
-        vertices_b(hooked<PlacedCache<PlacedVertices, 256>>(hooks)),
-        triangles_a(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
-        triangles_b(hooked<PlacedCache<PlacedTriangles, 256>>(hooks)),
+        placed_a(hooked<PlacedMesh>(hooks)),
+        placed_b(hooked<PlacedMesh>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
         gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
@@ -274,8 +289,7 @@ struct ExactScratch {
         parts(hooked_array<ExactPart>(hooks, kMostParts)),
         octants(hooked_array<ExactPart>(hooks, kMostParts)),
         octant_sums(hooked_array<OctantSums>(hooks, 8 * kMostSplit)) {
-    vertices_a->forget();
-    triangles_a->forget();
+    placed_a->forget();
     for (BlockMarks* marks : {&a, &b}) {
       for (HookedArray<std::uint64_t>* bits :
            {&marks->near, &marks->crossed, &marks->pierced, &marks->inside, &marks->shells})
@@ -296,14 +310,9 @@ struct ExactScratch {
 
   /// What is placed is of another pose: all but A's triangles in A's own frame.
   void forget(std::uint64_t mesh_a) noexcept {
-    boxes_a->forget();
-    boxes_b->forget();
-    vertices_b->forget();
-    triangles_b->forget();
-    if (mesh_a == placed_a) return;
-    vertices_a->forget();
-    triangles_a->forget();
-    placed_a = mesh_a;
+    placed_b->forget();
+    placed_a->boxes.forget();
+    if (std::exchange(hash_a, mesh_a) != mesh_a) placed_a->forget();
   }
 
   /// Pairs of blocks, or of triangles, that are kept for later.
@@ -317,10 +326,8 @@ struct ExactScratch {
   std::uint32_t most_blocks;     ///< of a mesh
   std::uint32_t most_crossed;    ///< blocks of a mesh that cross the other
   std::uint32_t most_crossings;  ///< pairs of triangles
-  Hooked<PlacedCache<PlacedBoxes, 256>> boxes_a, boxes_b;
-  Hooked<PlacedCache<PlacedVertices, 256>> vertices_a, vertices_b;
-  Hooked<PlacedCache<PlacedTriangles, 256>> triangles_a, triangles_b;
-  std::uint64_t placed_a = 0;  ///< hash of the asset that `vertices_a` and `triangles_a` are of
+  Hooked<PlacedMesh> placed_a, placed_b;
+  std::uint64_t hash_a = 0;  ///< of the asset that `placed_a` is of
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;

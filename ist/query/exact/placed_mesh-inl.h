@@ -51,14 +51,11 @@ inline float highest(const float* lanes) {
 }
 
 /// The boxes below a box block, seen from the other solid.
-template <class Cache>
-const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i,
-                                const Similarity& map, float pad, Cache& cache) {
+inline const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i,
+                                       const Similarity& map, float pad, PlacedMesh& kept) {
   const std::uint32_t number = tree.level[level].first + i;
-  PlacedBoxes& out = cache.placed[number % std::size(cache.number)];
-  std::uint32_t& held = cache.number[number % std::size(cache.number)];
-  if (held == number) return out;
-  held = number;
+  const auto [out, held] = kept.boxes.find(number);
+  if (held) return out;
   const BoxBlock& from = tree.level[level].boxes[i];
   const F d;
   float m[9], turn[9], size[9], t[3];
@@ -109,13 +106,10 @@ const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i
 }
 
 /// A block's vertices in A's unit frame; `map` is null for A's own.
-template <class Cache>
-const PlacedVertices& placed_vertices(const MeshTree& tree, std::uint32_t number,
-                                      const Similarity* map, Cache& cache) {
-  PlacedVertices& out = cache.placed[number % std::size(cache.number)];
-  std::uint32_t& held = cache.number[number % std::size(cache.number)];
-  if (held == number) return out;
-  held = number;
+inline const PlacedVertices& placed_vertices(const MeshTree& tree, std::uint32_t number,
+                                             const Similarity* map, PlacedMesh& kept) {
+  const auto [out, held] = kept.vertices.find(number);
+  if (held) return out;
   const MeshBlock& block = tree.blocks[number];
   for (std::uint32_t v = 0; v < kWidth; ++v) {
     const double* x = tree.vertices + std::size_t{3} * block.vertex[v];
@@ -136,15 +130,12 @@ const PlacedVertices& placed_vertices(const MeshTree& tree, std::uint32_t number
 }
 
 /// A block's triangles in A's unit frame.
-template <class Vertices, class Cache>
-const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32_t number,
-                                        const Similarity* map, Vertices& placed, Cache& cache) {
-  PlacedTriangles& out = cache.placed[number % std::size(cache.number)];
-  std::uint32_t& held = cache.number[number % std::size(cache.number)];
-  if (held == number) return out;
-  held = number;
+inline const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32_t number,
+                                               const Similarity* map, PlacedMesh& kept) {
+  const auto [out, held] = kept.triangles.find(number);
+  if (held) return out;
   const MeshBlock& block = tree.blocks[number];
-  const PlacedVertices& vertices = placed_vertices(tree, number, map, placed);
+  const PlacedVertices& vertices = placed_vertices(tree, number, map, kept);
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
   alignas(64) float at[3][kWidth];
@@ -231,20 +222,18 @@ HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&hi
 }
 
 /// Places what a search has come to, once.
-class PlacedPair {
+class PlacedMeshes {
  public:
-  PlacedPair(const CrossingSearch& search, ExactScratch& scratch)
+  PlacedMeshes(const CrossingSearch& search, ExactScratch& scratch)
       : search_(search), scratch_(scratch) {}
 
   const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
-    return of_b ? placed_vertices(*search_.b, number, &search_.a_from_b, *scratch_.vertices_b)
-                : placed_vertices(*search_.a, number, nullptr, *scratch_.vertices_a);
+    return of_b ? placed_vertices(*search_.b, number, &search_.a_from_b, *scratch_.placed_b)
+                : placed_vertices(*search_.a, number, nullptr, *scratch_.placed_a);
   }
   const PlacedTriangles& triangles(bool of_b, std::uint32_t number) {
-    return of_b ? placed_triangles(*search_.b, number, &search_.a_from_b, *scratch_.vertices_b,
-                                   *scratch_.triangles_b)
-                : placed_triangles(*search_.a, number, nullptr, *scratch_.vertices_a,
-                                   *scratch_.triangles_a);
+    return of_b ? placed_triangles(*search_.b, number, &search_.a_from_b, *scratch_.placed_b)
+                : placed_triangles(*search_.a, number, nullptr, *scratch_.placed_a);
   }
 
  private:
