@@ -119,40 +119,40 @@ class PairPatches {
 
 /// The patches of the part of a blend with the largest weight: a pair of levels, or the exact
 /// measure.
-struct ChosenPart {
-  const PlacedTree& a;
-  const PlacedTree& b;
-  const RelativePose& pose;
-  ContactSettings settings;
-  Workspace& workspace;
-  std::span<ContactPatch> patches;
+class ChosenPart final : public LargestPart {
+ public:
+  ChosenPart(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose, bool inner,
+             Workspace& workspace, std::span<ContactPatch> patches)
+      : a_(a), b_(b), pose_(pose), inner_(inner), workspace_(workspace), patches_(patches) {}
+
+  Penetration level(const DetailPair& pair, FieldUse use,
+                    const DescentLimits& limits) noexcept override {
+    levels.emplace(a_, tree_of(a_, pair.a), b_, tree_of(b_, pair.b), pose_,
+                   inner_ ? FieldUse::never : use, *workspace_.impl());
+    return levels->sum(limits);
+  }
+
+  Penetration exact(const PenetrationSettings& settings) noexcept override {
+    parts = exact_patches(a_, b_, settings, workspace_, patches_, {}, true).contact;
+    return parts->penetration;
+  }
+
+  // One of these at most:
   std::optional<PairPatches> levels;
-  std::optional<ContactPatches> exact;
+  std::optional<ContactPatches> parts;  ///< of the exact measure
 
-  bool inner() const noexcept { return settings.measure == Measure::inner; }
-
+ private:
   const TreeHeader& tree_of(const PlacedTree& placed, std::uint32_t detail) const noexcept {
     const AssetHeader& header = placed.tree.header();
-    return inner() ? header.inner_tree : matched_tree(header, detail);
+    return inner_ ? header.inner_tree : matched_tree(header, detail);
   }
 
-  static Penetration sum(void* context, const DetailPair& pair, FieldUse use,
-                         const DescentLimits& limits) noexcept {
-    ChosenPart& self = *static_cast<ChosenPart*>(context);
-    self.levels.emplace(self.a, self.tree_of(self.a, pair.a), self.b, self.tree_of(self.b, pair.b),
-                        self.pose, self.inner() ? FieldUse::never : use, *self.workspace.impl());
-    return self.levels->sum(limits);
-  }
-
-  static Penetration sum_exact(void* context, std::uint32_t max_visits, bool most) noexcept {
-    ChosenPart& self = *static_cast<ChosenPart*>(context);
-    ContactSettings settings = self.settings;
-    settings.max_visits = max_visits;
-    if (!most) return exact_penetration(self.a, self.b, settings, self.pose, self.workspace);
-    self.exact =
-        exact_patches(self.a, self.b, settings, self.workspace, self.patches, {}, true).contact;
-    return self.exact->penetration;
-  }
+  const PlacedTree& a_;
+  const PlacedTree& b_;
+  const RelativePose& pose_;
+  const bool inner_;
+  Workspace& workspace_;
+  const std::span<ContactPatch> patches_;
 };
 
 }  // namespace
@@ -169,20 +169,19 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
-  ChosenPart chosen{a, b, *pose, settings, workspace, patches, {}, {}};
-  const bool blends = !chosen.inner() && (settings.pair_budget > 0 || by_error(settings));
-  result.penetration =
-      blends ? blend_details(a, b, *pose, settings, workspace,
-                             {&chosen, ChosenPart::sum, ChosenPart::sum_exact})
-             : ChosenPart::sum(&chosen, DetailPair(), settings.field, limits_of(settings));
+  const bool inner = settings.measure == Measure::inner;
+  ChosenPart chosen(a, b, *pose, inner, workspace, patches);
+  const bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
+  result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &chosen)
+                              : chosen.level(DetailPair(), settings.field, limits_of(settings));
   if (std::isnan(result.penetration.volume)) return result;
-  if (!chosen.exact && !chosen.levels) return result;
-  result.count = chosen.exact ? chosen.exact->count : chosen.levels->write(patches);
-  const Penetration& part = chosen.exact ? chosen.exact->penetration : chosen.levels->whole();
+  if (!chosen.parts && !chosen.levels) return result;
+  result.count = chosen.parts ? chosen.parts->count : chosen.levels->write(patches);
+  const Penetration& part = chosen.parts ? chosen.parts->penetration : chosen.levels->whole();
   if (blends || result.count == 0)
     result.count = spread(part, result.penetration, result.count, patches);
   // A stopped exact query has the spheres' patches.
-  const bool by_parts = chosen.exact && part.status == QueryStatus::ok;
+  const bool by_parts = chosen.parts && part.status == QueryStatus::ok;
   finish_patches(patches.first(result.count), b.pose,
                  by_parts        ? exact_deepest(part.volume)
                  : chosen.levels ? chosen.levels->deepest()

@@ -9,24 +9,6 @@
 #include "query/solid_queries.h"
 
 namespace ist {
-namespace {
-
-/// The exact measure as part of a blend.
-struct ExactSum {
-  const PlacedTree& a;
-  const PlacedTree& b;
-  PenetrationSettings settings;
-  const RelativePose& pose;
-  Workspace& workspace;
-
-  static Penetration sum(void* context, std::uint32_t max_visits, bool /*most*/) noexcept {
-    ExactSum& self = *static_cast<ExactSum*>(context);
-    self.settings.max_visits = max_visits;
-    return exact_penetration(self.a, self.b, self.settings, self.pose, self.workspace);
-  }
-};
-
-}  // namespace
 
 Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
@@ -48,8 +30,7 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
   if (lacks_surface(method, use)) return not_held<Penetration>();
   if (!inner &&
       (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b))) {
-    ExactSum sum{a, b, settings, *pose, workspace};
-    return blend_details(a, b, *pose, settings, workspace, {&sum, nullptr, ExactSum::sum});
+    return blend_details(a, b, *pose, settings, workspace);
   }
   PairOverlap both(a, tree_a, b, tree_b, *pose, *workspace.impl());
   return both.by(method, limits_of(settings));
