@@ -53,8 +53,7 @@ class PairPatches {
     descent.run();
     filled_ = bins.collect(descent.precision());
     const Penetration lenses = descent.penetration();
-    const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-    const SurfaceWeight weight = surface_weight(method_, lenses, unit3);
+    const SurfaceWeight weight = surface_weight(method_, lenses, pose_.unit3());
     const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits);
     // The patches are those of the larger part.
     probed_ = left && weight.weight >= 0.5;

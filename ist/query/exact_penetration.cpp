@@ -30,24 +30,22 @@ struct ExactInWorld {
 
   ExactInWorld(const ExactSums& sums, const exact::Point& origin, const RelativePose& pose) {
     const double u = pose.unit_a, found = sums.volume();
-    volume = found * (u * u * u);
+    volume = found * pose.unit3();
     force = pose.rotation() * vector(sums.force) * (u * u);
     centroid.setZero();
     if (found != 0) centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
     // The sums' origin from B's.
-    const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
     const Eigen::Vector3d arm =
-        pose.rotation() * ((vector(origin) - shift) * u) + vector(pose.offset_b);
-    torque = pose.rotation() * vector(sums.torque) * (u * u * u) + arm.cross(force);
+        pose.rotation() * ((vector(origin) - vector(pose.a_from_b.t)) * u) + vector(pose.offset_b);
+    torque = pose.rotation() * vector(sums.torque) * pose.unit3() + arm.cross(force);
   }
 };
 
 Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
-  const double u = pose.unit_a;
   const ExactInWorld sums(found.sums, found.origin, pose);
   Penetration answer;
   answer.volume = std::max(0.0, sums.volume);
-  const double error = found.error * (u * u * u) + (answer.volume - sums.volume);
+  const double error = found.error * pose.unit3() + (answer.volume - sums.volume);
   answer.volume_min = std::max(0.0, answer.volume - error);
   answer.volume_max = answer.volume + error;
   if (answer.volume > 0) answer.centroid = sums.centroid;

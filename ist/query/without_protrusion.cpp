@@ -53,7 +53,7 @@ Left left_at(double depth, double flat) {
   const double t = std::max((depth - kTouching) / (kDeepOverlap - kTouching), 0.0);
   const double volume = smooth_step(t);
   const double force =
-      volume + kStiffening * depth * (6 * t * (1 - t) / (kDeepOverlap - kTouching));  // t < 1
+      volume + kStiffening * depth * (smooth_slope(t) / (kDeepOverlap - kTouching));  // t < 1
   return {1 - flat * (1 - volume), 1 - flat * (1 - force)};
 }
 

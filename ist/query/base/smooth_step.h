@@ -10,4 +10,7 @@ IST_HD inline double smooth_step(double t) noexcept {
   return t * t * (3 - 2 * t);
 }
 
+/// Its slope, 0 ≤ t ≤ 1.
+IST_HD inline double smooth_slope(double t) noexcept { return 6 * t * (1 - t); }
+
 }  // namespace ist

@@ -6,7 +6,7 @@ namespace ist {
 
 Penetration world_answer(const Overlap& overlap, double lowest, double highest,
                          const RelativePose& pose) noexcept {
-  const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
+  const double unit3 = pose.unit3();
   const WorldSums sums = overlap.in_world(pose);
   Penetration result;
   result.volume = unit3 * std::clamp(overlap.volume, lowest, highest);

@@ -125,7 +125,7 @@ void Descent::add_contained(bool of_a, int level, const ContainedNodes& containe
 Overlap Descent::contained_overlap(bool of_a, const SubtreeSums& contained) const {
   if (!of_a) return whole_spheres(contained, map_);
   Overlap overlap = whole_spheres(contained, Similarity::identity());
-  overlap.moment -= overlap.volume * Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  overlap.moment -= overlap.volume * vector(map_.t);
   return overlap;
 }
 
@@ -198,7 +198,7 @@ void Descent::estimate_unopened(const PairList& list, std::size_t from) {
 
 Overlap Descent::estimate_unopened_pair(std::uint32_t a, std::uint32_t b) {
   const PairEstimate pair = estimate(level_a_, a, level_b_, b);
-  const Eigen::Vector3d lever = pair.centre - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]);
+  const Eigen::Vector3d lever = pair.centre - vector(map_.t);
   stopped_ = true;
   unopened_bound_ += pair.bound;
   Overlap guess;

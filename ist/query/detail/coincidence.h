@@ -38,8 +38,7 @@ IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], doub
   const double part = (kCopyApart - distance / mean_radius) / (kCopyApart - kCopyAlone);
   result.weight = smooth_step(part);
   if (part >= 1) return result;
-  const double slope =
-      -6 * part * (1 - part) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
+  const double slope = -smooth_slope(part) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
   result.slope.by_translation = slope * way;
   result.slope.by_rotation =
       slope * (cross(lever, way) - spread * Vec3{m[5] - m[7], m[6] - m[2], m[1] - m[3]});

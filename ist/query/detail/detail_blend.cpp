@@ -221,7 +221,7 @@ BlendShares share_blend(const DetailChain& chain, const WantedError* wanted, boo
 Penetration mix_blend(DetailQueries& queries, const DetailChain& chain, const BlendShares& shares,
                       const Penetration& coarse, const RelativePose& pose,
                       const PenetrationSettings& settings) {
-  const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
+  const double unit3 = pose.unit3();
   const DetailWeight &sure = shares.sure, &rest = shares.wanted.rest;
   const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
   // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
@@ -291,9 +291,8 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
   if (coarse.status != QueryStatus::ok)
     return queries.with_counts(stopped_blend(queries, a, b, chain, coarse));
-  const double unit3 = pose.unit_a * pose.unit_a * pose.unit_a;
   const BlendShares shares = share_blend(chain, wanted ? &*wanted : nullptr, has_exact, sure,
-                                         settings.pair_budget, coarse.volume / unit3);
+                                         settings.pair_budget, coarse.volume / pose.unit3());
   return queries.with_counts(mix_blend(queries, chain, shares, coarse, pose, settings));
 }
 

@@ -84,7 +84,7 @@ IST_HD inline DetailWeight affordable(const DetailPair& pair, double estimate, d
   // (written so that a damaged asset's NaN takes the coarsest level)
   const double t = expected < none * budget ? (none - expected / budget) / (none - alone) : 0;
   if (!(t > 0 && t < 1)) return {smooth_step(t), 0};
-  return {smooth_step(t), -6 * t * (1 - t) / ((none - alone) * budget) * pair.density *
+  return {smooth_step(t), -smooth_slope(t) / ((none - alone) * budget) * pair.density *
                               (1 + pair.skin / (2 * std::sqrt(estimate)))};
 }
 

@@ -71,7 +71,7 @@ double crossings(const AssetHeader& asset, double share) {
 }  // namespace
 
 double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
-  const double left_out = 1 / std::max(asset.coverage, 0.01) - 1;
+  const double left_out = 1 / covered_part(asset) - 1;
   const double wider = 1 + left_out * tree.mean_radius / asset.matched_tree.mean_radius;
   return tree.volume_sum / tree.sphere_count * (wider * wider * wider);
 }
@@ -120,7 +120,7 @@ WantedError::Shares WantedError::shares(double coarse) const noexcept {
     const double t = coarse > kTooRough * from
                          ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0)
                          : 0;
-    const DetailWeight part{smooth_step(t), t < 1 ? 6 * t * (1 - t) / ((1 - kTooRough) * from) : 0};
+    const DetailWeight part{smooth_step(t), t < 1 ? smooth_slope(t) / ((1 - kTooRough) * from) : 0};
     shares.levels[i] = rest * part;
     rest = rest * complement(part);
   }

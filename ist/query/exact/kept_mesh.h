@@ -34,7 +34,6 @@ inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const Mes
     const double* c = placed.tree.header().centre;
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
   };
-  const Eigen::Vector3d shift(pose.a_from_b.t[0], pose.a_from_b.t[1], pose.a_from_b.t[2]);
   // The C library's hypot differs between processors.
   double between = 0;
   for (int k = 0; k < 3; ++k) between += (b.pose.t[k] - a.pose.t[k]) * (b.pose.t[k] - a.pose.t[k]);
@@ -42,7 +41,7 @@ inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const Mes
   return 1.1 * exact::kHalfUnit *
          (45 * (1.8 * pose.a_from_b.scale * mesh_b.extent() +
                 (between + offset(a) + offset(b)) / pose.unit_a) +
-          5 * shift.norm());
+          5 * vector(pose.a_from_b.t).norm());
 }
 
 }  // namespace ist

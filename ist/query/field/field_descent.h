@@ -42,8 +42,7 @@ class FieldDescent {
   }
 
   Penetration penetration() const noexcept {
-    const double reach = map_.scale * probes_.header->root[3] +
-                         Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]).norm();
+    const double reach = map_.scale * probes_.header->root[3] + vector(map_.t).norm();
     return tally_.answer(shape_.error() + 1e-15 * reach, budget_.visits());
   }
 
@@ -98,8 +97,8 @@ class FieldDescent {
         const BallPart ball = shape_.part(at, balls.r[i]);
         if (!(ball.volume > 0)) continue;
         ++pairs;
-        add_part(at - Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]), ball.volume,
-                 Eigen::Vector3d(ball.gradient), Eigen::Vector3d(ball.moment), part.overlap);
+        add_part(at - vector(map_.t), ball.volume, Eigen::Vector3d(ball.gradient),
+                 Eigen::Vector3d(ball.moment), part.overlap);
         part.area += ball.area;
         if (ball.area > 0)
           part.crossed += 4 * std::numbers::pi / 3 * (balls.r[i] * balls.r[i] * balls.r[i]);

@@ -95,7 +95,7 @@ class GapSearch {
     if (gap_ <= 0) return result;
     const double unit = pose_.unit_a;
     const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
-                         Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]).norm();
+                         vector(map_.t).norm();
     const double off =
         shape_.error() + distance_error(Precision::float64, reach) + pose_.rounding_of_world();
     result.distance_min = unit * std::max(0.0, cover_ - off);

@@ -21,7 +21,7 @@ class FieldMeetingSearch {
                      Workspace::Impl& scratch) noexcept
       : shape_(shape), tree_(tree), map_(pose.a_from_b), waiting_(scratch) {
     const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
-                         Eigen::Vector3d(map_.t[0], map_.t[1], map_.t[2]).norm();
+                         vector(map_.t).norm();
     error_ = shape_.error() + distance_error(Precision::float64, reach) + pose.rounding_of_world();
   }
 

@@ -33,7 +33,7 @@ constexpr double kHandover = 4;
 /// How coarse a tree's spheres are for their solid, its unit frame: the mean radius, and more where
 /// inner spheres cover little of it, the solid being thinner than its matched spheres.
 double grain(const TreeHeader& tree, const AssetHeader& asset) {
-  return tree.mean_radius / std::max(asset.coverage, 0.01);
+  return tree.mean_radius / covered_part(asset);
 }
 
 /// About how many triangles of a field a ball on its surface meets: those that a disc covers, and
@@ -109,7 +109,7 @@ std::pair<double, double> weight_at(const PairMethod& method, double volume) noe
   const double width = method.none - method.full;
   const double t = (volume - method.full) / width;
   if (!(t < 1)) return {0, 0};
-  return {method.share * (1 - smooth_step(t)), method.share * (-6 * t * (1 - t) / width)};
+  return {method.share * (1 - smooth_step(t)), method.share * (-smooth_slope(t) / width)};
 }
 
 }  // namespace
@@ -161,8 +161,8 @@ Penetration PairOverlap::by_surface(bool b_probes, const DescentLimits& limits,
   const SurfaceTree surface = surface_tree(owner.tree);
   const SphereTree probes(prober.tree.header(), b_probes ? tree_b_ : tree_a_);
   const double unit_b = pose_.unit_a * pose_.a_from_b.scale;
-  const double most = std::min(tree_a_.volume_sum * (pose_.unit_a * pose_.unit_a * pose_.unit_a),
-                               tree_b_.volume_sum * (unit_b * unit_b * unit_b));
+  const double most =
+      std::min(tree_a_.volume_sum * pose_.unit3(), tree_b_.volume_sum * (unit_b * unit_b * unit_b));
   if (b_probes) {
     SurfaceDescent descent(surface, probes, pose_, limits, scratch_, bins);
     descent.run();
@@ -191,7 +191,7 @@ Penetration PairOverlap::with_surface(const PairMethod& method, const Penetratio
   sum.node_visits += lenses.node_visits;
   sum.sphere_pairs += lenses.sphere_pairs;
   sum.status = std::max(sum.status, lenses.status);
-  return blended(lenses, sum, weight, pose_.unit_a * pose_.unit_a * pose_.unit_a);
+  return blended(lenses, sum, weight, pose_.unit3());
 }
 
 Penetration PairOverlap::without_surface(const PairMethod& method,
@@ -209,8 +209,7 @@ Penetration PairOverlap::by(const PairMethod& method, const DescentLimits& limit
   if (!method.surface) return by_lenses(limits);
   if (!method.lenses) return by_surface(method.b_probes, limits);
   const Penetration lenses = by_lenses(limits);
-  const double unit3 = pose_.unit_a * pose_.unit_a * pose_.unit_a;
-  const SurfaceWeight weight = surface_weight(method, lenses, unit3);
+  const SurfaceWeight weight = surface_weight(method, lenses, pose_.unit3());
   if (weight.most == 0) return lenses;
   const std::optional<DescentLimits> left = left_by(lenses, limits);
   if (!left) return without_surface(method, lenses);

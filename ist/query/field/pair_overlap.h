@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include <ist/query.h>
@@ -22,6 +23,11 @@ struct PairMethod {
   double share = 1;  ///< what "alone" is of trees that are all but alike: the rest is the lenses'
 };
 
+/// The part of a solid that inner spheres cover, or the least that counts.
+inline double covered_part(const AssetHeader& asset) noexcept {
+  return std::max(asset.coverage, 0.01);
+}
+
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
                        const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
 
@@ -30,8 +36,8 @@ inline bool lacks_surface(const PairMethod& method, FieldUse use) noexcept {
   return use == FieldUse::always && method.lenses;
 }
 
-/// The surface's weight by what lenses say, A's unit frame, and its slope by that. The finished sum's
-/// weight lies from `least` to `most`.
+/// The surface's weight by what lenses say, A's unit frame, and its slope by that. The finished
+/// sum's weight lies from `least` to `most`.
 struct SurfaceWeight {
   double weight = 1, slope = 0;
   double least = 1, most = 1;
