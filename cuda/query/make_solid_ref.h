@@ -159,7 +159,7 @@ inline std::vector<FilledBall> filled_balls(const SphereTree& tree) {
   std::vector<FilledBall> balls;
   for (std::uint32_t i = 0; i < tree.count(level); ++i) {
     const NodeBall ball = tree.ball(level, i);
-    const double sphere = 4 * kPi / 3 * ((ball.r * ball.r) * ball.r);
+    const double sphere = ball_volume(ball.r);
     balls.push_back({{ball.centre[0], ball.centre[1], ball.centre[2]},
                      ball.r,
                      tree.sums(level, i).volume / sphere});

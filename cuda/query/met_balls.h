@@ -41,7 +41,7 @@ struct MetBalls {
 /// field's frame.
 IST_HD inline void add_ball(const Similarity& a_from_b, const double (&x)[3], double r, bool inside,
                             double cones, PartSums& sums) {
-  const double whole = 4 * kPi / 3 * (r * r * r);
+  const double whole = ball_volume(r);
   const double part = (inside ? whole : 0) + cones;
   const double volume = part < 0 ? 0 : part > whole ? whole : part;
   const double none[3] = {0, 0, 0};

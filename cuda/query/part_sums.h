@@ -4,7 +4,7 @@
 
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/node_sums.h"
-#include "numerics/host_device.h"
+#include "numerics/plain.h"
 #include "query/base/pair_place.h"
 
 namespace ist::gpu {
@@ -35,7 +35,7 @@ struct PartSums {
 
   /// A node that is inside as a whole.
   IST_HD void add_whole(const NodeSum& sum, std::uint32_t count, const Similarity& a_from_b) {
-    const double factor = 4 * kPi / 3 * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
+    const double factor = kBallVolume * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
     volume += factor * sum.cubes;
     for (int k = 0; k < 3; ++k)
       moment[k] +=

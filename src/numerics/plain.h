@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "numerics/host_device.h"
 
@@ -14,6 +15,9 @@ IST_HD inline double most(double x, double y) { return x > y ? x : y; }
 IST_HD inline double clamped(double x, double low, double high) {
   return x < low ? low : high < x ? high : x;
 }
+
+inline constexpr double kBallVolume = 4 * std::numbers::pi / 3;
+IST_HD inline double ball_volume(double r) { return kBallVolume * (r * r * r); }
 
 // Sums of three products are in this order everywhere.
 IST_HD inline double dot(const double (&a)[3], const double (&b)[3]) {

@@ -24,19 +24,19 @@ using testing::box_mesh;
 using testing::calibrate_on_host;
 using testing::closed;
 
-double ball_volume(double r) { return 4 * std::numbers::pi / 3 * r * r * r; }
+double volume_of_ball(double r) { return 4 * std::numbers::pi / 3 * r * r * r; }
 
 Vector3d centre(const Sphere& s) { return {s.x, s.y, s.z}; }
 
 double volume_sum(const Calibration& calibration) {
   double sum = 0;
-  for (const Sphere& s : calibration.matched) sum += ball_volume(s.r);
+  for (const Sphere& s : calibration.matched) sum += volume_of_ball(s.r);
   return sum;
 }
 
 Vector3d centre_of_mass(const Calibration& calibration) {
   Vector3d sum = Vector3d::Zero();
-  for (const Sphere& s : calibration.matched) sum += ball_volume(s.r) * centre(s);
+  for (const Sphere& s : calibration.matched) sum += volume_of_ball(s.r) * centre(s);
   return sum / volume_sum(calibration);
 }
 
@@ -144,7 +144,7 @@ TEST(Calibration, OneSphereStandsForABall) {
   const Calibration result = calibrate_on_host(solid, {&off, 1});
   ASSERT_EQ(result.matched.size(), 1u);
   EXPECT_NEAR(centre(result.matched[0]).norm(), 0, 2e-4);
-  EXPECT_NEAR(ball_volume(result.matched[0].r) / solid.unit_volume(), 1, 1e-6);
+  EXPECT_NEAR(volume_of_ball(result.matched[0].r) / solid.unit_volume(), 1, 1e-6);
   EXPECT_GT(result.protrusion, 0);     // the ball of equal volume crosses the facets
   EXPECT_LT(result.protrusion, 3e-3);  // by less than their sagitta and the lattice's error
 }
@@ -158,7 +158,7 @@ TEST(Calibration, EightSpheresQuarterACube) {
   const Calibration result = calibrate_on_host(solid, inner);
   const double half = 0.5 / solid.frame().scale();
   for (std::size_t k = 0; k < 8; ++k) {
-    EXPECT_NEAR(ball_volume(result.matched[k].r) / solid.unit_volume(), 0.125, 2e-3);
+    EXPECT_NEAR(volume_of_ball(result.matched[k].r) / solid.unit_volume(), 0.125, 2e-3);
     const Vector3d expected(inner[k].x, inner[k].y, inner[k].z);
     EXPECT_LT((centre(result.matched[k]) - expected.cwiseSign() * half / 2).norm(), 5e-3);
   }
@@ -245,7 +245,7 @@ TEST(Calibration, MeasuresThinPlates) {
       EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
       for (std::size_t i = 0; i < inner.size(); ++i) {
         const Vector3d expected(inner[i].x, inner[i].y, inner[i].z);
-        EXPECT_NEAR(25 * ball_volume(result.matched[i].r) / solid.unit_volume(), 1, 0.05)
+        EXPECT_NEAR(25 * volume_of_ball(result.matched[i].r) / solid.unit_volume(), 1, 0.05)
             << "thickness " << thickness << ", turn " << k;
         EXPECT_LT((centre(result.matched[i]) - expected).norm(), 0.01)
             << "thickness " << thickness << ", turn " << k;
@@ -266,7 +266,7 @@ TEST(Calibration, MeasuresNeedles) {
     const Calibration result = calibrate_on_host(solid, inner);
     EXPECT_NEAR(volume_sum(result) / solid.unit_volume(), 1, 1e-6);
     for (std::size_t i = 0; i < inner.size(); ++i) {
-      EXPECT_NEAR(10 * ball_volume(result.matched[i].r) / solid.unit_volume(), 1, 0.05) << k;
+      EXPECT_NEAR(10 * volume_of_ball(result.matched[i].r) / solid.unit_volume(), 1, 0.05) << k;
       EXPECT_LT((centre(result.matched[i]) - Vector3d(inner[i].x, inner[i].y, inner[i].z)).norm(),
                 0.01)
           << k;

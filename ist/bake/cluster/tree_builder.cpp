@@ -11,13 +11,12 @@
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/overlap_bound.h"
 #include "bake/cluster/tree_order.h"
+#include "numerics/plain.h"
 #include "numerics/roots.h"
 #include "numerics/rounding.h"
 
 namespace ist {
 namespace {
-
-constexpr double kBallVolume = 4 * std::numbers::pi / 3;
 
 Ball to_ball(const Sphere& s) { return {s.x, s.y, s.z, s.r}; }
 
@@ -39,7 +38,7 @@ float cover_about(const Sphere& centre, std::span<const Ball> spheres,
 
 double volume_of(std::span<const Ball> spheres) {
   double sum = 0;
-  for (const Ball& s : spheres) sum += kBallVolume * (s.r * s.r * s.r);
+  for (const Ball& s : spheres) sum += ball_volume(s.r);
   return sum;
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <numbers>
 
 #include <ist/query.h>
 
 #include <ist/asset_layout.h>
 
+#include "numerics/plain.h"
 #include "query/asset/node_ball.h"
 
 namespace ist {
@@ -57,10 +57,7 @@ struct SphereTree {
   }
 
   NodeSums sums(int at_level, std::uint32_t block) const noexcept {
-    if (at_level == kSphereLevel) {
-      const double r = ball(at_level, block).r;
-      return {4 * std::numbers::pi / 3 * (r * r * r), 1};
-    }
+    if (at_level == kSphereLevel) return {ball_volume(ball(at_level, block).r), 1};
     if (at_level == top) return {header->volume_sum, static_cast<double>(header->overlap)};
     const NodeBlock& n = level[at_level + 1].nodes[block / kWidth];
     const std::uint32_t lane = block % kWidth;

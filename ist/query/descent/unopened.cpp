@@ -1,7 +1,6 @@
 #include "query/descent/unopened.h"
 
 #include <algorithm>
-#include <numbers>
 
 #include "query/kernel/lens.h"
 
@@ -58,9 +57,8 @@ PairEstimate estimate_pair(const SphereTree& a, int level_a, std::uint32_t block
   const Lens<double> inner = lens(radius_a, radius_b, d);
   const double overlap = inner.volume();
   if (!(overlap > 0)) return result;
-  const double ball_volume = 4 * std::numbers::pi / 3;
-  const double density_a = nodes.sums_a.volume / (ball_volume * radius_a * radius_a * radius_a);
-  const double density_b = nodes.volume_b / (ball_volume * radius_b * radius_b * radius_b);
+  const double density_a = nodes.sums_a.volume / (kBallVolume * radius_a * radius_a * radius_a);
+  const double density_b = nodes.volume_b / (kBallVolume * radius_b * radius_b * radius_b);
   const double guess = density_a * density_b * overlap;
   result.volume = std::min(guess, result.bound);
   const double share = result.volume / overlap;

@@ -2,10 +2,10 @@
 
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
 #include <ist/asset_layout.h>
 
+#include "numerics/plain.h"
 #include "query/asset/shared_constants.h"
 #include "query/base/smooth_step.h"
 
@@ -57,7 +57,7 @@ IST_HD inline DetailPair detail_pair(std::uint32_t a, const LevelCost& of_a, std
   const double size = of_b.reach * scale < of_a.reach ? of_b.reach * scale : of_a.reach;
   return {a, b,
           kPairShare * (of_a.sphere_count / of_a.volume_sum) * (of_b.sphere_count / volume_b) *
-              (4 * std::numbers::pi / 3 * (reach * reach * reach)),
+              ball_volume(reach),
           kPairRim * reach * std::sqrt(size)};
 }
 

@@ -100,8 +100,7 @@ class FieldDescent {
         add_part(at - vector(map_.t), ball.volume, Eigen::Vector3d(ball.gradient),
                  Eigen::Vector3d(ball.moment), part.overlap);
         part.area += ball.area;
-        if (ball.area > 0)
-          part.crossed += 4 * std::numbers::pi / 3 * (balls.r[i] * balls.r[i] * balls.r[i]);
+        if (ball.area > 0) part.crossed += ball_volume(balls.r[i]);
       }
     }
     tally_.add(block, part);

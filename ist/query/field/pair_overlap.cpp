@@ -77,8 +77,7 @@ PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const Plac
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
   method.surface = worth > 0;
   method.share = smooth_step((ratio - kAlike) / (kOther - kAlike));
-  method.full =
-      worth * kFewSpheres * (4 * std::numbers::pi / 3) * (coarse * coarse * coarse) / (1 - unlike);
+  method.full = worth * kFewSpheres * kBallVolume * (coarse * coarse * coarse) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }

@@ -68,7 +68,7 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
       ++pairs;
       add_part(x, part.volume, part.derivative * inward, part.moment * inward, total.overlap);
       total.area += part.derivative;
-      total.crossed += part.derivative > 0 ? 4 * std::numbers::pi / 3 * (r * r * r) : 0;
+      total.crossed += part.derivative > 0 ? ball_volume(r) : 0;
     }
     return total;
   }

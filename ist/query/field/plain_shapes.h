@@ -109,7 +109,7 @@ struct PlainCylinder {
   }
   /// The share of the mantle times that of the slab between the ends.
   IST_HD BallPart part(const double (&x)[3], double r) const {
-    const double whole = 4 * std::numbers::pi / 3 * (r * r * r);
+    const double whole = ball_volume(r);
     const double d = from_axis(x);
     const Cap mantle = cap(r, radius - d), top = cap(r, half - x[2]), bottom = cap(r, half + x[2]);
     const double slab = most(top.volume + bottom.volume - whole, 0);

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
 #include "query/asset/shared_constants.h"
 #include "query/kernel/overlap.h"
@@ -66,7 +65,7 @@ inline ProbeTotal total_of(const ProbeBalls& balls, const ProbeSums& sums, std::
   for (std::uint32_t bits = inside | sums.met; bits != 0; bits &= bits - 1) {
     const auto i = static_cast<std::size_t>(std::countr_zero(bits));
     const double r = balls.r[i];
-    const double whole = 4 * std::numbers::pi / 3 * (r * r * r);
+    const double whole = ball_volume(r);
     const double held = (inside >> i & 1) != 0 ? whole : 0;
     const Eigen::Vector3d x(balls.origin[0] + balls.x[i] - origin[0],
                             balls.origin[1] + balls.y[i] - origin[1],

@@ -13,7 +13,6 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMostBalls = 4 * kWidth;
-inline constexpr double kSphere = 4 * std::numbers::pi / 3;
 
 /// Evenly filled balls, in A's axes about the middle of B's root: so floats tell B's balls apart.
 struct alignas(64) FilledBalls {
@@ -50,11 +49,10 @@ HWY_INLINE void place(const SphereTree& tree, const Similarity& map, const doubl
     }
     out.count = kWidth;
     out.reach = out.r[0] = static_cast<float>(root.r * map.scale);
-    out.fill[0] =
-        static_cast<float>(tree.header->volume_sum / (kSphere * (root.r * root.r * root.r)));
+    out.fill[0] = static_cast<float>(tree.header->volume_sum / ball_volume(root.r));
     return;
   }
-  const V scale = hn::Set(d, map.scale), zero = hn::Zero(d), sphere = hn::Set(d, kSphere);
+  const V scale = hn::Set(d, map.scale), zero = hn::Zero(d), sphere = hn::Set(d, kBallVolume);
   V reach = zero;
   const SphereTree::Level& level = tree.level[at + 1];
   for (std::uint32_t i = 0; i < level.count; ++i) {

@@ -37,9 +37,9 @@ Overlap whole_spheres(const SubtreeSums& spheres, const Similarity& a_from_b) no
     for (int k = 0; k < 3; ++k) moment[k] += spheres.moment[k][lane];
   }
   const double cube = a_from_b.scale * a_from_b.scale * a_from_b.scale;
-  overlap.volume *= 4 * std::numbers::pi / 3;
+  overlap.volume *= kBallVolume;
   overlap.volume *= cube;
-  moment *= 4 * std::numbers::pi / 3;
+  moment *= kBallVolume;
   const double* const m = a_from_b.m;
   for (int k = 0; k < 3; ++k)
     overlap.moment[k] =

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "numerics/host_device.h"
+#include "numerics/plain.h"
 
 namespace ist {
 
@@ -18,12 +18,11 @@ struct Cap {
 IST_HD inline Cap cap(double r, double d) {
   const double pi = std::numbers::pi;
   if (!(d > -r)) return {};
-  if (d >= r) return {4 * pi / 3 * (r * r * r), 0, 0};
+  if (d >= r) return {ball_volume(r), 0, 0};
   const double circle = (r - d) * (r + d);
   const double h = d < 0 ? r + d : r - d;  // of the smaller side
   const double small = pi / 3 * (h * h) * (3 * r - h);
-  return {d < 0 ? small : 4 * pi / 3 * (r * r * r) - small, pi * circle,
-          pi / 4 * (circle * circle)};
+  return {d < 0 ? small : ball_volume(r) - small, pi * circle, pi / 4 * (circle * circle)};
 }
 
 }  // namespace ist
