@@ -6,6 +6,7 @@
 #include "numerics/angle.h"
 #include "numerics/host_device.h"
 #include "numerics/plain.h"
+#include "numerics/vec3.h"
 #include "query/asset/shared_constants.h"
 
 // What a triangle does to a ball that meets it: add_patch() (query/probe/patch_sums.h) for one of

@@ -5,6 +5,7 @@
 
 #include "numerics/host_device.h"
 #include "numerics/plain.h"
+#include "numerics/vec3.h"
 
 namespace ist::gpu {
 

@@ -33,4 +33,14 @@ IST_HD inline Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+// The same of arrays.
+IST_HD inline double dot(const double (&a)[3], const double (&b)[3]) {
+  return dot(vec3(a), vec3(b));
+}
+IST_HD inline double norm(const double (&a)[3]) { return norm(vec3(a)); }
+IST_HD inline void cross(const double (&a)[3], const double (&b)[3], double (&out)[3]) {
+  const Vec3 c = cross(vec3(a), vec3(b));
+  out[0] = c.x, out[1] = c.y, out[2] = c.z;
+}
+
 }  // namespace ist

@@ -6,6 +6,7 @@
 
 #include "numerics/host_device.h"
 #include "numerics/plain.h"
+#include "numerics/vec3.h"
 #include "query/asset/shared_constants.h"
 #include "query/kernel/lens.h"
 #include "query/probe/cap.h"

@@ -6,7 +6,7 @@
 
 #include "numerics/bits.h"
 #include "numerics/host_device.h"
-#include "numerics/plain.h"
+#include "numerics/vec3.h"
 
 // On which side of an edge a way passes, and on which side of a surface a point lies: the same on
 // CPU and GPU.
