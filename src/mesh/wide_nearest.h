@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cmath>
-#include <cstring>
 
 #include "mesh/closest_point.h"
 #include "mesh/exact_triangle.h"
 #include "mesh/wide_traversal.h"
+#include "numerics/bits.h"
 
 // Distance queries of a WideTree, by a team: one thread or a warp (numerics/team.h). The answers
 // are those of closest_point.h and exact_closest_point.h, bit for bit. All lanes ask the same and
@@ -90,13 +90,6 @@ struct WideBall {
       sum += gap * gap;
     }
     return sum;
-  }
-
-  /// Of a number ≥ 0: they order as the numbers do.
-  IST_HD static std::uint32_t bits_of(float x) {
-    std::uint32_t bits;
-    std::memcpy(&bits, &x, sizeof bits);
-    return bits;
   }
 };
 

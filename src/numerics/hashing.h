@@ -1,25 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
+#include "numerics/bits.h"
 #include "numerics/float3.h"
 
 // Names for things that no order of work can change: hashes of their coordinates' bits.
 
 namespace ist {
-
-IST_HD inline std::uint32_t bits_of(float x) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits;
-}
-
-IST_HD inline float float_of(std::uint32_t bits) {
-  float x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
 
 IST_HD inline std::uint64_t mixed(std::uint64_t x) {  // the finaliser of SplitMix64
   x ^= x >> 30;

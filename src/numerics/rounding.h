@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/team.h"
+#include "numerics/bits.h"
 
 // From double to float on a chosen side, the same bits on host and device.
 

@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
-#include "numerics/host_device.h"
+#include "numerics/bits.h"
 
 // A team is the threads that work on one item together: one on the CPU, a warp on the GPU
 // (cuda/warp_team.h). Shared numerics are templates over it and loop
@@ -15,35 +14,6 @@
 // may enter. All lanes must make the same calls.
 
 namespace ist {
-
-/// The bits of a float as an integer of the same order.
-IST_HD inline std::uint32_t ordered_bits(float x) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits ^ ((bits >> 31) != 0 ? 0xFFFFFFFFu : 0x80000000u);
-}
-
-IST_HD inline float from_ordered_bits(std::uint32_t ordered) {
-  const std::uint32_t bits = ordered ^ ((ordered >> 31) != 0 ? 0x80000000u : 0xFFFFFFFFu);
-  float x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
-
-/// The bits of a double as an integer of the same order.
-IST_HD inline std::uint64_t ordered_bits(double x) {
-  std::uint64_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits ^ ((bits >> 63) != 0 ? 0xFFFFFFFFFFFFFFFFull : 0x8000000000000000ull);
-}
-
-IST_HD inline double from_ordered_bits(std::uint64_t ordered) {
-  const std::uint64_t bits =
-      ordered ^ ((ordered >> 63) != 0 ? 0x8000000000000000ull : 0xFFFFFFFFFFFFFFFFull);
-  double x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
 
 /// A team of one thread, for the host (and for a single thread of the device).
 struct SerialTeam {
