@@ -74,6 +74,23 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
   }
 }
 
+/// Which children [lane, …) of a block come within reach of standing ball i; `d2`: squares of their
+/// distances, `r`: of their radii or more.
+template <class T, class V = hn::Vec<LaneTag<T>>>
+HWY_INLINE hn::Mask<LaneTag<T>> near_of(const BallBlock& block, std::size_t lane,
+                                        const StandingBalls<T>& standing, std::size_t i, V& d2,
+                                        V& r) {
+  const LaneTag<T> d;
+  const V dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
+  const V dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
+  const V dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
+  d2 = (dx * dx + dy * dy) + dz * dz;
+  r = load_as<T>(d, block.r + lane) * hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
+  // Negative for an unused lane, whose square must not count.
+  const V sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
+  return d2 < sum * sum;
+}
+
 /// With kContained, children inside of y[i] go to `contained`.
 template <class T, bool kContained>
 HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
@@ -81,7 +98,6 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
                                std::uint32_t* out_y, ContainedNodes* contained) {
   const LaneTag<T> d;
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
-  const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
   StandingBalls<T> standing;
   stand(stage, x, y, n, standing);
   std::size_t found = 0;
@@ -90,14 +106,8 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
     const BallBlock& block = opened.blocks[x[i]];
     const std::uint32_t first_child = kWidth * x[i];
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      const auto dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
-      const auto dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
-      const auto dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
-      const auto d2 = (dx * dx + dy * dy) + dz * dz;
-      // Negative for an unused lane, whose square must not count.
-      const auto r = load_as<T>(d, block.r + lane) * grow;
-      const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
-      auto near = d2 < sum * sum;
+      hn::Vec<LaneTag<T>> d2, r;
+      auto near = near_of(block, lane, standing, i, d2, r);
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
       if constexpr (kContained) {
         // Zero but near: an unused lane's square is no float.
@@ -123,22 +133,15 @@ HWY_INLINE void masks_as(const NodeStage& stage, const std::uint32_t* x, const s
                          std::size_t n, std::uint16_t* masks) {
   const LaneTag<T> d;
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
-  const auto grow = hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
   StandingBalls<T> standing;
   stand(stage, x, y, n, standing);
   const std::uint32_t below = stage.x->count(stage.level_x - 1);
   for (std::size_t i = 0; i < n; ++i) {
     const BallBlock& block = opened.blocks[x[i]];
     std::uint32_t near = 0;
-    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      const auto dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
-      const auto dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
-      const auto dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
-      const auto d2 = (dx * dx + dy * dy) + dz * dz;
-      const auto r = load_as<T>(d, block.r + lane) * grow;
-      const auto sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
-      near |= mask_bits(d, d2 < sum * sum) << lane;
-    }
+    hn::Vec<LaneTag<T>> d2, r;
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
+      near |= mask_bits(d, near_of(block, lane, standing, i, d2, r)) << lane;
     const std::uint32_t used = std::min(kWidth, below - kWidth * x[i]);
     masks[i] = static_cast<std::uint16_t>(near & ((1u << used) - 1));
   }
