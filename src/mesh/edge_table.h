@@ -5,13 +5,12 @@
 #include <span>
 #include <vector>
 
+#include "numerics/bits.h"
 #include "stage/raw_array.h"
 
 namespace ist {
 
 using Triangle = std::array<std::uint32_t, 3>;
-
-constexpr std::uint32_t kNoIndex = UINT32_MAX;
 
 /// The sides of all triangles, grouped by the edge they lie on. Side 3t + k runs from corner k of
 /// triangle t to the next. Triangles with repeated corners have no edges here: their sides cancel.

@@ -8,6 +8,8 @@
 
 namespace ist {
 
+inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;  ///< the number of nothing
+
 IST_HD inline std::uint32_t bits_of(float x) {
   std::uint32_t bits;
   std::memcpy(&bits, &x, sizeof bits);

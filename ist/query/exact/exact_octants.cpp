@@ -123,7 +123,7 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
 OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
   const ExactPart& part = scratch_.parts[part_of(element)];
   const std::uint32_t slot = scratch_.parts[part.kept].slot;
-  return slot == kNoPart ? nullptr : &scratch_.octant_sums[8 * slot];
+  return slot == kNoIndex ? nullptr : &scratch_.octant_sums[8 * slot];
 }
 
 /// The pieces that parts are summed of: see ExactTerms.
@@ -156,8 +156,8 @@ void ExactOctants::sum_octants() noexcept {
       std::int8_t whole[kWidth];
       count_triangles(own.mesh.blocks[b], crossed, whole);
       for (std::uint32_t t = 0; t < kWidth; ++t) {
-        const std::uint32_t element = whole[t] == 0 ? kNoPart : triangle_element(own, crossed, t);
-        if (element == kNoPart) continue;
+        const std::uint32_t element = whole[t] == 0 ? kNoIndex : triangle_element(own, crossed, t);
+        if (element == kNoIndex) continue;
         OctantSums* const octants = octants_of(element);
         if (octants == nullptr) continue;
         const auto at = [&](int k) { return corner(octants, crossed.at(crossed.fan[k][t])); };
@@ -207,7 +207,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     ExactPart& part = scratch_.parts[p];
-    part.slot = kNoPart;
+    part.slot = kNoIndex;
     if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
         slots == ExactScratch::kMostSplit)
       continue;
@@ -220,7 +220,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
     const std::uint32_t first = count;
-    if (parts[p].slot != kNoPart)
+    if (parts[p].slot != kNoIndex)
       count = write_octants(parts[p], falls(parts[p].sums.volume(), least), near, count);
     if (count > first) continue;
     ExactPart& whole = scratch_.octants[count] = parts[p];

@@ -66,7 +66,7 @@ void ExactParts::begin() noexcept {
   blocks_of_b_ = blocks_of_a_ + sides_[0].mesh.level[0].count;
   const auto alone = [&](std::uint32_t element) {
     scratch_.parent[element] = element;
-    scratch_.part[element] = kNoPart;
+    scratch_.part[element] = kNoIndex;
   };
   for (std::uint32_t i = 0; i < blocks_of_a_; ++i) alone(i);
   for (const Side& own : sides_)
@@ -116,7 +116,7 @@ void ExactParts::join_holes(Side& own) noexcept {
     Point from, to;
     segment(i, from, to);
     if (root(i) == i) curve = {triangle_of(i), from, from, {}};
-    if (curve.triangle != triangle_of(i)) curve.triangle = ~0u;
+    if (curve.triangle != triangle_of(i)) curve.triangle = kNoIndex;
     curve.low = {std::min(curve.low.x, from.x), std::min(curve.low.y, from.y),
                  std::min(curve.low.z, from.z)};
     curve.high = {std::max(curve.high.x, from.x), std::max(curve.high.y, from.y),
@@ -125,7 +125,7 @@ void ExactParts::join_holes(Side& own) noexcept {
   }
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     const CurveExtent& hole = curves[i];
-    if (root(i) != i || hole.triangle == ~0u) continue;
+    if (root(i) != i || hole.triangle == kNoIndex) continue;
     const MeshBlock& mesh = own.mesh.blocks[hole.triangle / kWidth];
     const std::uint32_t lane = hole.triangle % kWidth;
     const CrossedBlock& block = crossed_block(own, hole.triangle);
@@ -133,7 +133,7 @@ void ExactParts::join_holes(Side& own) noexcept {
     const Point normal =
         cross(block.at(mesh.corner[1][lane]) - corner, block.at(mesh.corner[2][lane]) - corner);
     if (dot(hole.area, normal) >= 0) continue;
-    std::uint32_t around = ~0u;
+    std::uint32_t around = kNoIndex;
     double narrowest = HUGE_VAL;
     for (std::uint32_t j = 0; j < out_.crossings; ++j) {
       const CurveExtent& curve = curves[root(j)];
@@ -146,7 +146,7 @@ void ExactParts::join_holes(Side& own) noexcept {
       narrowest = dot(wide, wide);
       around = j;
     }
-    if (around != ~0u)
+    if (around != kNoIndex)
       unite(i, around);
     else if (has(own.marks.inside, hole.triangle / kWidth))
       unite(i, block_element(own, hole.triangle / kWidth));
@@ -163,7 +163,7 @@ void ExactParts::join_edges() noexcept {
     for (std::uint32_t c = 0; c < own.marks.count; ++c) {
       const CrossedBlock& crossed = own.marks.blocks[c];
       for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
-        scratch_.middles[first_middle(own, crossed) + edge] = kNoPart;
+        scratch_.middles[first_middle(own, crossed) + edge] = kNoIndex;
       });
     }
   for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
@@ -189,7 +189,7 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
                                     std::uint32_t edge, std::uint32_t first) noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
-  for (std::uint32_t i = first; i != kNoPart;
+  for (std::uint32_t i = first; i != kNoIndex;
        i = static_cast<std::uint32_t>(scratch_.other_keys[i])) {
     const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
     ends[count++] = {0, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
@@ -202,18 +202,18 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
   const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                       q = mesh.corner[(edge + 1) % 3][edge / 3];
-  std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoPart;
+  std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoIndex;
   std::uint32_t middle = inside;
   for (std::uint32_t i = 0; i < count; ++i) {
     if ((ends[i].other & 1) != 0) {
       inside = ends[i].crossing;
     } else {
-      if (inside != kNoPart) unite(inside, ends[i].crossing);
-      inside = kNoPart;
+      if (inside != kNoIndex) unite(inside, ends[i].crossing);
+      inside = kNoIndex;
     }
     if ((ends[i].other & 2) != 0) middle = inside;
   }
-  if (inside != kNoPart && (crossed.inside >> q & 1) != 0)
+  if (inside != kNoIndex && (crossed.inside >> q & 1) != 0)
     unite(inside, vertex_element(own, crossed, q));
   return middle;
 }
@@ -265,7 +265,7 @@ void ExactParts::join_blocks(Side& own) noexcept {
 
 std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
   std::uint32_t& part = scratch_.part[root(element)];
-  if (part == kNoPart) {
+  if (part == kNoIndex) {
     part = std::min(parts_, ExactScratch::kMostParts - 1);
     if (part == parts_) {
       scratch_.parts[part] = {};
@@ -297,7 +297,7 @@ void ExactParts::sum_parts() noexcept {
         if (t % 8 == 0) triangle_terms(crossed, whole, static_cast<int>(t / 8), terms);
         if (whole[t] == 0) continue;
         const std::uint32_t element = triangle_element(own, crossed, t);
-        if (element != kNoPart)
+        if (element != kNoIndex)
           add_triangle_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
       }
     });

@@ -24,7 +24,6 @@ class ExactParts : public ExactQuery {
  protected:
   std::uint32_t part_of(std::uint32_t element) noexcept;
 
-  static constexpr std::uint32_t kNoPart = ~0u;
   std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
   /// What a triangle of a crossed block hangs together with, where it counts as a whole.
   std::uint32_t triangle_element(const Side& side, const CrossedBlock& crossed,

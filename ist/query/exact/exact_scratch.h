@@ -8,6 +8,7 @@
 #include <ist/asset_layout.h>
 
 #include "query/base/hooked_memory.h"
+#include "query/base/placed_cache.h"
 #include "query/exact/crossing.h"
 #include "query/exact/kept_pairs.h"
 
@@ -37,22 +38,6 @@ struct alignas(64) PlacedTriangles {
   float all_low[3], all_high[3];
   float size;   ///< no two points are further apart
   float reach;  ///< no coordinate is larger
-};
-
-/// Places that hold what was placed last with a number of the same remainder.
-template <class T, std::uint32_t kPlaces>
-struct PlacedCache {
-  std::uint32_t number[kPlaces];
-  T placed[kPlaces];
-
-  void forget() noexcept {
-    for (std::uint32_t& n : number) n = ~0u;
-  }
-
-  /// The place of a number, and whether it holds what was placed with it.
-  std::pair<T&, bool> find(std::uint32_t n) noexcept {
-    return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
-  }
 };
 
 /// What was placed of a mesh lately.
@@ -260,7 +245,7 @@ struct PiercedEnd {
 
 /// A curve where surfaces cross, if it lies in one triangle of a solid.
 struct CurveExtent {
-  std::uint32_t triangle;  ///< ~0: of several
+  std::uint32_t triangle;  ///< kNoIndex: of several
   exact::Point low, high;  ///< its box
   exact::Point area;       ///< twice the vector of what it goes around
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include <ist/asset_layout.h>
+#include "query/base/placed_cache.h"
 #include "query/base/precision.h"
 
 namespace ist {
@@ -30,31 +31,23 @@ struct alignas(64) PlacedBlock {
 
 /// The leaf blocks of one tree that a query met lately: each meets several of the other tree.
 template <class T>
-class BlockCache {
- public:
-  void forget() noexcept { std::fill_n(block_, kSlots, kNone); }
-
+struct BlockCache : PlacedCache<PlacedBlock<T>, 256> {
   /// The block, which `place(block, placed)` makes if it is not there; null if its room is that of
   /// one of the `held` blocks.
   template <class Place>
   const PlacedBlock<T>* find(std::uint32_t block, const PlacedBlock<T>* const* held,
                              std::size_t count, const Place& place) {
-    const std::uint32_t slot = block % kSlots;
-    PlacedBlock<T>& placed = placed_[slot];
-    if (block_[slot] != block) {
-      if (block_[slot] != kNone && std::find(held, held + count, &placed) != held + count)
+    const std::uint32_t slot = block % 256;
+    std::uint32_t& number = this->number[slot];
+    PlacedBlock<T>& placed = this->placed[slot];
+    if (number != block) {
+      if (number != kNoIndex && std::find(held, held + count, &placed) != held + count)
         return nullptr;
-      block_[slot] = block;
+      number = block;
       place(block, placed);
     }
     return &placed;
   }
-
- private:
-  static constexpr std::uint32_t kSlots = 256;
-  static constexpr std::uint32_t kNone = ~0u;
-  std::uint32_t block_[kSlots];
-  PlacedBlock<T> placed_[kSlots];
 };
 
 /// The leaf blocks of both trees.
