@@ -38,8 +38,8 @@ struct BatchCounters {
   std::uint32_t detailed, details_taken;  ///< pairs that are asked at several levels of detail
 };
 
-/// A batch of penetrations as it was asked, in the memory of who works on it: kernels, or a test on
-/// the host.
+/// A batch as it was asked, in the memory of who works on it: kernels, or a test on the host. Of
+/// penetrations and patches; of separations all but `answers`.
 struct SolidPairs {
   const SolidRef* solids;
   std::uint32_t solid_count;

@@ -8,7 +8,7 @@
 namespace ist {
 
 /// How nearly two copies of one asset coincide. Sphere upon equal sphere, the sum of lenses counts
-/// ∫ρ² where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 5 to 10 %
+/// ∫ρ² where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 6 to 9 %
 /// too much (docs/design.md 5). A level of detail against the next coarser one has nothing of the
 /// kind: its spheres are others. So as copies come to coincide, such unlike levels take over: the
 /// mean of both ways round, which has no force where the copies coincide.
