@@ -62,9 +62,9 @@ class GapSearch {
       double at[3];
       map_.apply(ball.centre, at);
       const Eigen::Vector3d x(at[0], at[1], at[2]);
-      const FieldSample sample = shape_.nearest(x);
-      const double gap = -sample.distance - ball.r * map_.scale;
-      const double cover = -sample.distance - cover_radius * map_.scale;
+      const double distance = -shape_.nearest(x).distance;
+      const double gap = distance - ball.r * map_.scale;
+      const double cover = distance - cover_radius * map_.scale;
       if (!wanted(gap, cover)) continue;
       if (level == 0) {
         ++pairs_;
@@ -73,7 +73,6 @@ class GapSearch {
         gap_ = gap;
         centre_ = x;
         radius_ = ball.r * map_.scale;
-        inward_ = sample.gradient;
         continue;
       }
       std::size_t place = size_++;
@@ -105,9 +104,10 @@ class GapSearch {
     }
     result.distance = unit * gap_;
     result.distance_max = unit * (gap_ + off);
-    const double length = inward_.norm();
+    const Eigen::Vector3d inward = shape_.nearest(centre_).gradient;
+    const double length = inward.norm();
     const Eigen::Vector3d out =
-        length > 0 ? Eigen::Vector3d(-inward_ / length) : Eigen::Vector3d::Zero().eval();
+        length > 0 ? Eigen::Vector3d(-inward / length) : Eigen::Vector3d::Zero().eval();
     result.point_b = pose_.to_world(centre_ - radius_ * out);
     result.point_a = pose_.to_world(centre_ - (radius_ + gap_) * out);
     result.normal = pose_.rotation() * out;
@@ -124,7 +124,6 @@ class GapSearch {
   double gap_ = std::numeric_limits<double>::infinity();
   double cover_ = std::numeric_limits<double>::infinity();
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d inward_ = Eigen::Vector3d::Zero();
   double radius_ = 0;
   std::uint32_t pairs_ = 0;
 };

@@ -39,7 +39,7 @@ struct ShapeOf : Plain {
   explicit ShapeOf(const auto& field) noexcept : Plain(plain(field)), sound(is_sound(field)) {}
 
   FieldSample sample(const Eigen::Vector3d& x) noexcept { return eigen(seen({x[0], x[1], x[2]})); }
-  FieldSample nearest(const Eigen::Vector3d& x) noexcept {
+  [[gnu::always_inline]] FieldSample nearest(const Eigen::Vector3d& x) noexcept {
     const double at[3] = {x[0], x[1], x[2]};
     if constexpr (requires { Plain::nearest(at); })
       return eigen(Plain::nearest(at));
