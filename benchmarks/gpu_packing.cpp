@@ -24,11 +24,10 @@ using ist::benchmark::Report;
 struct Run {
   double mesh = 0, all = 0;  ///< [s] until the mesh is on the device; until the spheres are here
   double peak = 0;           ///< [MiB] of device memory
-  ist::gpu::BandedCost cost;
   ist::SpherePacking packing;
 };
 
-/// `split`: waits for the mesh, to see how long it takes alone, and times the steps.
+/// `split`: waits for the mesh, to see how long it takes alone.
 Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
   const ist::MeshView& view = solid.view();
   const ist::gpu::HostMesh mesh{
@@ -46,7 +45,7 @@ Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
       run.mesh = ist::benchmark::wall_seconds() - start;
     }
     ist::Stage stage("pack", {});
-    run.packing = pack_banded(queue, on_device.tree(), limits, stage, split ? &run.cost : nullptr);
+    run.packing = pack_banded(queue, on_device.tree(), limits, stage);
   }
   run.all = ist::benchmark::wall_seconds() - start;
   run.peak = static_cast<double>(queue.peak_bytes()) / (1 << 20);
@@ -81,16 +80,13 @@ void measure(const std::string& name, const ist::MeshSolid& solid,
              const std::vector<std::size_t>& counts, int repeats, Report& report) {
   for (const std::size_t count : counts) {
     std::vector<double> ms, mesh_ms;
-    Run last, parts;
+    Run last;
     run_once(solid, count, false);
     for (int i = 0; i < repeats; ++i) {
       last = run_once(solid, count, false);
       ms.push_back(last.all * 1e3);
     }
-    for (int i = 0; i < 3; ++i) {
-      parts = run_once(solid, count, true);
-      mesh_ms.push_back(parts.mesh * 1e3);
-    }
+    for (int i = 0; i < 3; ++i) mesh_ms.push_back(run_once(solid, count, true).mesh * 1e3);
     report.row("Packing on the GPU", {{"mesh", name},
                                       {"triangles", solid.view().triangle_count},
                                       {"spheres", last.packing.spheres.size()},
@@ -99,16 +95,7 @@ void measure(const std::string& name, const ist::MeshSolid& solid,
                                       {"least", ist::benchmark::quantile(ms, 0)},
                                       {"most", ist::benchmark::quantile(ms, 1)},
                                       {"mesh alone, ms", ist::benchmark::quantile(mesh_ms, 0.5)},
-                                      {"work, ms", parts.cost.work * 1e3},
-                                      {"split, ms", parts.cost.split * 1e3},
-                                      {"select, ms", parts.cost.select * 1e3},
-                                      {"grid, ms", parts.cost.grid * 1e3},
-                                      {"rest, ms", parts.cost.rest * 1e3},
                                       {"rounds", last.packing.rounds},
-                                      {"levels", parts.cost.levels},
-                                      {"steps", parts.cost.steps},
-                                      {"cells worked on", parts.cost.cells_worked},
-                                      {"launches", parts.cost.launches},
                                       {"peak MiB", last.peak},
                                       {"hash", fingerprint(last.packing)}});
     compare(name, last, ist::benchmark::quantile(ms, 0.5), report);

@@ -137,10 +137,6 @@ IST_HD inline void to_selection(const BandedArrays& a) {
 
 IST_HD inline void after_work(const BandedArrays& a) {
   BandedState& s = *a.state;
-  if (s.cell_class == 0) {
-    ++s.levels;
-    s.worked += s.frontier;
-  }
   if (s.free_taken > s.free) s.free_taken = s.free;
   s.free += s.cascaded;
   s.cascaded = 0;

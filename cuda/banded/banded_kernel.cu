@@ -35,12 +35,6 @@ class WarpCoopGrid {
 
   __device__ void pause() const { __nanosleep(100); }
 
-  __device__ std::uint64_t now() const {
-    std::uint64_t ns;
-    asm volatile("mov.u64 %0, %%globaltimer;" : "=l"(ns));
-    return ns;
-  }
-
   template <class Last>
   __device__ void sync(const Last& last) {
     __syncthreads();

@@ -224,12 +224,6 @@ IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& su
     }
     coop.sync([&] {
       s.taken = 0;
-      ++s.steps;
-      if (a.timed) {
-        const std::uint64_t now = coop.now();
-        if (s.since != 0) s.time[static_cast<int>(step)] += now - s.since;
-        s.since = now;
-      }
       switch (step) {
         case Step::start:
           after_start(s);

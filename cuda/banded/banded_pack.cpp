@@ -70,58 +70,21 @@ class Watch {
   Mailbox* mailbox_ = nullptr;
 };
 
-BandedCost cost_of(const BandedState& state, std::uint32_t launches) {
-  BandedCost cost{state.worked, state.levels, state.steps, launches};
-  for (int i = 0; i < static_cast<int>(Step::finished); ++i) {
-    const double seconds = static_cast<double>(state.time[i]) * 1e-9;
-    switch (static_cast<Step>(i)) {
-      case Step::refresh:
-      case Step::confine:
-      case Step::work:
-        cost.work += seconds;
-        break;
-      case Step::split:
-        cost.split += seconds;
-        break;
-      case Step::collect:
-      case Step::dominate:
-      case Step::certify:
-      case Step::insert:
-        cost.select += seconds;
-        break;
-      case Step::clear_grid:
-      case Step::touch_all:
-      case Step::count:
-      case Step::make_room:
-      case Step::fill:
-        cost.grid += seconds;
-        break;
-      default:
-        cost.rest += seconds;
-        break;
-    }
-  }
-  return cost;
-}
-
 }  // namespace
 
 SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::PackingLimits& limits,
-                          Stage& stage, BandedCost* cost) {
+                          Stage& stage) {
   BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
                                             banded_sizes(limits.max_spheres));
   DeviceArray<GridBarrier> barrier(queue, 1);
   barrier.fill_bytes(0);
   Watch watch(limits, stage);
   BandedState state;
-  std::uint32_t launches = 0;
   try {
     for (;;) {
       BandedArrays arrays = buffers.arrays();
       arrays.mailbox = watch.mailbox();
-      arrays.timed = cost != nullptr;
       launch_banded(queue, arrays, mesh, barrier.data());
-      ++launches;
       watch.wait(queue);
       state = buffers.state();
       if (state.need == Need::nothing) break;
@@ -131,7 +94,6 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Pac
     cudaStreamSynchronize(queue.stream());  // the kernel may still write to the mailbox
     throw;
   }
-  if (cost != nullptr) *cost = cost_of(state, launches);
   return buffers.result(state);
 }
 

@@ -124,11 +124,6 @@ struct BandedState {
   SphereLists::Use use{SphereLists::kFirstWord, 0, 0};
 
   std::uint32_t stop_asked = 0;
-  std::uint64_t worked = 0;  ///< cells, for notes
-  std::uint32_t levels = 0, steps = 0;
-  std::uint64_t since = 0;                              ///< [ns] when this step began
-  std::uint64_t time[static_cast<int>(Step::finished)]  ///< [ns] by step
-      = {};
 };
 
 /// The arrays, by value.
@@ -159,7 +154,6 @@ struct BandedArrays {
 
   SphereLists lists_of_spheres;  ///< layout and use: see the state
   Mailbox* mailbox;              ///< null if nobody looks on
-  bool timed;                    ///< steps are timed, which costs some 0.8 µs each
 
   std::uint32_t many = kMany;  ///< cells from which on a level is worked on in parts
 

@@ -12,7 +12,6 @@
 //   Scratch& scratch();     this team's own memory
 //   std::uint32_t index();  this team's number, below size()
 //   void pause();           waits a little for other teams
-//   std::uint64_t now();    [ns] of a clock that all teams share
 //   void sync(last);        all teams meet; the last to come runs last(), then all go on and see
 //                           what any of them wrote before
 

@@ -34,7 +34,6 @@ class HostCoopGrid {
   std::uint32_t size() const { return size_; }
 
   void pause() const { std::this_thread::yield(); }
-  std::uint64_t now() const { return 0; }
 
   template <class Last>
   void sync(const Last& last) {
