@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "cuda/device_mesh.h"
+#include "mesh/mesh_solid.h"
 #include "report.h"
 #include "support/gpu_mesh_queries.h"
 #include "support/shared_data.h"
@@ -27,7 +28,6 @@ using ist::gpu::check;
 using ist::gpu::DeviceArray;
 using ist::gpu::DeviceMesh;
 using ist::gpu::ExactQuestion;
-using ist::gpu::HostMesh;
 using ist::gpu::LineQuestion;
 using ist::gpu::NearestQuestion;
 using ist::gpu::Queue;
@@ -53,25 +53,17 @@ class MeshOnCard {
   MeshOnCard(Report& report, const std::string& name, const std::string& path)
       : report_(report),
         name_(name),
-        mesh_(ist::close_mesh(ist::load_mesh(path), name).mesh),
-        queue_(ist::GpuSettings{}) {
-    Eigen::AlignedBox3d bounds;
-    for (const auto& v : mesh_.vertices) bounds.extend(v);
-    const ist::UnitFrame frame = ist::unit_frame(bounds);
-    host_.vertices = mesh_.vertices.front().data();
-    host_.vertex_count = mesh_.vertices.size();
-    host_.triangles = mesh_.triangles.front().data();
-    host_.triangle_count = mesh_.triangles.size();
-    for (int k = 0; k < 3; ++k) host_.centre[k] = frame.centre[k];
-    host_.scale = frame.scale();
-  }
+        solid_(ist::close_mesh(ist::load_mesh(path), name)),
+        host_(solid_.arrays()),
+        queue_(ist::GpuSettings{}) {}
 
   void build() {
     const int rounds = report_.quick() ? 10 : 50;
-    const std::size_t bytes = 24 * host_.vertex_count + 12 * host_.triangle_count;
+    const std::size_t vertex_bytes = 24 * std::size_t{host_.vertex_count};
+    const std::size_t bytes = vertex_bytes + 12 * std::size_t{host_.triangle_count};
     {
-      DeviceArray<double> vertices(queue_, 3 * host_.vertex_count);
-      DeviceArray<std::uint32_t> triangles(queue_, 3 * host_.triangle_count);
+      DeviceArray<double> vertices(queue_, vertex_bytes / 8);
+      DeviceArray<std::uint32_t> triangles(queue_, (bytes - vertex_bytes) / 4);
       const Times t = time(rounds, [&] {
         vertices.upload({host_.vertices, vertices.size()});
         triangles.upload({host_.triangles, triangles.size()});
@@ -87,15 +79,14 @@ class MeshOnCard {
       queue_.wait();
     });
     row("host triangles to hierarchy", t, bytes);
-    HostMesh pinned = host_;
+    ist::MeshView pinned = host_;
     void* memory = nullptr;
     check(cudaMallocHost(&memory, bytes), "allocating pinned memory");
-    std::memcpy(memory, host_.vertices, 24 * host_.vertex_count);
+    std::memcpy(memory, host_.vertices, vertex_bytes);
     pinned.vertices = static_cast<const double*>(memory);
-    pinned.triangles =
-        reinterpret_cast<std::uint32_t*>(static_cast<char*>(memory) + 24 * host_.vertex_count);
-    std::memcpy(static_cast<char*>(memory) + 24 * host_.vertex_count, host_.triangles,
-                12 * host_.triangle_count);
+    char* const triangles = static_cast<char*>(memory) + vertex_bytes;
+    pinned.triangles = reinterpret_cast<std::uint32_t*>(triangles);
+    std::memcpy(triangles, host_.triangles, bytes - vertex_bytes);
     row("the same from pinned memory",
         time(rounds,
              [&] {
@@ -125,14 +116,11 @@ class MeshOnCard {
         if (winding[i] >= 1) inside.push_back(drawn[i]);
     }
     while (close.size() < count) {
-      const auto& t = mesh_.triangles[random() % mesh_.triangles.size()];
+      const auto index = static_cast<std::uint32_t>(random() % host_.triangle_count);
+      const auto t = ist::triangle_corners(host_, index);
       ExactQuestion q = {{}, HUGE_VAL};
       for (int k = 0; k < 3; ++k)
-        q.p[k] =
-            ((mesh_.vertices[t[0]][k] + mesh_.vertices[t[1]][k] + mesh_.vertices[t[2]][k]) / 3 -
-             host_.centre[k]) /
-                host_.scale +
-            1e-3 * coordinate(random);
+        q.p[k] = (t[0][k] + t[1][k] + t[2][k]) / 3 + 1e-3 * coordinate(random);
       close.push_back(q);
     }
     for (const auto& [where, points] : {std::pair{"inside", inside}, {"near the surface", close}}) {
@@ -199,9 +187,9 @@ class MeshOnCard {
 
   Report& report_;
   std::string name_;
-  ist::TriangleMesh mesh_;
+  ist::MeshSolid solid_;
+  const ist::MeshView& host_;
   Queue queue_;
-  HostMesh host_;
 };
 
 }  // namespace

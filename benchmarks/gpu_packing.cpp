@@ -29,9 +29,6 @@ struct Run {
 
 /// `split`: waits for the mesh, to see how long it takes alone.
 Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
-  const ist::MeshView& view = solid.view();
-  const ist::gpu::HostMesh mesh{
-      view.vertices, view.triangles, view.vertex_count, view.triangle_count, {}, 1};
   ist::packing::PackingLimits limits;
   limits.volume = solid.unit_volume();
   limits.max_spheres = count;
@@ -39,7 +36,7 @@ Run run_once(const ist::MeshSolid& solid, std::size_t count, bool split) {
   Run run;
   const double start = ist::benchmark::wall_seconds();
   {
-    const ist::gpu::DeviceMesh on_device(queue, mesh);
+    const ist::gpu::DeviceMesh on_device(queue, solid.view());
     if (split) {
       queue.wait();
       run.mesh = ist::benchmark::wall_seconds() - start;

@@ -23,15 +23,6 @@ const GpuSettings& usable(const GpuSettings& settings) {
   return settings;
 }
 
-HostMesh host_mesh(const MeshView& arrays) {
-  HostMesh mesh;  // in the unit frame already
-  mesh.vertices = arrays.vertices;
-  mesh.triangles = arrays.triangles;
-  mesh.vertex_count = arrays.vertex_count;
-  mesh.triangle_count = arrays.triangle_count;
-  return mesh;
-}
-
 class CudaBackend final : public SolidBackend {
  public:
   /// `is_second`: there is one already, whose work comes first. `tree`: the solid's, if that has
@@ -91,7 +82,7 @@ class CudaBackend final : public SolidBackend {
  private:
   /// The mesh's hierarchy, made when it is first needed: the grids have none.
   const WideTree& tree() {
-    if (tree_ == nullptr) tree_ = &mesh_.emplace(queue_, host_mesh(solid_.arrays())).tree();
+    if (tree_ == nullptr) tree_ = &mesh_.emplace(queue_, solid_.arrays()).tree();
     return *tree_;
   }
 

@@ -12,22 +12,6 @@ namespace {
 constexpr unsigned kThreads = 128;
 constexpr unsigned kWarps = kThreads / 32;
 
-struct Placement {
-  double centre[3];
-  double scale;
-};
-
-/// UnitFrame::to_unit.
-__global__ void place_in_unit_frame(double* coordinates, std::size_t count, Placement placement) {
-  const std::size_t i = std::size_t{blockIdx.x} * kThreads + threadIdx.x;
-  if (i >= count) return;
-  const unsigned axis = static_cast<unsigned>(i % 3);
-  const double centre = axis == 0   ? placement.centre[0]
-                        : axis == 1 ? placement.centre[1]
-                                    : placement.centre[2];
-  coordinates[i] = (coordinates[i] - centre) / placement.scale;
-}
-
 __device__ Corners corners_of(const double* vertices, const std::uint32_t* t) {
   return {{vertices + 3 * std::size_t{t[0]}, vertices + 3 * std::size_t{t[1]},
            vertices + 3 * std::size_t{t[2]}}};
@@ -111,28 +95,23 @@ __global__ void join_boxes(WideNode* nodes, std::uint32_t first, std::uint32_t n
 
 }  // namespace
 
-DeviceMesh::DeviceMesh(Queue& queue, const HostMesh& mesh) {
-  const auto count = static_cast<std::uint32_t>(mesh.triangle_count);
+DeviceMesh::DeviceMesh(Queue& queue, const MeshView& mesh) {
+  const std::uint32_t count = mesh.triangle_count;
   const std::uint32_t block_count = (count + kWideWidth - 1) / kWideWidth;
   const int depth = wide_depth(block_count);
   tree_.first_leaf = first_wide_node(depth);
   tree_.block_count = block_count;
   tree_.triangle_count = count;
-  tree_.vertex_count = static_cast<std::uint32_t>(mesh.vertex_count);
+  tree_.vertex_count = mesh.vertex_count;
   const cudaStream_t stream = queue.stream();
 
-  DeviceArray<std::uint32_t> triangles(queue, 3 * mesh.triangle_count);
-  vertices_ = DeviceArray<double>(queue, 3 * mesh.vertex_count);
+  DeviceArray<std::uint32_t> triangles(queue, 3 * std::size_t{count});
+  vertices_ = DeviceArray<double>(queue, 3 * std::size_t{mesh.vertex_count});
   {
     PageableUpload upload(queue, vertices_.bytes() + triangles.bytes());
     upload.copy(vertices_.data(), mesh.vertices, vertices_.bytes());
     upload.copy(triangles.data(), mesh.triangles, triangles.bytes());
   }
-  const Placement placement = {{mesh.centre[0], mesh.centre[1], mesh.centre[2]}, mesh.scale};
-  place_in_unit_frame<<<blocks_for(vertices_.size(), kThreads), kThreads, 0, stream>>>(
-      vertices_.data(), vertices_.size(), placement);
-
-  check_launch("placing the mesh in the unit frame");
   const DeviceArray<std::uint32_t> order =
       order_triangles(queue, vertices_.data(), triangles.data(), count);
 

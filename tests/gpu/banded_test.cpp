@@ -28,10 +28,8 @@ class BandedGpuTest : public GpuTest {};
 
 SpherePacking pack_on_gpu(const MeshSolid& solid, const PackingSettings& settings,
                           const ProgressCallback& progress = {}) {
-  const MeshView& view = solid.view();
   gpu::Queue queue(settings.gpu);
-  const gpu::DeviceMesh mesh(
-      queue, {view.vertices, view.triangles, view.vertex_count, view.triangle_count, {}, 1});
+  const gpu::DeviceMesh mesh(queue, solid.view());
   Stage stage("pack", progress, settings.time_limit);
   return gpu::pack_banded(queue, mesh.tree(),
                           packing::packing_limits(solid, solid.frame().scale(), settings), stage);
