@@ -7,6 +7,9 @@ namespace ist::gpu {
 /// Throws Error unless `status` is success: what was being done, what CUDA says, and the way out.
 void check(cudaError_t status, const char* doing);
 
+/// Throws Error, with the remedy, if gpu_available(device) is false.
+void check_gpu(int device);
+
 /// Throws Error if the last kernel could not be launched.
 inline void check_launch(const char* kernel) { check(cudaGetLastError(), kernel); }
 

@@ -2,8 +2,6 @@
 
 #include <optional>
 
-#include <ist/error.h>
-
 #include "cuda/bake/on_gpu.h"
 #include "cuda/banded/banded_pack.h"
 #include "cuda/device_mesh.h"
@@ -17,12 +15,6 @@
 namespace ist::gpu {
 namespace {
 
-const GpuSettings& usable(const GpuSettings& settings) {
-  std::string why;
-  if (!gpu_available(settings.device, &why)) throw Error("GPU: " + why + ": bake on the CPU");
-  return settings;
-}
-
 class CudaBackend final : public SolidBackend {
  public:
   /// `is_second`: there is one already, whose work comes first. `tree`: the solid's, if that has
@@ -30,7 +22,7 @@ class CudaBackend final : public SolidBackend {
   CudaBackend(const MeshSolid& solid, const GpuSettings& settings, bool is_second = false,
               const WideTree* tree = nullptr)
       : solid_(solid),
-        settings_(usable(settings)),
+        settings_(settings),
         is_second_(is_second),
         queue_(settings_, is_second),
         tree_(tree) {}
@@ -98,6 +90,7 @@ class CudaBackend final : public SolidBackend {
 
 std::unique_ptr<SolidBackend> make_cuda_backend(const MeshSolid& solid,
                                                 const GpuSettings& settings) {
+  check_gpu(settings.device);
   return std::make_unique<CudaBackend>(solid, settings);
 }
 

@@ -113,7 +113,7 @@ constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whos
 
 GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
-  gpu_info(settings.device);  // throws where there is no such device
+  gpu::check_gpu(settings.device);
   gpu::Queue queue(settings);
   std::vector<gpu::SolidRef> refs(solids.size());
   gpu::SolidRef* at = nullptr;
@@ -237,7 +237,7 @@ std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
 
 GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
     : impl_(std::make_unique<Impl>()) {
-  gpu_info(settings.device);
+  gpu::check_gpu(settings.device);
   if (most_pairs > 0xFFFFFFFFu) throw Error("GPU: a batch holds up to 2^32 - 1 pairs: divide it");
   gpu::Queue queue(settings);
   impl_->device = settings.device;

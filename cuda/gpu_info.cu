@@ -5,19 +5,22 @@
 #include <string>
 
 #include "cuda/check.h"
-#include "cuda/device_code.h"
+#include "cuda/queue.h"
 
 namespace ist {
 namespace {
 
 constexpr int kOldest = 75;  // compute capability; CUDA 13 has none older
 
-/// What the device answers to `find_device_code()`.
-cudaError_t code_for(int device) {
+__global__ void any_kernel() {}  // all are compiled for the same architectures
+
+/// Success if this build holds code for the device. Makes the device's context.
+cudaError_t find_code_for(int device) {
   int previous = 0;
   cudaError_t status = cudaGetDevice(&previous);
   if (status == cudaSuccess) status = cudaSetDevice(device);
-  if (status == cudaSuccess) status = gpu::find_device_code();
+  cudaFuncAttributes attributes{};
+  if (status == cudaSuccess) status = cudaFuncGetAttributes(&attributes, any_kernel);
   if (previous != device) cudaSetDevice(previous);
   return status;
 }
@@ -50,7 +53,7 @@ std::string obstacle(int device) {
     return "the GPU or its driver's mode has no cooperative launch";
   if (attribute(cudaDevAttrMemoryPoolsSupported) == 0)
     return "the GPU or its driver's mode has no memory pools (cudaMallocAsync)";
-  switch (const cudaError_t code = code_for(device)) {
+  switch (const cudaError_t code = find_code_for(device)) {
     case cudaSuccess:
       return {};
     case cudaErrorNoKernelImageForDevice:
@@ -75,20 +78,20 @@ bool gpu_available(int device, std::string* why) {
   return found.empty();
 }
 
-GpuInfo gpu_info(int device) {
+void gpu::check_gpu(int device) {
   std::string why;
   if (!gpu_available(device, &why)) throw Error("GPU: " + why + ": bake on the CPU");
+}
+
+GpuInfo gpu_info(int device) {
+  gpu::check_gpu(device);
   cudaDeviceProp properties{};
   gpu::check(cudaGetDeviceProperties(&properties, device), "querying the GPU's properties");
-  int previous = 0;
-  gpu::check(cudaGetDevice(&previous), "querying the current GPU");
   GpuInfo info;
   info.name = properties.name;
   info.compute_capability = 10 * properties.major + properties.minor;
-  gpu::check(cudaSetDevice(device), "selecting the GPU");
-  const cudaError_t status = cudaMemGetInfo(&info.free_memory, &info.total_memory);
-  cudaSetDevice(previous);
-  gpu::check(status, "querying the GPU's memory");
+  const gpu::DeviceGuard guard(device);
+  gpu::check(cudaMemGetInfo(&info.free_memory, &info.total_memory), "querying the GPU's memory");
   return info;
 }
 
