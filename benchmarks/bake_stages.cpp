@@ -17,9 +17,9 @@
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/tree_builder.h"
 #include "bake/field/field.h"
-#include "packing/calibrate/calibration.h"
 #include "packing/cover/cover.h"
 #include "report.h"
+#include "support/on_host.h"
 #include "support/shared_data.h"
 
 namespace {
@@ -62,7 +62,7 @@ void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& s
   });
   const auto inner = stages.time("4 pack", [&] { return backend->pack(settings, {}).spheres; });
   const auto calibration =
-      stages.time("5 calibrate", [&] { return calibrate(*solid, *backend, inner, {}); });
+      stages.time("5 calibrate", [&] { return testing::calibrate(*solid, *backend, inner, {}); });
   const auto covers =
       stages.time("6 cover", [&] { return cover_radii(*solid, *backend, inner, {}); });
   const auto order = stages.time("7 order", [&] { return sphere_order(inner); });

@@ -35,7 +35,7 @@ void expect_same(const ClosedMesh& mesh, std::size_t count) {
   const std::vector<Sphere> inner = packed_on_cpu(solid, count);
   const auto on_gpu = make_backend(solid, {Device::cuda, {}});
   const Calibration host = testing::calibrate_on_host(solid, inner);
-  const Calibration card = calibrate(solid, *on_gpu, inner, {});
+  const Calibration card = testing::calibrate(solid, *on_gpu, inner, {});
   EXPECT_EQ(
       std::memcmp(host.matched.data(), card.matched.data(), host.matched.size() * sizeof(Sphere)),
       0);
@@ -104,7 +104,7 @@ TEST_F(GpuBake, CancellingEndsIt) {
   const auto on_gpu = make_backend(solid, {Device::cuda, {}});
   const Sphere ball = {0, 0, 0, 0.5f};
   const auto cancel = [](const Progress&) { return false; };
-  EXPECT_THROW(calibrate(solid, *on_gpu, {&ball, 1}, cancel), Error);
+  EXPECT_THROW(testing::calibrate(solid, *on_gpu, {&ball, 1}, cancel), Error);
   EXPECT_THROW(cover_radii(solid, *on_gpu, {&ball, 1}, cancel), Error);
 }
 

@@ -14,6 +14,16 @@ inline std::unique_ptr<SolidBackend> host_backend(const MeshSolid& solid) {
   return make_backend(solid, {Device::cpu, {}});
 }
 
+/// Calibrates a whole packing.
+inline Calibration calibrate(const MeshSolid& solid, SolidBackend& backend,
+                             std::span<const Sphere> inner, const ProgressCallback& progress) {
+  const std::size_t all = inner.size();
+  Calibration result;
+  calibrate_prefixes(solid, backend, inner, {&all, 1}, progress,
+                     [&](std::size_t, Calibration made) { result = std::move(made); });
+  return result;
+}
+
 /// calibrate() on so many host threads, 0 = all.
 inline Calibration calibrate_on_host(const MeshSolid& solid, std::span<const Sphere> inner,
                                      unsigned threads = 0, const ProgressCallback& progress = {}) {

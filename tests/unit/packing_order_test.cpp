@@ -42,6 +42,35 @@ class ShuffledSpheres {
   unsigned seed_;
 };
 
+/// GridSpheres for a team of any width: its lanes share the spheres.
+class TeamSpheres {
+ public:
+  TeamSpheres(const std::vector<Sphere>& spheres, const SphereGrid& grid)
+      : spheres_(spheres), grid_(grid) {}
+
+  std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
+  float reach() const { return grid_.layout().reach; }
+
+  template <class Team, class Visit>
+  void for_near(const Team& team, Float3 x, Visit&& visit) const {
+    std::uint32_t mine = 0;
+    int count = 0;
+    const auto hand_out = [&] {
+      if (count > 0) visit(team.lane() < count, mine, spheres_[mine]);
+      count = 0;
+    };
+    grid_.for_near(x, [&](std::uint32_t i) {
+      if (count++ == team.lane()) mine = i;
+      if (count == Team::kWidth) hand_out();
+    });
+    hand_out();
+  }
+
+ private:
+  const std::vector<Sphere>& spheres_;
+  const SphereGrid& grid_;
+};
+
 struct Shuffled {
   using Spheres = ShuffledSpheres;
   static void arrange(std::vector<std::uint32_t>& cells) {
@@ -111,8 +140,8 @@ void expect_team_agrees(const char* name, int ways, unsigned seed) {
   const std::vector<Sphere> spheres = packed<AsFound>(surface, limits_of(solid, 300));
   const float reach = 3 * spheres.back().r;
   const SphereGrid grid(spheres, sphere_grid_layout(spheres.size(), reach));
-  const GridSpheres near(spheres, grid);
-  const PrototypeField<WideMeshSurface, GridSpheres> field(surface, near);
+  const TeamSpheres near(spheres, grid);
+  const PrototypeField<WideMeshSurface, TeamSpheres> field(surface, near);
   using Scratch = CellScratch<std::uint32_t>;
   const SerialTeam one;
   std::mt19937 random(seed);
@@ -198,7 +227,7 @@ TEST(PackingOrder, AFullSampleKeepsTheNearestOfAnyOrder) {
     ist::testing::Fibers<32> fibers(static_cast<unsigned>(round));
     fibers.run([&](int lane) {
       const Sample mine = sample_spheres(ist::testing::FiberTeam<32>(fibers, lane), x,
-                                         GridSpheres(spheres, filled), 10, 9, &memory);
+                                         TeamSpheres(spheres, filled), 10, 9, &memory);
       if (lane == 0) s = mine;
     });
     check(s);

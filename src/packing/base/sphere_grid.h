@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "numerics/team.h"
 #include "packing/base/sphere_grid_layout.h"
 
 namespace ist::packing {
@@ -74,25 +75,11 @@ class GridSpheres {
   std::uint32_t count() const { return static_cast<std::uint32_t>(spheres_.size()); }
   float reach() const { return grid_.layout().reach; }
 
-  /// Calls visit(valid, index, sphere) for the spheres that x's cell lists, each on one lane; all
-  /// lanes make the same number of calls, those without a sphere with valid = false.
-  template <class Team, class Visit>
-  void for_near(const Team& team, Float3 x, Visit&& visit) const {
-    if constexpr (Team::kWidth == 1) {
-      grid_.for_near(x, [&](std::uint32_t i) { visit(true, i, spheres_[i]); });
-    } else {  // a team of the tests
-      std::uint32_t mine = 0;
-      int count = 0;
-      const auto hand_out = [&] {
-        if (count > 0) visit(team.lane() < count, mine, spheres_[mine]);
-        count = 0;
-      };
-      grid_.for_near(x, [&](std::uint32_t i) {
-        if (count++ == team.lane()) mine = i;
-        if (count == Team::kWidth) hand_out();
-      });
-      hand_out();
-    }
+  /// Calls visit(valid, index, sphere) for the spheres that x's cell lists. (Lanes of a wider team
+  /// would make the same number of calls, those without a sphere with valid = false.)
+  template <class Visit>
+  void for_near(const SerialTeam&, Float3 x, Visit&& visit) const {
+    grid_.for_near(x, [&](std::uint32_t i) { visit(true, i, spheres_[i]); });
   }
 
  private:

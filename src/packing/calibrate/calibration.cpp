@@ -250,13 +250,4 @@ void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
   stage.step(inner.size(), 1);
 }
 
-Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
-                      const ProgressCallback& progress) {
-  const std::size_t all = inner.size();
-  Calibration result;
-  calibrate_prefixes(solid, backend, inner, {&all, 1}, progress,
-                     [&](std::size_t, Calibration made) { result = std::move(made); });
-  return result;
-}
-
 }  // namespace ist

@@ -21,14 +21,11 @@ struct Calibration {
   double protrusion = 0;
 };
 
-/// Calibrates a packing: relaxed power cells seeded by the inner spheres, integrated over columns
-/// of the solid. `backend`: the solid's. Same bytes for any backend and number of threads, which
-/// are those of the current arena. Throws Error if there are no spheres or progress cancels.
-Calibration calibrate(const MeshSolid& solid, SolidBackend& backend, std::span<const Sphere> inner,
-                      const ProgressCallback& progress);
-
-/// The same for several prefixes of the spheres, each of `counts` by itself; a call shares what it
-/// makes of the solid. `take(i, calibration)` is given each as soon as it is ready, in their order.
+/// Calibrates prefixes of a packing, each of `counts` by itself: relaxed power cells seeded by the
+/// inner spheres, integrated over columns of the solid. `backend`: the solid's. Same bytes for any
+/// backend and number of threads, which are those of the current arena. `take(i, calibration)` is
+/// given each as soon as it is ready, in their order. Throws Error if there are no spheres or
+/// progress cancels.
 void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
                         std::span<const Sphere> inner, std::span<const std::size_t> counts,
                         const ProgressCallback& progress,
