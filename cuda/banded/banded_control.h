@@ -67,11 +67,6 @@ IST_HD inline void to_round(const BandedArrays& a) {
   to_work(a);
 }
 
-IST_HD inline void after_start(BandedState& s) {
-  s.slots = 1;
-  to_sweep(s);
-}
-
 IST_HD inline void after_sweep(BandedState& s) {
   s.schedule.drop(float_of(s.dropped));
   s.dropped = 0;
@@ -93,11 +88,6 @@ IST_HD inline void after_sweep(BandedState& s) {
   }
 }
 
-IST_HD inline void after_clear_grid(BandedState& s) {
-  s.use = {SphereLists::kFirstWord, 0, 0};
-  s.step = Step::touch_all;
-}
-
 /// After a pass that may have found the pools of the sphere grid too small.
 IST_HD inline void after_grid_pass(const BandedArrays& a, Step next) {
   BandedState& s = *a.state;
@@ -107,11 +97,6 @@ IST_HD inline void after_grid_pass(const BandedArrays& a, Step next) {
   } else {
     s.step = s.use.pairs > 0 ? next : s.after_grid;
   }
-}
-
-IST_HD inline void after_fill(BandedState& s) {
-  s.use.pairs = 0;
-  s.step = s.after_grid;
 }
 
 IST_HD inline void finish_round(const BandedArrays& a, std::uint32_t inserted) {
@@ -210,6 +195,45 @@ IST_HD inline void after_insert(const BandedArrays& a) {
   if (s.step == Step::finished) return;
   s.after_grid = s.step;
   after_grid_pass(a, Step::count);
+}
+
+/// After `step`: the next one in the order of Step, where nothing else is said.
+IST_HD inline void after_step(const BandedArrays& a, Step step) {
+  BandedState& s = *a.state;
+  switch (step) {
+    case Step::start:
+      s.slots = 1;
+      return to_sweep(s);
+    case Step::sweep:
+      return after_sweep(s);
+    case Step::clear_grid:
+      s.use = {SphereLists::kFirstWord, 0, 0};
+      break;
+    case Step::touch_all:
+      return after_grid_pass(a, Step::count);
+    case Step::make_room:
+      return after_grid_pass(a, Step::fill);
+    case Step::fill:
+      s.use.pairs = 0;
+      s.step = s.after_grid;
+      return;
+    case Step::activate:
+      return to_round(a);
+    case Step::confine:
+      s.pending = s.confined;
+      break;
+    case Step::work:
+      return after_work(a);
+    case Step::split:
+      return after_split(a);
+    case Step::dominate:
+      return after_find_winners(a);
+    case Step::insert:
+      return after_insert(a);
+    default:
+      break;
+  }
+  s.step = Step{static_cast<std::uint32_t>(step) + 1};
 }
 
 }  // namespace ist::gpu

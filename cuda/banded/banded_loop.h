@@ -130,16 +130,20 @@ IST_HD void clear_grid(CoopGrid& coop, const BandedArrays& a) {
   });
 }
 
-/// Calls pass(pair, sphere, share) for all shares of all pairs that were noted. Few pairs are
+/// Does the sphere grid's pass `step` over all shares of all pairs that were noted. Few pairs are
 /// shared by teams that would have none: what a pass takes is the time of its longest chain of
 /// atomics.
-template <class CoopGrid, class Pass>
-IST_HD void for_pairs(CoopGrid& coop, const BandedArrays& a, const SphereLists& grid,
-                      const Pass& pass) {
+template <class CoopGrid>
+IST_HD void pass_over_pairs(CoopGrid& coop, const BandedArrays& a, Step step) {
+  const SphereLists grid = a.grid();
   const std::uint32_t shares = grid.use->pairs < coop.size() ? 8 : 1;
   distribute_statically(coop, shares * grid.use->pairs, [&](std::uint32_t i) {
     const SphereLists::Pair pair = grid.pairs[i / shares];
-    pass(pair, a.spheres[pair.sphere].sphere(), SphereLists::Share{i % shares, shares});
+    const Sphere sphere = a.spheres[pair.sphere].sphere();
+    const SphereLists::Share share{i % shares, shares};
+    if (step == Step::count) grid.count_in_cells(coop.team(), pair, sphere, share);
+    if (step == Step::make_room) grid.make_room(coop.team(), pair, sphere, share);
+    if (step == Step::fill) grid.fill_cells(coop.team(), pair, sphere, share);
   });
 }
 
@@ -148,7 +152,6 @@ IST_HD void for_pairs(CoopGrid& coop, const BandedArrays& a, const SphereLists& 
 template <class CoopGrid, class Surface>
 IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
-  const auto& team = coop.team();
   for (;;) {
     const Step step = s.step;
     if (step == Step::finished || s.need != Need::nothing) return;
@@ -166,32 +169,14 @@ IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& su
         const SphereLists grid = a.grid();
         distribute_dynamically(
             coop, static_cast<std::uint32_t>(s.schedule.spheres), &s.taken,
-            [&](std::uint32_t i) { grid.touch_blocks(team, i, a.spheres[i].sphere()); });
+            [&](std::uint32_t i) { grid.touch_blocks(coop.team(), i, a.spheres[i].sphere()); });
         break;
       }
-      case Step::count: {
-        const SphereLists grid = a.grid();
-        for_pairs(
-            coop, a, grid,
-            [&](const SphereLists::Pair& pair, const Sphere& sphere, SphereLists::Share share) {
-              grid.count_in_cells(team, pair, sphere, share);
-            });
+      case Step::count:
+      case Step::make_room:
+      case Step::fill:
+        pass_over_pairs(coop, a, step);
         break;
-      }
-      case Step::make_room: {
-        const SphereLists grid = a.grid();
-        for_pairs(coop, a, grid,
-                  [&](const SphereLists::Pair& pair, const Sphere& sphere,
-                      SphereLists::Share share) { grid.make_room(team, pair, sphere, share); });
-        break;
-      }
-      case Step::fill: {
-        const SphereLists grid = a.grid();
-        for_pairs(coop, a, grid,
-                  [&](const SphereLists::Pair& pair, const Sphere& sphere,
-                      SphereLists::Share share) { grid.fill_cells(team, pair, sphere, share); });
-        break;
-      }
       case Step::activate:
         activate_cells(coop, a);
         break;
@@ -224,59 +209,7 @@ IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& su
     }
     coop.sync([&] {
       s.taken = 0;
-      switch (step) {
-        case Step::start:
-          after_start(s);
-          break;
-        case Step::sweep:
-          after_sweep(s);
-          break;
-        case Step::clear_grid:
-          after_clear_grid(s);
-          break;
-        case Step::touch_all:
-          after_grid_pass(a, Step::count);
-          break;
-        case Step::count:
-          s.step = Step::make_room;
-          break;
-        case Step::make_room:
-          after_grid_pass(a, Step::fill);
-          break;
-        case Step::fill:
-          after_fill(s);
-          break;
-        case Step::activate:
-          to_round(a);
-          break;
-        case Step::refresh:
-          s.step = Step::confine;
-          break;
-        case Step::confine:
-          s.pending = s.confined;
-          s.step = Step::work;
-          break;
-        case Step::work:
-          after_work(a);
-          break;
-        case Step::split:
-          after_split(a);
-          break;
-        case Step::collect:
-          s.step = Step::dominate;
-          break;
-        case Step::dominate:
-          after_find_winners(a);
-          break;
-        case Step::certify:
-          s.step = Step::insert;
-          break;
-        case Step::insert:
-          after_insert(a);
-          break;
-        case Step::finished:
-          break;
-      }
+      after_step(a, step);
     });
   }
 }
