@@ -1,13 +1,11 @@
 #pragma once
 
 #include <ist/error.h>
-#include <ist/packing.h>
 
-#include <algorithm>
 #include <span>
-#include <vector>
 
 #include "cuda/banded/banded_control.h"
+#include "packing/banded/banded_packer.h"
 
 namespace ist::gpu {
 
@@ -132,22 +130,10 @@ class BandedBuffers {
   SpherePacking result(const BandedState& state) const {
     const std::size_t count = state.schedule.spheres;
     const std::vector<StoredSphere> stored = spheres_.to_host(count);
-    std::vector<float> kept = kept_.to_host(count);
     SpherePacking packing;
     packing.spheres.reserve(count);
-    for (const StoredSphere& s : stored) {
-      packing.spheres.push_back(s.sphere());
-      if (s.r < packing::kFloatNoise) packing.below_float_noise = true;
-    }
-    packing.stop = state.schedule.reason;
-    packing.coverage = state.schedule.coverage();
-    packing.rounds = state.schedule.rounds;
-    if (!kept.empty()) {
-      const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(count / 2);
-      std::nth_element(kept.begin(), middle, kept.end());
-      packing.kept_ratio_median = *middle;
-      packing.kept_ratio_worst = *std::min_element(kept.begin(), kept.end());
-    }
+    for (const StoredSphere& s : stored) packing.spheres.push_back(s.sphere());
+    finish(packing, state.schedule, kept_.to_host(count));
     return packing;
   }
 

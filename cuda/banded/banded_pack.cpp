@@ -16,7 +16,7 @@ namespace {
 /// and tells it to stop.
 class Watch {
  public:
-  Watch(const packing::PackingLimits& limits, Stage& stage) : limits_(limits), stage_(stage) {
+  Watch(const packing::PackingLimits& limits, Stage& stage) : schedule_(limits), stage_(stage) {
     if (!stage.watched()) return;
     void* memory = nullptr;
     check(cudaHostAlloc(&memory, sizeof(Mailbox), cudaHostAllocMapped | cudaHostAllocPortable),
@@ -50,9 +50,9 @@ class Watch {
   void look() {
     try {
       const auto why = stage_.stop([this](Progress& now) {
-        const double coverage = static_cast<double>(mailbox_->covered) *
-                                packing::volume_unit_of(limits_.volume) / limits_.volume;
-        packing::set_progress(now, limits_, mailbox_->spheres, coverage, double{mailbox_->radius});
+        schedule_.covered = mailbox_->covered;
+        packing::set_progress(now, schedule_.limits, mailbox_->spheres, schedule_.coverage(),
+                              double{mailbox_->radius});
       });
       if (why) stop(*why);
     } catch (...) {
@@ -65,7 +65,7 @@ class Watch {
     if (mailbox_->stop == 0) mailbox_->stop = 1 + static_cast<std::uint32_t>(why);
   }
 
-  const packing::PackingLimits& limits_;
+  packing::BandSchedule schedule_;  ///< for the coverage alone
   Stage& stage_;
   Mailbox* mailbox_ = nullptr;
 };

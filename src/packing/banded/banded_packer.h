@@ -21,6 +21,21 @@ struct AsFound {
   static void arrange(std::vector<std::uint32_t>&) {}
 };
 
+/// Completes a packing of spheres in the order of insertion. `kept`: their radii over the largest
+/// bound there was.
+inline void finish(SpherePacking& packing, const BandSchedule& schedule, std::vector<float> kept) {
+  packing.stop = schedule.reason;
+  packing.coverage = schedule.coverage();
+  packing.rounds = schedule.rounds;
+  for (const Sphere& s : packing.spheres)
+    if (s.r < kFloatNoise) packing.below_float_noise = true;
+  if (kept.empty()) return;
+  const auto middle = kept.begin() + static_cast<std::ptrdiff_t>(kept.size() / 2);
+  std::nth_element(kept.begin(), middle, kept.end());
+  packing.kept_ratio_median = *middle;
+  packing.kept_ratio_worst = *std::min_element(kept.begin(), kept.end());
+}
+
 /// The greedy packing with a guarantee of docs/design.md 4.2 over one kind of surface, on the host.
 template <class Surface, class Order = AsFound>
 class BandedPacker {
@@ -41,15 +56,7 @@ class BandedPacker {
       band();
       schedule_.end_band();
     }
-    result_.stop = schedule_.reason;
-    result_.coverage = schedule_.coverage();
-    result_.rounds = schedule_.rounds;
-    if (!kept_.empty()) {
-      const auto middle = kept_.begin() + static_cast<std::ptrdiff_t>(kept_.size() / 2);
-      std::nth_element(kept_.begin(), middle, kept_.end());
-      result_.kept_ratio_median = *middle;
-      result_.kept_ratio_worst = *std::min_element(kept_.begin(), kept_.end());
-    }
+    finish(result_, schedule_, std::move(kept_));
     return std::move(result_);
   }
 
@@ -214,7 +221,6 @@ class BandedPacker {
       grid_.insert(static_cast<std::uint32_t>(result_.spheres.size()), sphere);
       result_.spheres.push_back(sphere);
       kept_.push_back(std::min(1.0f, r / top));
-      if (r < kFloatNoise) result_.below_float_noise = true;
       schedule_.insert(r);
       ++inserted;
     }
