@@ -49,6 +49,22 @@ IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t val
 #endif
 }
 
+/// Adds the first lane's `count` to what a team's lanes share with others; the value before.
+template <class Team>
+IST_HD std::uint32_t take(const Team& team, std::uint32_t* at, std::uint32_t count) {
+  std::uint32_t first = 0;
+  if (team.lane() == 0) first = atomic_add(at, count);
+  return team.broadcast(first, 0);
+}
+
+/// Place of this lane's item in a list to which the lanes with `adds` append one each.
+template <class Team>
+IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
+  int total = 0;
+  const auto before = static_cast<std::uint32_t>(team.exclusive_count(adds, total));
+  return total == 0 ? 0 : take(team, size, static_cast<std::uint32_t>(total)) + before;
+}
+
 /// Writes `value` if `expected` is there.
 IST_HD inline std::uint32_t atomic_replace(std::uint32_t* at, std::uint32_t expected,
                                            std::uint32_t value) {

@@ -1,6 +1,8 @@
 #include "cuda/bake/on_gpu.h"
 
+#include "cuda/atomics.h"
 #include "cuda/device_array.h"
+#include "cuda/launch.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
 #include "packing/cover/cover_cells.h"
@@ -45,12 +47,6 @@ struct Counters {
   std::uint32_t scratch;
 };
 
-__device__ std::uint32_t take(std::uint32_t& counter, std::uint32_t count) {
-  std::uint32_t first = 0;
-  if ((threadIdx.x & 31u) == 0) first = atomicAdd(&counter, count);
-  return __shfl_sync(0xFFFFFFFFu, first, 0);
-}
-
 /// Makes each ball as large as the solid around its centre, and by the slack larger. A warp a ball.
 __global__ void __launch_bounds__(kThreads)
     clear_balls(WideTree tree, CoverBall* balls, std::uint32_t count, double slack) {
@@ -79,12 +75,12 @@ __global__ void __launch_bounds__(kThreads)
   const WarpTeam team;
   const DeviceCoverSurface surface{team, tree};
   for (;;) {
-    const std::uint32_t child = take(counters->next, 1);
+    const std::uint32_t child = take(team, &counters->next, 1);
     if (child >= 8 * cell_count) return;
     CoverCell cell = cover_child(from.cells[child / 8], static_cast<int>(child % 8), level.half);
     std::uint32_t* keep = short_lists[threadIdx.x / 32];
     if (cell.count > kShortList) {
-      const std::uint32_t at = take(counters->scratch, cell.count);
+      const std::uint32_t at = take(team, &counters->scratch, cell.count);
       if (at + cell.count > scratch_room) continue;  // the host sees it and tries again
       keep = scratch + at;
     }
@@ -94,8 +90,8 @@ __global__ void __launch_bounds__(kThreads)
       atomicMax(&raised[verdict.demand.ball],
                 static_cast<unsigned long long>(__double_as_longlong(verdict.demand.extension)));
     if (verdict.divide) {
-      const std::uint32_t first = take(counters->listed, verdict.count);
-      const std::uint32_t place = take(counters->cells, 1);
+      const std::uint32_t first = take(team, &counters->listed, verdict.count);
+      const std::uint32_t place = take(team, &counters->cells, 1);
       if (first + verdict.count <= to.list_room && place < to.cell_room) {
         for (std::uint32_t i = static_cast<std::uint32_t>(team.lane()); i < verdict.count; i += 32)
           to.lists[first + i] = keep[i];
@@ -130,8 +126,8 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
   const unsigned all_blocks = kBlocksEach * static_cast<unsigned>(queue.multiprocessors());
   DeviceArray<CoverBall> balls(queue, count);
   balls.upload(task.balls);
-  clear_balls<<<(count + kWarps - 1) / kWarps, kThreads, 0, stream>>>(mesh, balls.data(), count,
-                                                                      task.slack);
+  clear_balls<<<blocks_for(count, kWarps), kThreads, 0, stream>>>(mesh, balls.data(), count,
+                                                                  task.slack);
   DeviceArray<double> extension(queue, count), raised(queue, count);
   extension.fill_bytes(0);
   raised.fill_bytes(0);
@@ -143,7 +139,7 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
   DeviceArray<Counters> counters(queue, 1);
   CoverCell first{task.middle[0], task.middle[1], task.middle[2], 0, count, false};
   from.cells.upload({&first, 1});
-  list_all<<<(count + kThreads - 1) / kThreads, kThreads, 0, stream>>>(from.lists.data(), count);
+  list_all<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(from.lists.data(), count);
   check_launch("cover radii");
 
   CoverLevel level;

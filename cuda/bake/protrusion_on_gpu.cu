@@ -1,6 +1,7 @@
 #include "cuda/bake/on_gpu.h"
 
 #include "cuda/device_array.h"
+#include "cuda/launch.h"
 #include "cuda/warp_team.h"
 #include "mesh/wide_rays.h"
 #include "packing/calibrate/protrusion.h"
@@ -34,7 +35,7 @@ double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sp
   on_device.upload(balls);
   DeviceArray<double> largest(queue, 1);
   largest.fill_bytes(0);
-  find_protrusion<<<(count + kWarps - 1) / kWarps, kThreads, 0, queue.stream()>>>(
+  find_protrusion<<<blocks_for(count, kWarps), kThreads, 0, queue.stream()>>>(
       mesh, on_device.data(), count, reinterpret_cast<unsigned long long*>(largest.data()));
   check_launch("measuring protrusions");
   return largest.to_host(1).front();

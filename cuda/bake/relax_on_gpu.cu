@@ -1,5 +1,7 @@
 #include "cuda/bake/on_gpu.h"
 
+#include "cuda/atomics.h"
+#include "cuda/launch.h"
 #include "cuda/warp_reduce.h"
 #include "cuda/warp_team.h"
 #include "packing/calibrate/power_relaxation.h"
@@ -169,8 +171,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   const std::uint32_t* list = short_list;
   std::uint32_t first = 0;
   if (kept > kPowerLeafSites) {
-    if (team.lane() == 0) first = atomicAdd(round.listed, kept);
-    first = team.broadcast(first, 0);
+    first = take(team, round.listed, kept);
     if (first + kept > round.list_room) return;  // the host sees it and tries again
     filtered(round.lists + first, kept);
     list = round.lists + first;
@@ -194,12 +195,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   const int octant = team.lane();
   const PowerGridCell child = child_of(task.cell, static_cast<std::uint32_t>(octant) & 7);
   const bool needed = octant < 8 && !is_empty(grid, child);
-  int total = 0;
-  const auto place = static_cast<std::uint32_t>(team.exclusive_count(needed, total));
-  std::uint32_t at = 0;
-  if (team.lane() == 0)
-    at = atomicAdd(round.task_counts + child.level, static_cast<std::uint32_t>(total));
-  at = team.broadcast(at, 0) + place;
+  const std::uint32_t at = append(team, needed, round.task_counts + child.level);
   if (needed && at < round.task_room) round.tasks[child.level % 2][at] = {child, first, kept};
 }
 
@@ -285,7 +281,7 @@ class Relaxation {
   void round(double volume) {
     do cut();
     while (!fits());
-    const unsigned blocks = (count_ + kThreads - 1) / kThreads;
+    const unsigned blocks = blocks_for(count_, kThreads);
     total_.fill_bytes(0);
     sum_lengths<<<blocks, kThreads, 0, queue_.stream()>>>(sums_.data(), count_, total_.data());
     relax_all<<<blocks, kThreads, 0, queue_.stream()>>>(sites_.data(), sums_.data(), shares_.data(),
@@ -318,7 +314,7 @@ class Relaxation {
     const PowerRound round = view();
     const cudaStream_t stream = queue_.stream();
     const unsigned blocks = kBlocksEach * static_cast<unsigned>(queue_.multiprocessors());
-    start_round<<<(count_ + kThreads - 1) / kThreads, kThreads, 0, stream>>>(round, count_);
+    start_round<<<blocks_for(count_, kThreads), kThreads, 0, stream>>>(round, count_);
     unsigned most = 1;  // cells of the level
     for (int level = grid_.levels - 1; level >= 0; --level) {
       const int above = grid_.levels - 1 - level;

@@ -31,9 +31,7 @@ IST_HD void distribute_dynamically(CoopGrid& coop, std::uint32_t count, std::uin
   while (i < count) {
     work(i);
     if (count <= coop.size()) return;
-    std::uint32_t next = 0;
-    if (coop.team().lane() == 0) next = atomic_add(taken, 1);
-    i = coop.size() + coop.team().broadcast(next, 0);
+    i = coop.size() + take(coop.team(), taken, 1);
   }
 }
 
@@ -45,16 +43,6 @@ IST_HD void distribute_to_lanes(CoopGrid& coop, std::uint32_t count, const Work&
   const std::uint32_t stride = coop.size() * kWidth;
   for (std::uint32_t base = coop.index() * kWidth; base < count; base += stride)
     work(base + static_cast<std::uint32_t>(coop.team().lane()));
-}
-
-/// Place of this lane's item in a list to which the lanes with `adds` append one each.
-template <class Team>
-IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
-  int total = 0;
-  const int before = team.exclusive_count(adds, total);
-  std::uint32_t base = 0;
-  if (team.lane() == 0 && total > 0) base = atomic_add(size, static_cast<std::uint32_t>(total));
-  return team.broadcast(base, 0) + static_cast<std::uint32_t>(before);
 }
 
 }  // namespace ist::gpu

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "cuda/atomics.h"
 #include "cuda/launch.h"
 #include "cuda/warp_team.h"
 #include "packing/grids/discrete_distance.h"
@@ -100,14 +101,8 @@ __global__ void keep_active_cells(const __grid_constant__ GridScene scene,
     if (active && threadIdx.x % 32 == 0) kept[atomicAdd(kept_count, 1u)] = cells[c];
   } else {
     active = c < count && packing::prototype_cell_active(SerialTeam(), scene, prototypes, cells[c]);
-    const unsigned raised = __ballot_sync(0xFFFFFFFFu, active);
-    const unsigned lane = threadIdx.x % 32;
-    std::uint32_t first = 0;
-    if (lane == 0 && raised != 0)
-      first = atomicAdd(kept_count, static_cast<std::uint32_t>(__popc(raised)));
-    first = __shfl_sync(0xFFFFFFFFu, first, 0);
-    if (active)
-      kept[first + static_cast<unsigned>(__popc(raised & ((1u << lane) - 1u)))] = cells[c];
+    const std::uint32_t place = append(WarpTeam(), active, kept_count);
+    if (active) kept[place] = cells[c];
   }
 }
 
@@ -117,9 +112,7 @@ __global__ void converge_prototypes(const __grid_constant__ GridScene scene,
                                     std::uint32_t* next, GridCandidate* candidates) {
   const WarpTeam team;
   for (;;) {
-    std::uint32_t n = 0;
-    if (team.lane() == 0) n = atomicAdd(next, 1u);
-    n = team.broadcast(n, 0);
+    const std::uint32_t n = take(team, next, 1);
     if (n >= end) return;
     const GridCandidate c = packing::converged_prototype(team, scene, settings, cells[n]);
     if (team.lane() == 0) candidates[n] = c;

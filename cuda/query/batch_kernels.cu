@@ -22,9 +22,9 @@ __global__ void __launch_bounds__(kSiftThreads) sift_pairs(const BatchArrays bat
   std::uint32_t meet = 0;
   const PairUse use = i < batch.pairs.count ? sift_pair(batch, static_cast<std::uint32_t>(i), meet)
                                             : PairUse::answered;
-  const std::uint32_t place = list_place(team, use == PairUse::summed, &batch.counters->listed);
+  const std::uint32_t place = append(team, use == PairUse::summed, &batch.counters->listed);
   if (use == PairUse::summed) list_pair(batch, static_cast<std::uint32_t>(i), meet, place);
-  const std::uint32_t other = list_place(team, use == PairUse::detailed, &batch.counters->detailed);
+  const std::uint32_t other = append(team, use == PairUse::detailed, &batch.counters->detailed);
   if (use == PairUse::detailed) batch.detailed[other] = static_cast<std::uint32_t>(i);
 }
 

@@ -29,16 +29,6 @@ __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& 
   by_warps(count, taken, work, [] { return true; });
 }
 
-/// Where each lane that raises the flag writes into a list of which `listed` are taken.
-__device__ inline std::uint32_t list_place(const WarpTeam& team, bool flag, std::uint32_t* listed) {
-  int total = 0;
-  const int before = team.exclusive_count(flag, total);
-  if (total == 0) return 0;
-  std::uint32_t first = 0;
-  if (team.lane() == 0) first = atomic_add(listed, static_cast<std::uint32_t>(total));
-  return team.broadcast(first, 0) + static_cast<std::uint32_t>(before);
-}
-
 /// Blocks of a kernel that the current device runs at a time.
 template <class Kernel>
 int blocks_at_a_time(const Kernel& kernel, unsigned threads) {

@@ -19,7 +19,7 @@ __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatc
   const int group =
       i < batch.pairs.count ? sift_field_pair(batch, static_cast<std::uint32_t>(i)) : -1;
   for (int k = 0; k < kFieldGroups; ++k) {
-    const std::uint32_t place = list_place(team, group == k, &batch.counters->listed[k]);
+    const std::uint32_t place = append(team, group == k, &batch.counters->listed[k]);
     if (group == k) listed_pair(batch, k, place) = static_cast<std::uint32_t>(i);
   }
 }

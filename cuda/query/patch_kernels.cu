@@ -21,7 +21,7 @@ __global__ void __launch_bounds__(kSiftThreads) sift_contacts(const PatchArrays 
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
   const bool sums =
       i < batch.pairs.pairs.count && sift_patches(batch, static_cast<std::uint32_t>(i));
-  const std::uint32_t place = list_place(team, sums, &batch.pairs.counters->listed);
+  const std::uint32_t place = append(team, sums, &batch.pairs.counters->listed);
   if (sums) batch.pairs.list[place] = static_cast<std::uint32_t>(i);
 }
 

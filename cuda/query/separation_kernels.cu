@@ -27,7 +27,7 @@ __global__ void __launch_bounds__(kSiftThreads) sift_separations(const Separatio
   const int list = i < batch.pairs.pairs.count ? sift_separation(batch, pair) : -1;
   const WarpTeam team;
   for (int kind = 0; kind < 2; ++kind) {
-    const std::uint32_t place = list_place(team, list == kind, &batch.counters[kind].listed);
+    const std::uint32_t place = append(team, list == kind, &batch.counters[kind].listed);
     if (list == kind) batch.list[kind][place] = pair;
   }
 }
