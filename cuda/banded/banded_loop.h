@@ -118,7 +118,7 @@ IST_HD void split_cells(CoopGrid& coop, const BandedArrays& a, const Surface& su
 template <class CoopGrid>
 IST_HD void clear_grid(CoopGrid& coop, const BandedArrays& a) {
   const SphereLists grid = a.grid();
-  const std::uint32_t blocks = grid.block_count();
+  const std::uint32_t blocks = grid.layout.block_count();
   distribute_to_lanes(coop, blocks, [&](std::uint32_t i) {
     if (i < blocks) grid.blocks[i] = 0;
   });

@@ -34,8 +34,9 @@ struct SphereLists {
   static constexpr std::uint32_t kBlockInMaking = 0x7FFFFFFFu;  ///< else 0: no cells, or 1 + which
   static constexpr std::uint32_t kCovered = 0x80000000u;        ///< in Cell::size
   static constexpr std::uint32_t kInMaking = 0x80000000u;       ///< in Cell::where
-  static constexpr std::uint32_t kCellsPerBlock = 512;
-  static constexpr std::uint32_t kMostBlocks = 128u * 128u * 128u;
+  static constexpr std::uint32_t kCellsPerBlock = packing::SphereGridLayout::kCellsPerBlock;
+  static constexpr std::uint32_t kMostBlocks =
+      packing::kMostBlocksPerSide * packing::kMostBlocksPerSide * packing::kMostBlocksPerSide;
   static constexpr std::uint64_t kFirstWord = 8;
 
   packing::SphereGridLayout layout;
@@ -46,15 +47,6 @@ struct SphereLists {
   Use* use;
   std::uint64_t word_capacity;
   std::uint32_t block_capacity, pair_capacity;
-
-  IST_HD std::uint32_t block_count() const {
-    const auto side = static_cast<std::uint32_t>(layout.blocks_per_side);
-    return side * side * side;
-  }
-  IST_HD std::uint32_t block_index(int i, int j, int k) const {
-    return static_cast<std::uint32_t>((k * layout.blocks_per_side + j) * layout.blocks_per_side +
-                                      i);
-  }
 
   /// Words that a list of `size` ≤ 2³⁰ takes, its length included. Grows by steps of a third or
   /// more.
@@ -70,15 +62,16 @@ struct SphereLists {
     const int i = packing::grid_coordinate(layout, x.x);
     const int j = packing::grid_coordinate(layout, x.y);
     const int k = packing::grid_coordinate(layout, x.z);
-    const std::uint32_t block = in_global_memory(blocks)[block_index(i >> 3, j >> 3, k >> 3)];
+    const std::uint32_t block =
+        in_global_memory(blocks)[layout.block_index(i >> 3, j >> 3, k >> 3)];
     std::uint32_t count = 0, only = 0;
     const std::uint32_t* list = nullptr;
     if ((block & kCoveredBlock) != 0) {
       count = 1;
       only = block & ~kCoveredBlock;
     } else if (block != 0) {
-      const Cell cell =
-          in_global_memory(cells)[std::size_t{block - 1} * kCellsPerBlock + cell_index(i, j, k)];
+      const Cell cell = in_global_memory(
+          cells)[std::size_t{block - 1} * kCellsPerBlock + layout.cell_index(i, j, k)];
       if ((cell.size & kCovered) != 0) {
         count = 1;
         only = cell.where;
@@ -108,7 +101,7 @@ struct SphereLists {
       std::uint32_t block = 0;
       if (n < nx * ny * nz) {
         const int i = first[0] + n % nx, j = first[1] + n / nx % ny, k = first[2] + n / nx / ny;
-        block = block_index(i, j, k);
+        block = layout.block_index(i, j, k);
         const packing::GridRelation relation = packing::block_relation(layout, s, i, j, k);
         if (relation == packing::GridRelation::covers)
           atomic_exchange(&blocks[block], kCoveredBlock | index);
@@ -174,10 +167,6 @@ struct SphereLists {
   }
 
  private:
-  IST_HD static std::uint32_t cell_index(int i, int j, int k) {
-    return static_cast<std::uint32_t>(((k & 7) * 8 + (j & 7)) * 8 + (i & 7));
-  }
-
   /// Calls visit(cell, relation) for the cells of the pair's block that the sphere is not away
   /// from, of this share, in the lanes' own order.
   template <class Team, class Visit>
@@ -203,7 +192,7 @@ struct SphereLists {
       const int i = lo[0] + n % count[0], j = lo[1] + n / count[0] % count[1],
                 k = lo[2] + n / count[0] / count[1];
       const packing::GridRelation relation = packing::cell_relation(layout, s, i, j, k);
-      if (relation != packing::GridRelation::away) visit(own[cell_index(i, j, k)], relation);
+      if (relation != packing::GridRelation::away) visit(own[layout.cell_index(i, j, k)], relation);
     }
   }
 };

@@ -25,10 +25,10 @@ class SphereGrid {
   void for_near(Float3 x, Visit&& visit) const {
     const int i = grid_coordinate(layout_, x.x), j = grid_coordinate(layout_, x.y),
               k = grid_coordinate(layout_, x.z);
-    const Block& block = blocks_[block_index(i >> 3, j >> 3, k >> 3)];
+    const Block& block = blocks_[layout_.block_index(i >> 3, j >> 3, k >> 3)];
     if (block.owner != kNone) return visit(block.owner);
     if (block.cells == kNone) return;
-    const Cell& cell = cells_[block.cells + cell_index(i & 7, j & 7, k & 7)];
+    const Cell& cell = cells_[block.cells + layout_.cell_index(i, j, k)];
     for (std::uint32_t chunk = cell.head; chunk != kNone; chunk = chunks_[chunk].next)
       for (std::uint32_t n = 0; n < chunks_[chunk].size; ++n) visit(chunks_[chunk].index[n]);
   }
@@ -46,18 +46,10 @@ class SphereGrid {
     bool covered = false;
   };
   struct Block {
-    std::uint32_t cells = kNone;  ///< first of its 512 cells
+    std::uint32_t cells = kNone;  ///< first of its cells
     std::uint32_t owner = kNone;  ///< a sphere that covers the whole block
   };
 
-  std::size_t block_index(int i, int j, int k) const {
-    const auto side = static_cast<std::size_t>(layout_.blocks_per_side);
-    return (static_cast<std::size_t>(k) * side + static_cast<std::size_t>(j)) * side +
-           static_cast<std::size_t>(i);
-  }
-  static std::uint32_t cell_index(int i, int j, int k) {
-    return static_cast<std::uint32_t>((k * 8 + j) * 8 + i);
-  }
   void append(Cell& cell, std::uint32_t index);
 
   SphereGridLayout layout_;

@@ -19,6 +19,17 @@ struct SphereGridLayout {
   float inverse_size = 4;
   int blocks_per_side = 1;
   int cells_per_side = 8;
+
+  static constexpr std::uint32_t kCellsPerBlock = 512;
+
+  IST_HD std::uint32_t block_count() const { return block_index(0, 0, blocks_per_side); }
+  IST_HD std::uint32_t block_index(int i, int j, int k) const {
+    return static_cast<std::uint32_t>((k * blocks_per_side + j) * blocks_per_side + i);
+  }
+  /// Place of the grid's cell (i, j, k) in its block.
+  IST_HD static std::uint32_t cell_index(int i, int j, int k) {
+    return static_cast<std::uint32_t>(((k & 7) * 8 + (j & 7)) * 8 + (i & 7));
+  }
 };
 
 constexpr float kGridHalfExtent = 1;
