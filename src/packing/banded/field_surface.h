@@ -1,8 +1,7 @@
 #pragma once
 
-#include <ist/solid.h>
-
 #include "packing/banded/sample.h"
+#include "packing/base/unit_field.h"
 
 namespace ist::packing {
 
@@ -19,24 +18,14 @@ class FieldSurface {
     float radius = 0;
   };
 
-  FieldSurface(const Solid& solid, const UnitFrame& frame)
-      : solid_(solid), frame_(frame), scale_(frame.scale()) {}
+  FieldSurface(const Solid& solid, const UnitFrame& frame) : field_{solid, frame} {}
 
   /// Unsigned distance to the surface, and the feature there, if it is less than `limit`.
   template <class Team>
   NearestFeature<Feature> nearest(const Team&, Float3 x, float limit) const {
     const double s = value(x);
     if (!(std::fabs(s) < limit)) return {{}, limit, false};
-    // Central differences over a step that float coordinates resolve.
-    const double step = 0x1p-20;
-    const Eigen::Vector3d at(x.x, x.y, x.z);
-    Eigen::Vector3d g;
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d e = step * Eigen::Vector3d::Unit(k);
-      g[k] = value(at + e) - value(at - e);
-    }
-    const double length = std::sqrt(g.dot(g));
-    const Eigen::Vector3d q = length > 0 ? Eigen::Vector3d(at - s / length * g) : at;
+    const Eigen::Vector3d q = field_.foot(exact(x), s);
     Feature feature;
     feature.centre = {static_cast<float>(q.x()), static_cast<float>(q.y()),
                       static_cast<float>(q.z())};
@@ -65,14 +54,10 @@ class FieldSurface {
   }
 
  private:
-  double value(Float3 x) const { return value(Eigen::Vector3d(x.x, x.y, x.z)); }
-  double value(const Eigen::Vector3d& x) const {
-    return solid_.signed_distance(frame_.from_unit(x)) / scale_;
-  }
+  static Eigen::Vector3d exact(Float3 x) { return {x.x, x.y, x.z}; }
+  double value(Float3 x) const { return field_.value(exact(x)); }
 
-  const Solid& solid_;
-  UnitFrame frame_;
-  double scale_;
+  UnitField field_;
 };
 
 }  // namespace ist::packing

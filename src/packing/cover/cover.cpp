@@ -14,6 +14,7 @@
 #include "mesh/exact_triangle.h"
 #include "numerics/roots.h"
 #include "numerics/rounding.h"
+#include "packing/base/unit_field.h"
 #include "packing/cover/cover_cells.h"
 #include "stage/stage.h"
 
@@ -31,9 +32,7 @@ class MeshCover {
     for (int k = 0; k < 3; ++k) q[k] = near.point[k];
     return near.triangle != kNoTriangle;
   }
-  bool inside(const double point[3]) const {
-    return solid_.inside(Eigen::Vector3d(point[0], point[1], point[2]));
-  }
+  bool inside(const double point[3]) const { return solid_.inside(Eigen::Vector3d(point)); }
   /// Distance from the surface of a point inside, else 0.
   double depth(const Eigen::Vector3d& point) const {
     return solid_.inside(point) ? solid_.closest_point(point).distance : 0;
@@ -45,39 +44,16 @@ class MeshCover {
 };
 
 /// A signed distance, as cover_cell() asks it.
-class FieldCover {
- public:
-  FieldCover(const Solid& solid, const UnitFrame& frame)
-      : solid_(solid), frame_(frame), scale_(frame.scale()) {}
-
+struct FieldCover : packing::UnitField {
   bool nearest(const double point[3], double radius, double q[3]) const {
-    const Eigen::Vector3d x(point[0], point[1], point[2]);
+    const Eigen::Vector3d x(point);
     const double s = value(x);
     if (std::abs(s) > radius) return false;
-    const double step = 0x1p-20;
-    Eigen::Vector3d g;
-    for (int k = 0; k < 3; ++k) {
-      Eigen::Vector3d e = Eigen::Vector3d::Zero();
-      e[k] = step;
-      g[k] = value(x + e) - value(x - e);
-    }
-    const double length = std::sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    for (int k = 0; k < 3; ++k) q[k] = length > 0 ? x[k] - s / length * g[k] : x[k];
+    Eigen::Vector3d::Map(q) = foot(x, s);
     return true;
   }
-  bool inside(const double point[3]) const {
-    return value(Eigen::Vector3d(point[0], point[1], point[2])) > 0;
-  }
+  bool inside(const double point[3]) const { return value(Eigen::Vector3d(point)) > 0; }
   double depth(const Eigen::Vector3d& point) const { return std::max(0.0, value(point)); }
-
- private:
-  double value(const Eigen::Vector3d& x) const {
-    return solid_.signed_distance(frame_.from_unit(x)) / scale_;
-  }
-
-  const Solid& solid_;
-  UnitFrame frame_;
-  double scale_;
 };
 
 /// Cells to divide, and the lists that their children filter.
@@ -193,7 +169,7 @@ std::vector<double> cover_on_host(const MeshSolid& solid, const CoverTask& task,
 
 std::vector<double> cover_on_host(const Solid& solid, const UnitFrame& frame, const CoverTask& task,
                                   const std::function<void(int)>& report) {
-  return cover(FieldCover(solid, frame), task, report);
+  return cover(FieldCover{{solid, frame}}, task, report);
 }
 
 }  // namespace ist
