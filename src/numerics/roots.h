@@ -15,7 +15,7 @@ IST_HD inline double power_three_eighths(double x) {
 /// Cube root of x ≥ 0 to a few units in the last place, from + − × ÷ alone: the C library's cbrt
 /// differs between processors, and radii go into the asset (docs/design.md 3.3).
 IST_HD inline double cube_root(double x) {
-  if (!(x > 0)) return 0;
+  if (!(x > 0 && x < HUGE_VAL)) return x > 0 ? x : 0;
   double scale = 1;  // x in [1/8, 1) by powers of 8, exact
   while (x >= 1) {
     x *= 0.125;

@@ -67,6 +67,7 @@ TEST(CubeRoot, IsAccurate) {
   for (double x = 1e-30; x < 1e30; x *= 1.37) EXPECT_NEAR(cube_root(x) / std::cbrt(x), 1, 1e-15);
   EXPECT_EQ(cube_root(0), 0);
   EXPECT_EQ(cube_root(8), 2);
+  EXPECT_EQ(cube_root(HUGE_VAL), HUGE_VAL);
 }
 
 TEST(PowerCells, PiecesOfALineBelongToTheLeastPower) {
