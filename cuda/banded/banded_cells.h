@@ -22,8 +22,8 @@ IST_HD void put_cell(const Team& team, const BandedArrays& a, const packing::Cel
 }
 
 /// Begins with the root cell alone; spheres and grid stay.
-template <class CoopGrid, class Surface>
-IST_HD void plant_root(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void plant_root(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   distribute_to_lanes(coop, s.slots, [&](std::uint32_t i) {
     if (i > 0 && i < s.slots) a.bounds[i] = 0;
@@ -31,15 +31,15 @@ IST_HD void plant_root(CoopGrid& coop, const BandedArrays& a, const Surface& sur
   if (coop.index() == 0) {
     packing::Cell root = packing::Cell{};
     root.inside = surface.inside(coop.team(), root.centre);
-    for (int i = coop.team().lane(); i < packing::kRingCapacity; i += CoopGrid::Team::kWidth)
+    for (int i = coop.team().lane(); i < packing::kRingCapacity; i += CoopLaunch::Team::kWidth)
       coop.scratch().ring[i] = 0;
     put_cell(coop.team(), a, root, coop.scratch(), 0);
   }
 }
 
 /// Frees the cells below the floor; finds the largest bound of the others.
-template <class CoopGrid>
-IST_HD void sweep_cells(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void sweep_cells(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const float floor = s.schedule.floor;
   float top = 0, dropped = 0;
@@ -68,8 +68,8 @@ IST_HD void sweep_cells(CoopGrid& coop, const BandedArrays& a) {
 }
 
 /// The cells that reach the margin become the frontier.
-template <class CoopGrid>
-IST_HD void activate_cells(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void activate_cells(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const float margin = s.schedule.margin;
   std::uint32_t* const frontier = a.lists[s.frontier_array];
@@ -137,8 +137,8 @@ IST_HD void queue_children(const Team& team, const BandedArrays& a, ChildCode fi
 }
 
 /// Waits for the entry of the queue that is this team's; kNone if none will come.
-template <class CoopGrid>
-IST_HD std::uint32_t wait_for_child(const CoopGrid& coop, const BandedArrays& a,
+template <class CoopLaunch>
+IST_HD std::uint32_t wait_for_child(const CoopLaunch& coop, const BandedArrays& a,
                                     std::uint32_t place) {
   std::uint32_t code = ChildCode::kNone;
   if (coop.team().lane() == 0 && place < a.queue_capacity) {
@@ -163,8 +163,8 @@ IST_HD inline void note_candidates(BandedState& s, std::uint32_t radius, std::ui
 /// The first part of the work on the frontier's cells of one class, a lane a cell: what the spheres
 /// and the remembered triangles tell has little to share among lanes. Where the bound is attained
 /// is kept in place of the prototype, which an open cell does not have.
-template <class CoopGrid, class Surface>
-IST_HD void refresh_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void refresh_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
@@ -184,8 +184,8 @@ IST_HD void refresh_cells(CoopGrid& coop, const BandedArrays& a, const Surface& 
       packing::SampleMemory memory;
       typename decltype(field)::Bounded seen;
       cell = a.cells[slot].cell;
-      state = field.refresh(typename CoopGrid::Lane{}, cell, a.cells[slot].ring, &memory, threshold,
-                            margin, seen);
+      state = field.refresh(typename CoopLaunch::Lane{}, cell, a.cells[slot].ring, &memory,
+                            threshold, margin, seen);
       if (state == CellState::open) cell.prototype = seen.y;
       a.cells[slot].cell = cell;
       a.bounds[slot] = cell.bound;
@@ -213,8 +213,8 @@ IST_HD inline void note_splitting(const BandedArrays& a, std::uint32_t slot) {
 }
 
 /// The second part, of the cells that the first left open.
-template <class CoopGrid, class Surface>
-IST_HD void confine_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void confine_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
@@ -237,8 +237,8 @@ IST_HD void confine_cells(CoopGrid& coop, const BandedArrays& a, const Surface& 
 /// still open. Where the schedule says that no rule can come between (state.depth), cells that are
 /// to be split are split in the same step, and so on for that many levels: a chain of splits then
 /// waits for itself alone.
-template <class CoopGrid, class Surface>
-IST_HD void work_on_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void work_on_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "cuda/banded/banded_loop.h"
-#include "cuda/banded/cooperative_grid.h"
+#include "cuda/banded/coop_launch.h"
 #include "cuda/check.h"
 #include "cuda/warp_team.h"
 #include "packing/banded/wide_mesh_surface.h"
@@ -13,17 +13,17 @@
 namespace ist::gpu {
 namespace {
 
-/// The cooperative grid of a cooperative kernel (cooperative_grid.h): all its warps. Successive
+/// A cooperative kernel as a launch (coop_launch.h): all its warps. Successive
 /// numbers stand in different blocks, so that little work spreads over many multiprocessors.
 template <class Scratch_>
-class WarpCoopGrid {
+class WarpCoopLaunch {
  public:
   using Team = WarpTeam;
   using Lane = LaneTeam;
   using Scratch = Scratch_;
 
   /// `scratch`: shared memory, one a warp.
-  __device__ WarpCoopGrid(GridBarrier* barrier, Scratch* scratch)
+  __device__ WarpCoopLaunch(CoopBarrier* barrier, Scratch* scratch)
       : barrier_(barrier), scratch_(scratch + threadIdx.x / 32) {
     generation_ = atomic_load(&barrier->generation);
   }
@@ -57,7 +57,7 @@ class WarpCoopGrid {
   }
 
  private:
-  GridBarrier* barrier_;
+  CoopBarrier* barrier_;
   Scratch* scratch_;
   std::uint32_t generation_;
   Team team_;
@@ -70,9 +70,9 @@ constexpr std::size_t kShared = sizeof(Scratch) * (kThreads / 32);  // bytes a b
 static_assert(kShared <= 64 << 10, "what compute capability 7.5 gives a block");
 
 __global__ void __launch_bounds__(kThreads, 1)
-    banded_kernel(const BandedArrays arrays, const WideTree mesh, GridBarrier* barrier) {
+    banded_kernel(const BandedArrays arrays, const WideTree mesh, CoopBarrier* barrier) {
   extern __shared__ Scratch scratch[];
-  WarpCoopGrid<Scratch> coop(barrier, scratch);
+  WarpCoopLaunch<Scratch> coop(barrier, scratch);
   pack_banded(coop, arrays, packing::WideMeshSurface(mesh));
 }
 
@@ -90,7 +90,7 @@ unsigned resident_blocks(const Queue& queue) {
 }  // namespace
 
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
-                   GridBarrier* barrier) {
+                   CoopBarrier* barrier) {
   check(cudaFuncSetAttribute(banded_kernel, cudaFuncAttributeMaxDynamicSharedMemorySize,
                              static_cast<int>(kShared)),
         "preparing the packing kernel");

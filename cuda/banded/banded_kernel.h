@@ -7,14 +7,14 @@
 namespace ist::gpu {
 
 /// Where the blocks of a cooperative kernel meet; zero before the first launch.
-struct GridBarrier {
+struct CoopBarrier {
   std::uint32_t here;
   std::uint32_t generation;
 };
 
-/// Enqueues a cooperative grid that packs from the step that the state says until it is finished or
-/// needs something (banded_loop.h).
+/// Enqueues a cooperative kernel that packs from the step that the state says until it is finished
+/// or needs something (banded_loop.h).
 void launch_banded(Queue& queue, const BandedArrays& arrays, const WideTree& mesh,
-                   GridBarrier* barrier);
+                   CoopBarrier* barrier);
 
 }  // namespace ist::gpu

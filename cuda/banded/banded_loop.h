@@ -19,8 +19,8 @@ IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool ke
 }
 
 /// split_cells() with a team a child, for so few that no team has a second one.
-template <class CoopGrid, class Field>
-IST_HD void split_few(CoopGrid& coop, const BandedArrays& a, const Field& field) {
+template <class CoopLaunch, class Field>
+IST_HD void split_few(CoopLaunch& coop, const BandedArrays& a, const Field& field) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const std::uint32_t i = coop.index();
@@ -61,8 +61,8 @@ IST_HD void split_few(CoopGrid& coop, const BandedArrays& a, const Field& field)
 /// little to share among lanes. Slots come from the free list, a queue; the parents' own go to its
 /// end, for later steps. A child for which there is no slot stays to be made, and the step is done
 /// again when there are more.
-template <class CoopGrid, class Surface>
-IST_HD void split_cells(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void split_cells(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
@@ -88,7 +88,7 @@ IST_HD void split_cells(CoopGrid& coop, const BandedArrays& a, const Surface& su
       const BandedArrays::Cell& parent = a.cells[parent_slot];
       packing::SampleMemory memory;
       for (int k = 0; k < packing::kRingCapacity; ++k) child.ring[k] = parent.ring[k];
-      child.cell = field.child(typename CoopGrid::Lane{}, parent.cell, static_cast<int>(i % 8),
+      child.cell = field.child(typename CoopLaunch::Lane{}, parent.cell, static_cast<int>(i % 8),
                                child.ring, &memory, margin);
       if (child.cell.bound < floor && child.cell.bound > dropped) dropped = child.cell.bound;
     }
@@ -115,8 +115,8 @@ IST_HD void split_cells(CoopGrid& coop, const BandedArrays& a, const Surface& su
 }
 
 /// Zeroes the sphere grid for its new layout.
-template <class CoopGrid>
-IST_HD void clear_grid(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void clear_grid(CoopLaunch& coop, const BandedArrays& a) {
   const SphereLists grid = a.grid();
   const std::uint32_t blocks = grid.layout.block_count();
   distribute_to_lanes(coop, blocks, [&](std::uint32_t i) {
@@ -133,8 +133,8 @@ IST_HD void clear_grid(CoopGrid& coop, const BandedArrays& a) {
 /// Does the sphere grid's pass `step` over all shares of all pairs that were noted. Few pairs are
 /// shared by teams that would have none: what a pass takes is the time of its longest chain of
 /// atomics.
-template <class CoopGrid>
-IST_HD void pass_over_pairs(CoopGrid& coop, const BandedArrays& a, Step step) {
+template <class CoopLaunch>
+IST_HD void pass_over_pairs(CoopLaunch& coop, const BandedArrays& a, Step step) {
   const SphereLists grid = a.grid();
   const std::uint32_t shares = grid.use->pairs < coop.size() ? 8 : 1;
   distribute_statically(coop, shares * grid.use->pairs, [&](std::uint32_t i) {
@@ -149,8 +149,8 @@ IST_HD void pass_over_pairs(CoopGrid& coop, const BandedArrays& a, Step step) {
 
 /// The whole packing (BandedPacker on the CPU, the same spheres bit for bit), from the step that
 /// the state says until it is finished or needs something of the host.
-template <class CoopGrid, class Surface>
-IST_HD void pack_banded(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void pack_banded(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   for (;;) {
     const Step step = s.step;

@@ -76,7 +76,7 @@ SpherePacking pack_banded(Queue& queue, const WideTree& mesh, const packing::Pac
                           Stage& stage) {
   BandedBuffers<DeviceArray, Queue> buffers(queue, packing::BandSchedule(limits),
                                             banded_sizes(limits.max_spheres));
-  DeviceArray<GridBarrier> barrier(queue, 1);
+  DeviceArray<CoopBarrier> barrier(queue, 1);
   barrier.fill_bytes(0);
   Watch watch(limits, stage);
   BandedState state;

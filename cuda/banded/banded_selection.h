@@ -12,8 +12,8 @@ namespace ist::gpu {
 using packing::Candidate;
 
 /// Hangs the active cells' candidates into the chains of their buckets.
-template <class CoopGrid>
-IST_HD void collect_candidates(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void collect_candidates(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const std::uint32_t* const active = a.lists[1 - s.frontier_array];
   const std::uint64_t seed = s.schedule.limits.seed;
@@ -48,8 +48,8 @@ IST_HD void for_neighbours(const Team& team, const BandedArrays& a, Float3 centr
 }
 
 /// Finds the candidates that no overlapping one goes before.
-template <class CoopGrid>
-IST_HD void find_winners(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void find_winners(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   distribute_statically(coop, s.active, [&](std::uint32_t i) {
@@ -97,8 +97,8 @@ IST_HD inline void judge_winner(const BandedArrays& a, std::uint32_t w, bool ins
 /// Works out what radius the winners may keep. Three teams a winner: one finds on which side of the
 /// surface it lies, one how far it is from it, one how far from spheres and other winners; who
 /// comes last judges.
-template <class CoopGrid, class Surface>
-IST_HD void certify_winners(CoopGrid& coop, const BandedArrays& a, const Surface& surface) {
+template <class CoopLaunch, class Surface>
+IST_HD void certify_winners(CoopLaunch& coop, const BandedArrays& a, const Surface& surface) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const ListedSpheres spheres = listed_spheres(a);
@@ -138,8 +138,8 @@ IST_HD void certify_winners(CoopGrid& coop, const BandedArrays& a, const Surface
 
 /// Inserts the accepted winners in their order, as many as may still come, and notes the blocks of
 /// the sphere grid that they touch.
-template <class CoopGrid>
-IST_HD void insert_winners(CoopGrid& coop, const BandedArrays& a) {
+template <class CoopLaunch>
+IST_HD void insert_winners(CoopLaunch& coop, const BandedArrays& a) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const SphereLists grid = a.grid();
@@ -153,7 +153,7 @@ IST_HD void insert_winners(CoopGrid& coop, const BandedArrays& a) {
     const std::uint32_t bucket = rank_bucket(s, me.radius);
     int before = 0;
     for (std::uint32_t b = bucket + 1 + static_cast<std::uint32_t>(team.lane());
-         b < RankBuckets::kCount; b += CoopGrid::Team::kWidth)
+         b < RankBuckets::kCount; b += CoopLaunch::Team::kWidth)
       before += static_cast<int>(a.ranks->size[b]);
     before = team.sum(before);
     for (std::uint32_t at = a.ranks->head[bucket]; at != 0; at = a.winners[at - 1].next) {

@@ -10,7 +10,7 @@
 
 namespace ist::gpu {
 
-/// What the cooperative grid does next. Every step ends with a meeting.
+/// What the launch does next. Every step ends with a meeting.
 enum class Step : std::uint32_t {
   start,       ///< the root cell's side
   sweep,       ///< drop dead cells, find the largest bound; the schedule begins a band
@@ -31,8 +31,8 @@ enum class Step : std::uint32_t {
   finished,
 };
 
-/// What is too small for the next step. The cooperative grid stops; the host makes it larger and
-/// starts the cooperative grid again where it stopped.
+/// What is too small for the next step. The launch ends; the host makes it larger and starts
+/// another one where it stopped.
 enum class Need : std::uint32_t { nothing, cells, candidates, spheres, grid };
 
 /// A candidate in a chain of its bucket.

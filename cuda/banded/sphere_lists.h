@@ -1,7 +1,7 @@
 #pragma once
 
 #include "cuda/atomics.h"
-#include "cuda/banded/cooperative_grid.h"
+#include "cuda/banded/coop_launch.h"
 #include "packing/base/sphere_grid_layout.h"
 
 namespace ist::gpu {

@@ -10,11 +10,11 @@
 #include "packing/banded/mesh_surface.h"
 #include "packing/base/packing_settings.h"
 #include "samples/samples.h"
-#include "support/host_coop_grid.h"
+#include "support/host_coop_launch.h"
 #include "support/same_packing.h"
 #include "support/test_meshes.h"
 
-// The GPU's banded packing, run by a cooperative grid of host threads: the same spheres as the
+// The GPU's banded packing, run by a cooperative launch of host threads: the same spheres as the
 // CPU's packer, whatever the number of teams and however small its arrays are at first.
 
 namespace ist::testing {
@@ -68,7 +68,7 @@ GridOfTeams pack_by_grid(const MeshSolid& solid, const PackingSettings& settings
   for (;;) {
     gpu::BandedArrays arrays = buffers.arrays();
     arrays.many = many;
-    run_grid<packing::CellScratch<std::uint32_t>>(
+    run_launch<packing::CellScratch<std::uint32_t>>(
         teams, [&](auto& coop) { gpu::pack_banded(coop, arrays, surface); });
     ++out.launches;
     out.state = buffers.state();

@@ -4,8 +4,8 @@
 
 #include "cuda/atomics.h"
 
-// A cooperative grid is all the teams that do one packing together: the warps of a kernel, or a few
-// threads of the host (tests). Steps are templates over it. It has
+// A cooperative launch is all the teams that do one packing together: the warps of a kernel, or a
+// few threads of the host (tests). Steps are templates over it. It has
 //
 //   using Team;             const Team& team() const;
 //   using Lane;             a team of one of its lanes
@@ -18,14 +18,14 @@
 namespace ist::gpu {
 
 /// Calls work(i) for all i < count, a team an item, a fixed share each: for items of equal work.
-template <class CoopGrid, class Work>
-IST_HD void distribute_statically(CoopGrid& coop, std::uint32_t count, const Work& work) {
+template <class CoopLaunch, class Work>
+IST_HD void distribute_statically(CoopLaunch& coop, std::uint32_t count, const Work& work) {
   for (std::uint32_t i = coop.index(); i < count; i += coop.size()) work(i);
 }
 
 /// The same, each team taking the next item when it is done with one. `taken` starts at 0.
-template <class CoopGrid, class Work>
-IST_HD void distribute_dynamically(CoopGrid& coop, std::uint32_t count, std::uint32_t* taken,
+template <class CoopLaunch, class Work>
+IST_HD void distribute_dynamically(CoopLaunch& coop, std::uint32_t count, std::uint32_t* taken,
                                    const Work& work) {
   std::uint32_t i = coop.index();
   while (i < count) {
@@ -37,9 +37,9 @@ IST_HD void distribute_dynamically(CoopGrid& coop, std::uint32_t count, std::uin
 
 /// Calls work(i) for all i < count, a lane an item. A team's lanes come together: where i ≥ count,
 /// `work` is called all the same and must only take part in what the team does together.
-template <class CoopGrid, class Work>
-IST_HD void distribute_to_lanes(CoopGrid& coop, std::uint32_t count, const Work& work) {
-  constexpr auto kWidth = static_cast<std::uint32_t>(CoopGrid::Team::kWidth);
+template <class CoopLaunch, class Work>
+IST_HD void distribute_to_lanes(CoopLaunch& coop, std::uint32_t count, const Work& work) {
+  constexpr auto kWidth = static_cast<std::uint32_t>(CoopLaunch::Team::kWidth);
   const std::uint32_t stride = coop.size() * kWidth;
   for (std::uint32_t base = coop.index() * kWidth; base < count; base += stride)
     work(base + static_cast<std::uint32_t>(coop.team().lane()));

@@ -6,14 +6,14 @@
 #include <thread>
 #include <vector>
 
-#include "cuda/banded/cooperative_grid.h"
+#include "cuda/banded/coop_launch.h"
 #include "numerics/team.h"
 
 namespace ist::testing {
 
-/// A cooperative grid (cuda/banded/cooperative_grid.h) of host threads, each a team of one.
+/// A cooperative launch (cuda/banded/coop_launch.h) of host threads, each a team of one.
 template <class Scratch_>
-class HostCoopGrid {
+class HostCoopLaunch {
  public:
   using Team = SerialTeam;
   using Lane = SerialTeam;
@@ -25,7 +25,7 @@ class HostCoopGrid {
     std::uint32_t here = 0, generation = 0;
   };
 
-  HostCoopGrid(Meeting& meeting, std::uint32_t index, std::uint32_t size)
+  HostCoopLaunch(Meeting& meeting, std::uint32_t index, std::uint32_t size)
       : meeting_(meeting), index_(index), size_(size) {}
 
   const Team& team() const { return team_; }
@@ -58,12 +58,12 @@ class HostCoopGrid {
 
 /// Calls work(coop) in `size` threads.
 template <class Scratch, class Work>
-void run_grid(std::uint32_t size, const Work& work) {
-  typename HostCoopGrid<Scratch>::Meeting meeting;
+void run_launch(std::uint32_t size, const Work& work) {
+  typename HostCoopLaunch<Scratch>::Meeting meeting;
   std::vector<std::thread> threads;
   for (std::uint32_t i = 0; i < size; ++i)
     threads.emplace_back([&, i] {
-      HostCoopGrid<Scratch> coop(meeting, i, size);
+      HostCoopLaunch<Scratch> coop(meeting, i, size);
       work(coop);
     });
   for (std::thread& thread : threads) thread.join();
