@@ -9,11 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "cuda/grids/device_grid_rounds.h"
 #include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
 #include "samples/samples.h"
+#include "support/grid_history.h"
 #include "support/shared_data.h"
 #include "timing.h"
 
@@ -23,7 +23,8 @@ using ist::GridMode;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::wall_seconds;
-using History = std::vector<ist::packing::GridRound>;
+using ist::testing::GridRound;
+using History = std::vector<GridRound>;
 
 struct Mode {
   GridMode mode;
@@ -68,10 +69,8 @@ class MeshOnGrids {
       std::size_t peak = 0;
       for (int run = 0; run < (report_.quick() ? 2 : 4); ++run) {
         ist::gpu::Queue queue{ist::GpuSettings{}};
-        History history;
         const double start = wall_seconds();
-        ist::Stage stage("pack", {});
-        ist::gpu::pack_grids(queue, solid_, settings_, stage, &history);
+        History history = ist::testing::history_on_grids(queue, solid_, settings_);
         if (run > 0) runs.emplace_back(wall_seconds() - start, std::move(history));
         peak = queue.peak_bytes();
       }
@@ -82,7 +81,7 @@ class MeshOnGrids {
       const double before = std::max(0.0, seconds - history.back().seconds);
       Curve& curve = curves_[grid.name];
       curve.upload = before;
-      for (const ist::packing::GridRound& r : history) {
+      for (const GridRound& r : history) {
         curve.seconds.push_back(before + r.seconds);
         curve.coverage.push_back(r.coverage);
         curve.spheres.push_back(r.spheres);
@@ -91,12 +90,12 @@ class MeshOnGrids {
                                {"ms", 1e3 * (before + r.seconds)},
                                {"spheres", r.spheres},
                                {"coverage", r.coverage},
-                               {"prototypes", r.use.prototypes},
-                               {"cells", r.use.cells},
-                               {"active cells", r.use.active_cells},
-                               {"grid MB", static_cast<double>(r.use.bytes) / 1e6},
-                               {"dense MB", static_cast<double>(r.use.dense_bytes) / 1e6},
-                               {"hashed", r.use.hashed}});
+                               {"prototypes", r.prototypes},
+                               {"cells", r.cells},
+                               {"active cells", r.active_cells},
+                               {"grid MB", static_cast<double>(r.bytes) / 1e6},
+                               {"dense MB", static_cast<double>(r.dense_bytes) / 1e6},
+                               {"hashed", r.hashed}});
       }
       report_.row("Whole packing", {{"mesh", name_},
                                     {"grid", grid.name},

@@ -22,9 +22,8 @@ class DeviceGridRounds {
                                          const packing::GoOn& go_on);
   void append(const std::vector<Sphere>& spheres);
   void update() { grid_.update(); }
-  packing::GridUse use() const;
 
- private:
+ protected:
   Queue& queue_;
   DeviceGrid grid_;
   DevicePrototypes prototypes_;
@@ -33,6 +32,6 @@ class DeviceGridRounds {
 /// Packs a mesh on the paper's grids (settings.grid, not banded): the same bytes as
 /// packing::pack_grids().
 SpherePacking pack_grids(Queue& queue, const MeshSolid& solid, const PackingSettings& settings,
-                         Stage& stage, std::vector<packing::GridRound>* history = nullptr);
+                         Stage& stage);
 
 }  // namespace ist::gpu

@@ -9,6 +9,7 @@
 #include "stage/thread_arena.h"
 #include "support/certified_packing.h"
 #include "support/gpu_test.h"
+#include "support/grid_history.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
@@ -103,13 +104,11 @@ TEST_F(GridPackingGpuTest, TheMemoryOfInactiveCellsIsGivenBack) {
   gpu::Queue queue{GpuSettings{}};
   PackingSettings settings = small(GridMode::implicit_refinement, 300);
   settings.grids.resolution = 128;
-  std::vector<packing::GridRound> history;
-  Stage stage("pack", {});
-  gpu::pack_grids(queue, solid, settings, stage, &history);
+  const std::vector<testing::GridRound> history = testing::history_on_grids(queue, solid, settings);
   ASSERT_GE(history.size(), 3u);
-  EXPECT_LT(history.back().use.active_cells, history.front().use.active_cells / 3);
-  EXPECT_LT(history.back().use.bytes, history.front().use.bytes / 2);
-  EXPECT_LT(history.back().use.bytes, history.back().use.dense_bytes / 5);
+  EXPECT_LT(history.back().active_cells, history.front().active_cells / 3);
+  EXPECT_LT(history.back().bytes, history.front().bytes / 2);
+  EXPECT_LT(history.back().bytes, history.back().dense_bytes / 5);
 }
 
 TEST_F(GridPackingGpuTest, TheSameMedialNodes) {

@@ -14,27 +14,6 @@ struct GridWinner {
   double room = 0;
 };
 
-/// What the grids hold at a time.
-struct GridUse {
-  std::size_t cells = 0;         ///< of the distance grid
-  std::size_t active_cells = 0;  ///< of these
-  std::size_t prototypes = 0;    ///< placed in the last round
-  std::size_t bytes = 0;         ///< of both grids: words or hash table, records, lists, prototypes
-  std::size_t dense_bytes = 0;   ///< of the same with a record and a prototype for every cell
-  bool hashed = false;           ///< the distance grid stands in a hash table
-};
-
-/// Of a prototype: its cell's id and its candidate.
-constexpr std::size_t kPrototypeBytes = sizeof(std::uint32_t) + sizeof(GridCandidate);
-
-/// What dense grids would hold: a record with a word for each cell, a prototype for each cell of
-/// the prototype grid, and the same lists.
-inline std::size_t dense_grid_bytes(std::size_t cells, std::size_t prototype_cells,
-                                    std::size_t list_bytes) {
-  return cells * (sizeof(CellRecord) + sizeof(std::uint32_t)) + prototype_cells * kPrototypeBytes +
-         list_bytes;
-}
-
 /// Called between pieces of a round's work; false: give up.
 using GoOn = std::function<bool()>;
 
@@ -48,6 +27,5 @@ using GoOn = std::function<bool()>;
 //   converged(settings, go_on)  std::vector<GridCandidate>, all that converged, in any order
 //   append(spheres)           they count after the next update() or build()
 //   update()                  lists, active cells and discrete distances after append()
-//   use()                     GridUse
 
 }  // namespace ist::packing

@@ -73,7 +73,8 @@ GridScene HostGrid::scene(const std::vector<Sphere>& spheres) const {
 }
 
 std::size_t HostGrid::bytes() const {
-  return 4 * (words_.size() + keys_.size()) + list_bytes() + sizeof(CellRecord) * records_.size();
+  return 4 * (words_.size() + keys_.size() + triangle_lists_.size() + sphere_lists_.size()) +
+         sizeof(CellRecord) * records_.size();
 }
 
 void HostGrid::build(const GridLayout& layout, const std::vector<Sphere>& spheres) {

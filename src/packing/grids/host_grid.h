@@ -26,7 +26,6 @@ class HostGrid {
   std::size_t cells() const { return layout_.count(); }
   std::size_t active_cells() const { return active_; }
   std::size_t bytes() const;
-  std::size_t list_bytes() const { return 4 * (triangle_lists_.size() + sphere_lists_.size()); }
   bool hashed() const { return !keys_.empty(); }
 
  private:

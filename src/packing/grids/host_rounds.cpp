@@ -168,15 +168,4 @@ void HostRounds::update() {
   listed_ = spheres_.size();
 }
 
-GridUse HostRounds::use() const {
-  GridUse u;
-  u.cells = grid_.cells();
-  u.active_cells = grid_.active_cells();
-  u.prototypes = cells_.size();
-  u.bytes = grid_.bytes() + cells_.size() * kPrototypeBytes;
-  u.dense_bytes = dense_grid_bytes(grid_.cells(), prototypes_.count(), grid_.list_bytes());
-  u.hashed = grid_.hashed();
-  return u;
-}
-
 }  // namespace ist::packing

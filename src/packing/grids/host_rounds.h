@@ -22,7 +22,6 @@ class HostRounds {
   std::vector<GridWinner> round(const AscentSettings& settings, const GoOn& go_on);
   void append(const std::vector<Sphere>& spheres);
   void update();
-  GridUse use() const;
 
  private:
   HostGrid grid_;

@@ -19,14 +19,9 @@ GridFigures grid_figures(const MeshSolid& solid, std::size_t memory) {
   return figures;
 }
 
-SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage,
-                         std::vector<GridRound>* history) {
+SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage) {
   constexpr std::size_t kHostMemory = std::size_t{512} << 20;
-  const GridSchedule schedule =
-      grid_schedule(settings.grid, settings.grids, grid_figures(solid, kHostMemory));
-  const PackingLimits limits = packing_limits(solid, solid.frame().scale(), settings);
-  HostRounds rounds(solid.arrays());
-  return GridPacker(rounds, schedule, limits, stage, history).run();
+  return pack_grids_by(HostRounds(solid.arrays()), solid, settings, kHostMemory, stage);
 }
 
 }  // namespace ist::packing

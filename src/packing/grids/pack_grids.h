@@ -13,15 +13,6 @@
 
 namespace ist::packing {
 
-/// A round, for whoever wants the history.
-struct GridRound {
-  double seconds = 0;  ///< since the start, at the end of the round
-  std::size_t spheres = 0;
-  double coverage = 0;
-  double radius = 0;  ///< largest inserted in the round, unit frame; 0: none
-  GridUse use;
-};
-
 // Float distances to a grid's lists are good to a few 2^-23: nothing below this is told apart. The
 // banded mode certifies as it goes, and goes down to a quarter of it.
 constexpr float kSmallestGridRadius = 0x1p-21f;
@@ -33,12 +24,11 @@ template <class Rounds>
 class GridPacker {
  public:
   GridPacker(Rounds& rounds, const GridSchedule& schedule, const PackingLimits& limits,
-             Stage& stage, std::vector<GridRound>* history)
+             Stage& stage)
       : rounds_(rounds),
         schedule_(schedule),
         limits_(limits),
         stage_(stage),
-        history_(history),
         prototypes_(schedule.level(schedule.prototypes)),
         distances_(schedule.distances) {}
 
@@ -95,7 +85,6 @@ class GridPacker {
     }
     ++result_.rounds;
     if (!stopped_) rounds_.append(inserted);
-    record(inserted.empty() ? 0 : double{inserted.front().r});
     return !inserted.empty();
   }
 
@@ -109,12 +98,6 @@ class GridPacker {
       rounds_.update();
     }
     rounds_.split_prototypes();
-  }
-
-  void record(double radius) {
-    if (history_ == nullptr) return;
-    history_->push_back(
-        {stage_.elapsed(), result_.spheres.size(), coverage(), radius, rounds_.use()});
   }
 
   double coverage() const {
@@ -140,7 +123,6 @@ class GridPacker {
   const GridSchedule& schedule_;
   const PackingLimits& limits_;
   Stage& stage_;
-  std::vector<GridRound>* const history_;
   GridLayout prototypes_;
   int distances_;
   SpherePacking result_;
@@ -154,9 +136,18 @@ class GridPacker {
 /// What grid sizes are picked from; `memory` [bytes] for the grids.
 GridFigures grid_figures(const MeshSolid& solid, std::size_t memory);
 
-/// Packs a mesh on the paper's grids (settings.grid, not banded) with the threads of the current
-/// arena.
-SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage,
-                         std::vector<GridRound>* history = nullptr);
+/// Packs a mesh on the paper's grids (settings.grid, not banded) by the rounds of a host or a
+/// device (grid_rounds.h).
+template <class Rounds>
+SpherePacking pack_grids_by(Rounds&& rounds, const MeshSolid& solid,
+                            const PackingSettings& settings, std::size_t memory, Stage& stage) {
+  const GridSchedule schedule =
+      grid_schedule(settings.grid, settings.grids, grid_figures(solid, memory));
+  const PackingLimits limits = packing_limits(solid, solid.frame().scale(), settings);
+  return GridPacker(rounds, schedule, limits, stage).run();
+}
+
+/// The same with the threads of the current arena.
+SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage);
 
 }  // namespace ist::packing
