@@ -5,7 +5,8 @@
 #include "cuda/bake/on_gpu.h"
 #include "cuda/banded/banded_pack.h"
 #include "cuda/device_mesh.h"
-#include "cuda/grids/device_grid_rounds.h"
+#include "cuda/grids/device_rounds.h"
+#include "cuda/grids/pack_grids.h"
 #include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
 #include "packing/base/packing_settings.h"
@@ -40,7 +41,7 @@ class CudaBackend final : public SolidBackend {
   }
 
   std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
-    return packing::medial_nodes_by(DeviceGridRounds(queue_, solid_.arrays()), solid_, settings);
+    return packing::medial_nodes_by(DeviceRounds(queue_, solid_.arrays()), solid_, settings);
   }
 
   RelaxedSites relax_sites(const RelaxTask& task,

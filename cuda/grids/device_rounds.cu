@@ -195,58 +195,58 @@ enum Counter { kKept, kNext, kAhead, kWinners };
 
 }  // namespace
 
-std::uint32_t DevicePrototypes::read_counter(int which) {
+std::uint32_t DeviceRounds::read_counter(int which) {
   return counters_.to_host(4)[static_cast<std::size_t>(which)];
 }
 
-void DevicePrototypes::place(const packing::GridLayout& layout) {
-  layout_ = layout;
+void DeviceRounds::place_prototypes(const packing::GridLayout& layout) {
+  prototypes_ = layout;
   count_ = layout.count();
-  cells_ = DeviceArray<std::uint32_t>(*queue_, count_);
-  number_cells<<<blocks_for(count_, kThreads), kThreads, 0, queue_->stream()>>>(
+  cells_ = DeviceArray<std::uint32_t>(queue_, count_);
+  number_cells<<<blocks_for(count_, kThreads), kThreads, 0, queue_.stream()>>>(
       cells_.data(), static_cast<std::uint32_t>(count_));
   check_launch("placing prototypes");
 }
 
-void DevicePrototypes::split() {
-  const GridLayout coarse = layout_;
-  layout_ = packing::refined(coarse);
-  DeviceArray<std::uint32_t> children(*queue_, 8 * count_);
-  split_cells<<<blocks_for(8 * count_, kThreads), kThreads, 0, queue_->stream()>>>(
-      coarse, layout_, cells_.data(), static_cast<std::uint32_t>(count_), children.data());
+void DeviceRounds::split_prototypes() {
+  const GridLayout coarse = prototypes_;
+  prototypes_ = packing::refined(coarse);
+  DeviceArray<std::uint32_t> children(queue_, 8 * count_);
+  split_cells<<<blocks_for(8 * count_, kThreads), kThreads, 0, queue_.stream()>>>(
+      coarse, prototypes_, cells_.data(), static_cast<std::uint32_t>(count_), children.data());
   check_launch("splitting prototype cells");
   cells_ = std::move(children);
   count_ *= 8;
 }
 
-bool DevicePrototypes::converge(const GridScene& scene, const packing::AscentSettings& settings,
-                                const packing::GoOn& go_on) {
-  const cudaStream_t stream = queue_->stream();
+bool DeviceRounds::converge(const packing::AscentSettings& settings, const packing::GoOn& go_on) {
+  const GridScene scene = grid_.scene();
+  const cudaStream_t stream = queue_.stream();
   candidates_.release();
   counters_.fill_bytes(0);
-  DeviceArray<std::uint32_t> kept(*queue_, count_);
+  DeviceArray<std::uint32_t> kept(queue_, count_);
   const auto before = static_cast<std::uint32_t>(count_);
-  if (scene.grid.layout.level > layout_.level + 1)
+  if (scene.grid.layout.level > prototypes_.level + 1)
     keep_active_cells<true><<<blocks_for(before, kWarps), kThreads, 0, stream>>>(
-        scene, layout_, cells_.data(), before, kept.data(), counters_.data() + kKept);
+        scene, prototypes_, cells_.data(), before, kept.data(), counters_.data() + kKept);
   else
     keep_active_cells<false><<<blocks_for(before, kThreads), kThreads, 0, stream>>>(
-        scene, layout_, cells_.data(), before, kept.data(), counters_.data() + kKept);
+        scene, prototypes_, cells_.data(), before, kept.data(), counters_.data() + kKept);
   check_launch("looking for active cells");
   count_ = read_counter(kKept);
   if (8 * count_ < 7 * kept.size()) {
-    cells_ = DeviceArray<std::uint32_t>(*queue_, count_);
+    cells_ = DeviceArray<std::uint32_t>(queue_, count_);
     check(cudaMemcpyAsync(cells_.data(), kept.data(), count_ * sizeof(std::uint32_t),
                           cudaMemcpyDeviceToDevice, stream),
           "keeping active cells");
   } else {
     cells_ = std::move(kept);
   }
-  candidates_ = DeviceArray<GridCandidate>(*queue_, count_);
+  candidates_ = DeviceArray<GridCandidate>(queue_, count_);
   constexpr std::size_t kChunk = std::size_t{1} << 17;  // between two looks at clock and progress
   for (std::size_t from = 0; from < count_; from += kChunk) {
     const std::size_t end = std::min(count_, from + kChunk);
-    const auto most = static_cast<std::size_t>(16 * queue_->multiprocessors());
+    const auto most = static_cast<std::size_t>(16 * queue_.multiprocessors());
     // Every warp takes one number too many.
     const auto next = static_cast<std::uint32_t>(from);
     check(cudaMemcpyAsync(counters_.data() + kNext, &next, sizeof next, cudaMemcpyHostToDevice,
@@ -263,31 +263,39 @@ bool DevicePrototypes::converge(const GridScene& scene, const packing::AscentSet
           scene, settings, cells_.data(), last, counters_.data() + kNext, candidates_.data());
     }
     check_launch("letting prototypes converge");
-    if (count_ > kChunk) queue_->wait();
+    if (count_ > kChunk) queue_.wait();
     if (!go_on()) return false;
   }
   return true;
 }
 
-std::vector<GridWinner> DevicePrototypes::winners(const GridScene& scene) {
-  if (count_ == 0) return {};
-  const cudaStream_t stream = queue_->stream();
+std::vector<GridCandidate> DeviceRounds::converged(const packing::AscentSettings& settings,
+                                                   const packing::GoOn& go_on) {
+  if (!converge(settings, go_on)) return {};
+  return candidates_.to_host(count_);
+}
+
+std::vector<GridWinner> DeviceRounds::round(const packing::AscentSettings& settings,
+                                            const packing::GoOn& go_on) {
+  if (!converge(settings, go_on) || count_ == 0) return {};
+  const GridScene scene = grid_.scene();
+  const cudaStream_t stream = queue_.stream();
   const auto count = static_cast<std::uint32_t>(count_);
-  DeviceArray<std::uint32_t> ahead(*queue_, count_);
+  DeviceArray<std::uint32_t> ahead(queue_, count_);
   {
     const std::size_t size = packing::hash_size(count_);
-    DeviceArray<std::uint32_t> keys(*queue_, size), values(*queue_, size);
+    DeviceArray<std::uint32_t> keys(queue_, size), values(queue_, size);
     keys.fill_bytes(0xFF);
     const auto mask = static_cast<std::uint32_t>(size - 1);
     fill_table<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
         cells_.data(), count, keys.data(), values.data(), mask);
     select_ahead<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
-        layout_, CellTable{keys.data(), values.data(), mask}, candidates_.data(), count,
+        prototypes_, CellTable{keys.data(), values.data(), mask}, candidates_.data(), count,
         ahead.data(), counters_.data() + kAhead);
     check_launch("selecting prototypes");
   }
-  DeviceArray<std::uint32_t> winners(*queue_, count_);
-  const auto most = static_cast<std::size_t>(16 * queue_->multiprocessors());
+  DeviceArray<std::uint32_t> winners(queue_, count_);
+  const auto most = static_cast<std::size_t>(16 * queue_.multiprocessors());
   select_winners<<<static_cast<unsigned>(std::min<std::size_t>(most, blocks_for(count, kWarps))),
                    kThreads, 0, stream>>>(candidates_.data(), ahead.data(),
                                           counters_.data() + kAhead, winners.data(),
@@ -295,11 +303,16 @@ std::vector<GridWinner> DevicePrototypes::winners(const GridScene& scene) {
   check_launch("selecting prototypes");
   const std::uint32_t found = read_counter(kWinners);
   if (found == 0) return {};
-  DeviceArray<GridWinner> certified(*queue_, found);
+  DeviceArray<GridWinner> certified(queue_, found);
   certify<<<blocks_for(found, kWarps), kThreads, 0, stream>>>(
       scene, candidates_.data(), winners.data(), found, certified.data());
   check_launch("certifying spheres");
   return certified.to_host(found);
+}
+
+void DeviceRounds::append(const std::vector<Sphere>& spheres) {
+  grid_.append(spheres.data(), spheres.size());
+  queue_.wait();  // the vector is the caller's
 }
 
 }  // namespace ist::gpu

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "cuda/grids/device_grid.h"
@@ -8,31 +7,34 @@
 
 namespace ist::gpu {
 
-/// The prototype grid in device memory and what a round does with it, a warp a prototype.
-class DevicePrototypes {
+/// The work of a grid packing's rounds on the GPU (packing/grids/grid_rounds.h says what the calls
+/// do), a warp a prototype. Must not outlive the queue.
+class DeviceRounds {
  public:
-  explicit DevicePrototypes(Queue& queue) : queue_(&queue), counters_(queue, 4) {}
+  /// `mesh`'s exact arrays are in use until the first round.
+  DeviceRounds(Queue& queue, const MeshView& mesh)
+      : queue_(queue), grid_(queue, mesh), counters_(queue, 4) {}
 
-  void place(const packing::GridLayout& layout);
-  void split();
+  void build(const packing::GridLayout& layout) { grid_.build(layout); }
+  void place_prototypes(const packing::GridLayout& layout);
+  void split_prototypes();
+  std::vector<packing::GridCandidate> converged(const packing::AscentSettings& settings,
+                                                const packing::GoOn& go_on);
+  std::vector<packing::GridWinner> round(const packing::AscentSettings& settings,
+                                         const packing::GoOn& go_on);
+  void append(const std::vector<Sphere>& spheres);
+  void update() { grid_.update(); }
 
+ protected:
   /// Keeps the active cells and lets their prototypes converge; false if `go_on` gave up.
-  bool converge(const packing::GridScene& scene, const packing::AscentSettings& settings,
-                const packing::GoOn& go_on);
-  /// Of the last converge().
-  std::vector<packing::GridWinner> winners(const packing::GridScene& scene);
-  std::vector<packing::GridCandidate> candidates() const { return candidates_.to_host(count_); }
-
-  std::size_t count() const { return count_; }  ///< cells in the list
-  const packing::GridLayout& layout() const { return layout_; }
-
- private:
+  bool converge(const packing::AscentSettings& settings, const packing::GoOn& go_on);
   std::uint32_t read_counter(int which);
 
-  Queue* queue_;
-  packing::GridLayout layout_;
-  DeviceArray<std::uint32_t> cells_;
-  std::size_t count_ = 0;
+  Queue& queue_;
+  DeviceGrid grid_;
+  packing::GridLayout prototypes_;
+  DeviceArray<std::uint32_t> cells_;  ///< of the prototype grid, active as of the last round
+  std::size_t count_ = 0;             ///< of these
   DeviceArray<packing::GridCandidate> candidates_;
   DeviceArray<std::uint32_t> counters_;
 };

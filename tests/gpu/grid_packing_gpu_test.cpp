@@ -2,7 +2,7 @@
 
 #include <thread>
 
-#include "cuda/grids/device_grid_rounds.h"
+#include "cuda/grids/pack_grids.h"
 #include "cuda/queue.h"
 #include "mesh/mesh_solid.h"
 #include "samples/samples.h"

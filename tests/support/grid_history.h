@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "cuda/grids/device_grid_rounds.h"
-#include "cuda/queue.h"
+#include "cuda/grids/device_rounds.h"
+#include "packing/grids/pack_grids.h"
 
 namespace ist::testing {
 
@@ -22,13 +22,13 @@ struct GridRound {
 };
 
 /// The GPU's rounds, written down.
-class RecordedRounds : public gpu::DeviceGridRounds {
+class RecordedRounds : public gpu::DeviceRounds {
  public:
   RecordedRounds(gpu::Queue& queue, const MeshSolid& solid, Stage& stage)
-      : DeviceGridRounds(queue, solid.arrays()), volume_(solid.unit_volume()), stage_(stage) {}
+      : DeviceRounds(queue, solid.arrays()), volume_(solid.unit_volume()), stage_(stage) {}
 
   void append(const std::vector<Sphere>& spheres) {
-    DeviceGridRounds::append(spheres);
+    DeviceRounds::append(spheres);
     for (const Sphere& s : spheres) covered_ += packing::fixed_ball_volume(s.r, unit_);
     spheres_ += spheres.size();
     record(spheres_, std::min(1.0, static_cast<double>(covered_) * unit_ / volume_));
@@ -45,10 +45,9 @@ class RecordedRounds : public gpu::DeviceGridRounds {
     constexpr std::size_t kPrototype = sizeof(std::uint32_t) + sizeof(packing::GridCandidate);
     constexpr std::size_t kCell = sizeof(packing::CellRecord) + sizeof(std::uint32_t);
     const std::size_t cells = grid_.layout().count(), lists = grid_.list_bytes();
-    history_.push_back({stage_.elapsed(), spheres, coverage, prototypes_.count(), cells,
-                        grid_.active_cells(), grid_.bytes() + prototypes_.count() * kPrototype,
-                        cells * kCell + prototypes_.layout().count() * kPrototype + lists,
-                        grid_.hashed()});
+    history_.push_back({stage_.elapsed(), spheres, coverage, count_, cells, grid_.active_cells(),
+                        grid_.bytes() + count_ * kPrototype,
+                        cells * kCell + prototypes_.count() * kPrototype + lists, grid_.hashed()});
   }
 
   const double volume_;
