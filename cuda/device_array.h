@@ -55,6 +55,24 @@ class DeviceArray {
           "copying from the GPU");
   }
 
+  /// Copies the first `count` elements of another array to the front of this one.
+  void copy(const DeviceArray& from, std::size_t count) {
+    if (count == 0) return;
+    check(cudaMemcpyAsync(data_, from.data_, count * sizeof(T), cudaMemcpyDeviceToDevice,
+                          queue_->stream()),
+          "moving device memory");
+  }
+
+  /// One element, after waiting for it.
+  T at(std::size_t index) const {
+    T value;
+    check(cudaMemcpyAsync(&value, data_ + index, sizeof value, cudaMemcpyDeviceToHost,
+                          queue_->stream()),
+          "copying from the GPU");
+    queue_->wait();
+    return value;
+  }
+
   /// The first `count` elements, after waiting for them.
   std::vector<T> to_host(std::size_t count) const {
     std::vector<T> host(count);
@@ -67,10 +85,7 @@ class DeviceArray {
   void grow(std::size_t size, std::size_t kept) {
     if (size <= size_) return;
     DeviceArray larger(*queue_, size);
-    if (kept > 0)
-      check(cudaMemcpyAsync(larger.data_, data_, kept * sizeof(T), cudaMemcpyDeviceToDevice,
-                            queue_->stream()),
-            "moving device memory");
+    larger.copy(*this, kept);
     swap(larger);
   }
 

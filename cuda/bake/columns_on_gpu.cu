@@ -180,15 +180,9 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
     check_launch("drawing the mesh onto columns");
   };
   draw_all(nullptr);
-  check(cudaMemcpyAsync(first.data(), counts.data(), counts.bytes(), cudaMemcpyDeviceToDevice,
-                        stream),
-        "drawing the mesh onto columns");
+  first.copy(counts, counts.size());
   exclusive_sum(queue, first);
-  std::uint32_t crossing_count = 0;
-  check(cudaMemcpyAsync(&crossing_count, first.data() + line_count, sizeof crossing_count,
-                        cudaMemcpyDeviceToHost, stream),
-        "drawing the mesh onto columns");
-  queue.wait();
+  const std::uint32_t crossing_count = first.at(line_count);
   DeviceArray<Crossing> crossings(queue, crossing_count);
   draw_all(crossings.data());
 
@@ -201,7 +195,7 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
   write_spans<<<blocks_for(line_count, kThreads), kThreads, 0, stream>>>(
       crossings.data(), first.data(), line_count, first_.data(), spans_.data());
   check_launch("cutting columns");
-  length_ = static_cast<double>(length.to_host(1).front()) * kLengthUnit;
+  length_ = static_cast<double>(length.at(0)) * kLengthUnit;
 }
 
 void ColumnsOnGpu::flag(Queue& queue) {

@@ -169,9 +169,7 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
       to.lists.grow(std::size_t{seen.listed} * 3 / 2, 0);
       scratch.grow(std::size_t{seen.scratch} * 3 / 2, 0);
     }
-    check(cudaMemcpyAsync(extension.data(), raised.data(), raised.bytes(), cudaMemcpyDeviceToDevice,
-                          stream),
-          "cover radii");
+    extension.copy(raised, count);
     std::swap(from, to);
     cells = seen.cells;
   }

@@ -38,7 +38,7 @@ double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sp
   find_protrusion<<<blocks_for(count, kWarps), kThreads, 0, queue.stream()>>>(
       mesh, on_device.data(), count, reinterpret_cast<unsigned long long*>(largest.data()));
   check_launch("measuring protrusions");
-  return largest.to_host(1).front();
+  return largest.at(0);
 }
 
 }  // namespace ist::gpu

@@ -198,8 +198,6 @@ GridScene DeviceGrid::scene() const {
   return scene;
 }
 
-std::uint32_t DeviceGrid::read_counter() { return counter_.to_host(1).front(); }
-
 void DeviceGrid::append(const Sphere* spheres, std::size_t count) {
   if (sphere_count_ + count > spheres_.size()) {
     const std::size_t room =
@@ -240,14 +238,7 @@ void DeviceGrid::build(const GridLayout& layout) {
       words_.data(), cells, slots.data());
   exclusive_sum(*queue_, slots);
   exclusive_sum(*queue_, counts);
-  std::uint32_t active = 0, listed = 0;
-  const auto last = [&](const DeviceArray<std::uint32_t>& sums, std::uint32_t& to) {
-    check(cudaMemcpyAsync(&to, sums.data() + cells, sizeof to, cudaMemcpyDeviceToHost, stream),
-          "reading a count");
-  };
-  last(slots, active);
-  last(counts, listed);
-  queue_->wait();
+  const std::uint32_t active = slots.at(cells), listed = counts.at(cells);
   if (active > DistanceGrid::kMostActive)
     throw Error("packing: more than 16 million active grid cells: set a smaller grid resolution");
   active_ = active;
@@ -289,7 +280,7 @@ void DeviceGrid::cover(std::size_t first_new) {
 }
 
 void DeviceGrid::drop_inactive() {
-  active_ -= read_counter();
+  active_ -= counter_.at(0);
   const std::size_t count = records_.size();
   if (8 * (count - active_) < count) return;
   const cudaStream_t stream = queue_->stream();
@@ -338,13 +329,8 @@ void DeviceGrid::list_spheres() {
   take_sphere_counts<<<blocks_for(std::size_t{count} + 1, kThreads), kThreads, 0, stream>>>(
       records_.data(), count, begins.data());
   exclusive_sum(*queue_, begins);
-  std::uint32_t listed = 0;
-  check(cudaMemcpyAsync(&listed, begins.data() + count, sizeof listed, cudaMemcpyDeviceToHost,
-                        stream),
-        "reading a count");
-  queue_->wait();
   sphere_lists_.release();
-  sphere_lists_ = DeviceArray<std::uint32_t>(*queue_, listed);
+  sphere_lists_ = DeviceArray<std::uint32_t>(*queue_, begins.at(count));
   place_sphere_lists<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count,
                                                                            begins.data());
   list(sphere_lists_.data());

@@ -38,7 +38,6 @@ class DeviceGrid {
   void hash_words();
   void list_spheres();
   void measure_distances();
-  std::uint32_t read_counter();
 
   Queue* queue_;
   std::uint32_t triangle_count_;

@@ -195,10 +195,6 @@ enum Counter { kKept, kNext, kAhead, kWinners };
 
 }  // namespace
 
-std::uint32_t DeviceRounds::read_counter(int which) {
-  return counters_.to_host(4)[static_cast<std::size_t>(which)];
-}
-
 void DeviceRounds::place_prototypes(const packing::GridLayout& layout) {
   prototypes_ = layout;
   count_ = layout.count();
@@ -233,12 +229,10 @@ bool DeviceRounds::converge(const packing::AscentSettings& settings, const packi
     keep_active_cells<false><<<blocks_for(before, kThreads), kThreads, 0, stream>>>(
         scene, prototypes_, cells_.data(), before, kept.data(), counters_.data() + kKept);
   check_launch("looking for active cells");
-  count_ = read_counter(kKept);
+  count_ = counters_.at(kKept);
   if (8 * count_ < 7 * kept.size()) {
     cells_ = DeviceArray<std::uint32_t>(queue_, count_);
-    check(cudaMemcpyAsync(cells_.data(), kept.data(), count_ * sizeof(std::uint32_t),
-                          cudaMemcpyDeviceToDevice, stream),
-          "keeping active cells");
+    cells_.copy(kept, count_);
   } else {
     cells_ = std::move(kept);
   }
@@ -301,7 +295,7 @@ std::vector<GridWinner> DeviceRounds::round(const packing::AscentSettings& setti
                                           counters_.data() + kAhead, winners.data(),
                                           counters_.data() + kWinners);
   check_launch("selecting prototypes");
-  const std::uint32_t found = read_counter(kWinners);
+  const std::uint32_t found = counters_.at(kWinners);
   if (found == 0) return {};
   DeviceArray<GridWinner> certified(queue_, found);
   certify<<<blocks_for(found, kWarps), kThreads, 0, stream>>>(

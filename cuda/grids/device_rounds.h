@@ -28,7 +28,6 @@ class DeviceRounds {
  protected:
   /// Keeps the active cells and lets their prototypes converge; false if `go_on` gave up.
   bool converge(const packing::AscentSettings& settings, const packing::GoOn& go_on);
-  std::uint32_t read_counter(int which);
 
   Queue& queue_;
   DeviceGrid grid_;
