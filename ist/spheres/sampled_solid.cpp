@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <numeric>
 #include <unordered_set>
 
 #include "mesh/edge_table.h"
@@ -16,149 +14,6 @@
 
 namespace ist {
 namespace {
-
-/// Points that are asked for the nearest one and for those within reach: a k-d tree.
-class PointTree {
- public:
-  struct Nearest {
-    double distance2 = std::numeric_limits<double>::infinity();
-    std::uint32_t index = UINT32_MAX;  ///< smallest among equals; UINT32_MAX: no point is nearer
-  };
-
-  PointTree() = default;
-  explicit PointTree(const std::vector<Eigen::Vector3d>& points);
-
-  bool empty() const { return points_.empty(); }
-
-  /// The nearest point closer than √limit2.
-  Nearest nearest(const Eigen::Vector3d& p,
-                  double limit2 = std::numeric_limits<double>::infinity()) const;
-
-  /// Calls visit(index, distance²) for every point within `radius`, in an order of the tree's own.
-  template <class Visit>
-  void within(const Eigen::Vector3d& p, double radius, const Visit& visit) const {
-    if (points_.empty() || !(radius >= 0)) return;
-    const double radius2 = radius * radius;
-    std::array<std::uint32_t, kDeepest> stack;
-    int top = 0;
-    stack[static_cast<std::size_t>(top++)] = 0;
-    while (top > 0) {
-      const Node& node = nodes_[stack[static_cast<std::size_t>(--top)]];
-      if (box_distance2(node, p) > radius2) continue;
-      if (node.left != 0) {
-        stack[static_cast<std::size_t>(top++)] = node.left;
-        stack[static_cast<std::size_t>(top++)] = node.left + 1;
-        continue;
-      }
-      for (std::uint32_t i = node.first; i < node.last; ++i) {
-        const double d2 = (points_[i] - p).squaredNorm();
-        if (d2 <= radius2) visit(order_[i], d2);
-      }
-    }
-  }
-
- private:
-  static constexpr std::size_t kDeepest = 96;
-  static constexpr std::uint32_t kLeaf = 8;  ///< points a leaf
-
-  struct Node {
-    std::array<double, 3> low, high;
-    std::uint32_t first, last;
-    std::uint32_t left = 0;  ///< of two children side by side; 0: a leaf
-  };
-
-  static double box_distance2(const Node& node, const Eigen::Vector3d& p) {
-    double sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double x = p[static_cast<int>(k)];
-      const double below = node.low[k] - x, above = x - node.high[k];
-      const double out = below > above ? below : above;
-      if (out > 0) sum += out * out;
-    }
-    return sum;
-  }
-
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Eigen::Vector3d> points_;  ///< in the tree's order
-};
-
-PointTree::PointTree(const std::vector<Eigen::Vector3d>& points) {
-  if (points.empty()) return;
-  order_.resize(points.size());
-  std::iota(order_.begin(), order_.end(), 0u);
-  nodes_.reserve(points.size() / 2 + 2);
-  nodes_.push_back({{}, {}, 0, static_cast<std::uint32_t>(points.size())});
-  for (std::size_t n = 0; n < nodes_.size(); ++n) {
-    Node node = nodes_[n];
-    node.low.fill(std::numeric_limits<double>::infinity());
-    node.high.fill(-std::numeric_limits<double>::infinity());
-    for (std::uint32_t i = node.first; i < node.last; ++i) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double x = points[order_[i]][static_cast<int>(k)];
-        node.low[k] = std::min(node.low[k], x);
-        node.high[k] = std::max(node.high[k], x);
-      }
-    }
-    if (node.last - node.first > kLeaf) {
-      int axis = 0;
-      double longest = -1;
-      for (std::size_t k = 0; k < 3; ++k) {
-        if (node.high[k] - node.low[k] > longest) {
-          longest = node.high[k] - node.low[k];
-          axis = static_cast<int>(k);
-        }
-      }
-      const std::uint32_t middle = node.first + (node.last - node.first) / 2;
-      std::nth_element(order_.begin() + node.first, order_.begin() + middle,
-                       order_.begin() + node.last, [&](std::uint32_t a, std::uint32_t b) {
-                         const double x = points[a][axis], y = points[b][axis];
-                         return x < y || (x == y && a < b);
-                       });
-      node.left = static_cast<std::uint32_t>(nodes_.size());
-      nodes_.push_back({{}, {}, node.first, middle});
-      nodes_.push_back({{}, {}, middle, node.last});
-    }
-    nodes_[n] = node;
-  }
-  points_.reserve(points.size());
-  for (const std::uint32_t i : order_) points_.push_back(points[i]);
-}
-
-PointTree::Nearest PointTree::nearest(const Eigen::Vector3d& p, double limit2) const {
-  Nearest best;
-  best.distance2 = limit2;
-  if (points_.empty()) return best;
-  struct Entry {
-    std::uint32_t node;
-    double distance2;
-  };
-  std::array<Entry, kDeepest> stack;
-  std::size_t top = 0;
-  stack[top++] = {0, box_distance2(nodes_[0], p)};
-  while (top > 0) {
-    const Entry entry = stack[--top];
-    if (entry.distance2 > best.distance2) continue;
-    const Node& node = nodes_[entry.node];
-    if (node.left != 0) {
-      Entry near = {node.left, box_distance2(nodes_[node.left], p)};
-      Entry far = {node.left + 1, box_distance2(nodes_[node.left + 1], p)};
-      if (far.distance2 < near.distance2) std::swap(near, far);
-      stack[top++] = far;
-      stack[top++] = near;
-      continue;
-    }
-    for (std::uint32_t i = node.first; i < node.last; ++i) {
-      const double d2 = (points_[i] - p).squaredNorm();
-      if (d2 < best.distance2 ||
-          (d2 == best.distance2 && order_[i] < best.index && best.index != UINT32_MAX)) {
-        best.distance2 = d2;
-        best.index = order_[i];
-      }
-    }
-  }
-  return best;
-}
 
 using Eigen::Vector3d;
 
@@ -336,10 +191,15 @@ SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets) {
     sample_face(face, out.spacing / 2, thin_fine, fine);
   }
   // Balls near edges are small, so that rays stand close there; elsewhere as far apart as targets.
-  const PointTree on_edges(edges.points);
+  const PointGrid on_edges(edges.points);
   const double close = 3 * out.spacing;
   std::erase_if(fine, [&](const Sample& s) {
-    return on_edges.nearest(s.point, close * close).index == UINT32_MAX;
+    bool is_close = false;
+    on_edges.within(s.point, close * (1 + 1e-5) + 1e-6, [&](std::uint32_t place, float) {
+      const Vector3d& p = edges.points[on_edges.index(place)];
+      is_close |= (p - s.point).squaredNorm() < close * close;
+    });
+    return !is_close;
   });
   fine.insert(fine.end(), coarse.begin(), coarse.end());
   fine.insert(fine.end(), edges.fans.begin(), edges.fans.end());
