@@ -1,7 +1,6 @@
 #include "mesh/mesh_solid.h"
 
 #include <ist/error.h>
-#include <oneapi/tbb/collaborative_call_once.h>
 #define XXH_INLINE_ALL
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -10,54 +9,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
-#include <optional>
 
-#include "mesh/bvh.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/resolve/resolve.h"
 #include "mesh/winding.h"
-#include "stage/raw_array.h"
 
 namespace ist {
-
-struct MeshSolid::Impl {
-  UnitFrame frame;
-  Eigen::AlignedBox3d bounds;
-  RawArray<double> vertices;  // unit frame
-  RawArray<std::uint32_t> triangles;
-  MeshView arrays;
-  double rounding = 0;  // unit frame
-  bool meets_itself = false, may_overlap = false;
-  std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs;
-
-  oneapi::tbb::collaborative_once_flag hierarchy_made, moments_made, hash_made;
-  std::uint64_t hash = 0;
-  Bvh bvh;
-  MeshView view;  // arrays and bvh
-  MeshMoments moments;
-
-  const MeshView& with_hierarchy() {
-    oneapi::tbb::collaborative_call_once(hierarchy_made, [this] {
-      bvh = build_bvh(vertices, triangles);
-      view = arrays;
-      view.nodes = bvh.nodes.get();
-      view.blocks = bvh.blocks.get();
-      view.root = bvh.root;
-    });
-    return view;
-  }
-
-  const MeshMoments& with_moments() {
-    // One shell that does not meet itself winds around no point twice.
-    oneapi::tbb::collaborative_call_once(moments_made, [this] {
-      const HierarchyMaker hierarchy = [this]() -> const MeshView& { return with_hierarchy(); };
-      moments = may_overlap ? winding_set_moments(arrays, meets_itself, hierarchy)
-                            : enclosed_moments(arrays);
-    });
-    return moments;
-  }
-};
 
 namespace {
 
@@ -103,7 +60,7 @@ std::uint64_t hash_mesh(const UnitFrame& frame, const RawArray<double>& vertices
 
 }  // namespace
 
-MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>()) {
+MeshSolid::MeshSolid(const ClosedMesh& closed) {
   const TriangleMesh& mesh = closed.mesh;
   if (mesh.triangles.empty())
     throw Error(closed.name + ": no triangles, so it does not bound a solid");
@@ -123,85 +80,85 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) : impl_(std::make_unique<Impl>())
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     if (place[v] == kUnused) continue;
     place[v] = count++;
-    impl_->bounds.extend(mesh.vertices[v]);
+    bounds_.extend(mesh.vertices[v]);
   }
-  impl_->frame = unit_frame(impl_->bounds);
-  impl_->vertices = RawArray<double>(3 * std::size_t{count});
+  frame_ = unit_frame(bounds_);
+  vertices_ = RawArray<double>(3 * std::size_t{count});
   using Range = tbb::blocked_range<std::size_t>;
-  impl_->rounding = tbb::parallel_reduce(
+  rounding_ = tbb::parallel_reduce(
       Range(0, mesh.vertices.size()), 0.0,
       [&](const Range& range, double most) {
-        const double scale = impl_->frame.scale();
+        const double scale = frame_.scale();
         for (std::size_t v = range.begin(); v != range.end(); ++v) {
           if (place[v] == kUnused) continue;
-          const Eigen::Vector3d x = impl_->frame.to_unit(mesh.vertices[v]);
+          const Eigen::Vector3d x = frame_.to_unit(mesh.vertices[v]);
           for (std::size_t k = 0; k < 3; ++k)
-            impl_->vertices[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
-          most = std::max(most, rounding_at(impl_->frame, scale, mesh.vertices[v]));
+            vertices_[3 * std::size_t{place[v]} + k] = x[static_cast<int>(k)];
+          most = std::max(most, rounding_at(frame_, scale, mesh.vertices[v]));
         }
         return most;
       },
       [](double a, double b) { return std::max(a, b); });
-  impl_->triangles = RawArray<std::uint32_t>(3 * mesh.triangles.size());
+  triangles_ = RawArray<std::uint32_t>(3 * mesh.triangles.size());
   tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
-    for (std::size_t k = 0; k < 3; ++k) impl_->triangles[3 * t + k] = place[mesh.triangles[t][k]];
+    for (std::size_t k = 0; k < 3; ++k) triangles_[3 * t + k] = place[mesh.triangles[t][k]];
   });
 
-  MeshView& arrays = impl_->arrays;
-  arrays.vertices = impl_->vertices.data();
-  arrays.triangles = impl_->triangles.data();
-  arrays.vertex_count = count;
-  arrays.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
-  impl_->meets_itself = closed.report.meets_itself;
+  arrays_.vertices = vertices_.data();
+  arrays_.triangles = triangles_.data();
+  arrays_.vertex_count = count;
+  arrays_.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
+  meets_itself_ = closed.report.meets_itself;
   if (closed.meeting_pairs) {
     for (const auto& pair : *closed.meeting_pairs)
       if (pair[0] >= mesh.triangles.size() || pair[1] >= mesh.triangles.size())
         throw Error(closed.name + ": meeting pairs refer to a triangle that does not exist");
-    if (impl_->rounding == 0) impl_->meeting_pairs = closed.meeting_pairs;
+    if (rounding_ == 0) meeting_pairs_ = closed.meeting_pairs;
   }
-  impl_->may_overlap = closed.report.meets_itself || closed.report.shells != 1;
+  may_overlap_ = closed.report.meets_itself || closed.report.shells != 1;
 }
 
-MeshSolid::~MeshSolid() = default;
-
 double MeshSolid::signed_distance(const Eigen::Vector3d& x) const {
-  const Eigen::Vector3d unit = impl_->frame.to_unit(x);
-  const double distance = closest_point(unit).distance * impl_->frame.scale();
+  const Eigen::Vector3d unit = frame_.to_unit(x);
+  const double distance = closest_point(unit).distance * frame_.scale();
   return inside(unit) ? distance : -distance;
 }
 
-Eigen::AlignedBox3d MeshSolid::bounds() const { return impl_->bounds; }
-
 double MeshSolid::volume() const {
-  const double scale = impl_->frame.scale();
-  return impl_->with_moments().volume * scale * scale * scale;
+  const double scale = frame_.scale();
+  return unit_volume() * scale * scale * scale;
 }
 
 double MeshSolid::volume_error() const {
-  const double scale = impl_->frame.scale();
-  return impl_->with_moments().volume_error * scale * scale * scale;
+  const double scale = frame_.scale();
+  return unit_moments().volume_error * scale * scale * scale;
 }
 
-const UnitFrame& MeshSolid::frame() const { return impl_->frame; }
-double MeshSolid::rounding() const { return impl_->rounding; }
-double MeshSolid::unit_volume() const { return impl_->with_moments().volume; }
-const MeshMoments& MeshSolid::unit_moments() const { return impl_->with_moments(); }
-bool MeshSolid::meets_itself() const { return impl_->meets_itself; }
-const std::vector<std::array<std::uint32_t, 2>>* MeshSolid::meeting_pairs() const {
-  return impl_->meeting_pairs ? &*impl_->meeting_pairs : nullptr;
-}
-bool MeshSolid::may_overlap() const { return impl_->may_overlap; }
-std::uint64_t MeshSolid::hash() const {
-  oneapi::tbb::collaborative_call_once(impl_->hash_made, [this] {
-    impl_->hash = hash_mesh(impl_->frame, impl_->vertices, impl_->triangles);
+const MeshView& MeshSolid::view() const {
+  oneapi::tbb::collaborative_call_once(hierarchy_made_, [this] {
+    bvh_ = build_bvh(vertices_, triangles_);
+    view_ = arrays_;
+    view_.nodes = bvh_.nodes.get();
+    view_.blocks = bvh_.blocks.get();
+    view_.root = bvh_.root;
   });
-  return impl_->hash;
+  return view_;
 }
-const MeshView& MeshSolid::view() const { return impl_->with_hierarchy(); }
-const MeshView& MeshSolid::arrays() const { return impl_->arrays; }
 
-ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit) const {
-  return closest_point(unit, std::numeric_limits<double>::infinity());
+const MeshMoments& MeshSolid::unit_moments() const {
+  // One shell that does not meet itself winds around no point twice.
+  oneapi::tbb::collaborative_call_once(moments_made_, [this] {
+    const HierarchyMaker hierarchy = [this]() -> const MeshView& { return view(); };
+    moments_ = may_overlap_ ? winding_set_moments(arrays_, meets_itself_, hierarchy)
+                            : enclosed_moments(arrays_);
+  });
+  return moments_;
+}
+
+std::uint64_t MeshSolid::hash() const {
+  oneapi::tbb::collaborative_call_once(
+      hash_made_, [this] { hash_ = hash_mesh(frame_, vertices_, triangles_); });
+  return hash_;
 }
 
 ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit, double limit) const {
@@ -210,10 +167,6 @@ ClosestPoint MeshSolid::closest_point(const Eigen::Vector3d& unit, double limit)
 
 int MeshSolid::winding_number(const Eigen::Vector3d& unit) const {
   return ist::winding_number(view(), unit.data());
-}
-
-void MeshSolid::line_crossings(double y, double z, std::vector<Crossing>& out) const {
-  ist::line_crossings(view(), y, z, out);
 }
 
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {

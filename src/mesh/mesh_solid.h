@@ -1,15 +1,19 @@
 #pragma once
 
+#include <oneapi/tbb/collaborative_call_once.h>
+
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <memory>
+#include <limits>
+#include <optional>
 #include <vector>
 
 #include <ist/solid.h>
 
+#include "mesh/bvh.h"
 #include "mesh/mesh_moments.h"
-#include "mesh/mesh_view.h"
+#include "stage/raw_array.h"
 
 namespace ist {
 
@@ -36,46 +40,57 @@ inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
 class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
-  ~MeshSolid() override;
 
   double signed_distance(const Eigen::Vector3d& x) const override;
-  Eigen::AlignedBox3d bounds() const override;
+  Eigen::AlignedBox3d bounds() const override { return bounds_; }
   double volume() const override;
   double volume_error() const override;
   const MeshSolid* mesh() const noexcept override { return this; }
 
-  const UnitFrame& frame() const;
-  double rounding() const;     ///< unit frame: no vertex was moved further on the way there
-  double unit_volume() const;  ///< unit frame³
+  const UnitFrame& frame() const { return frame_; }
+  double rounding() const { return rounding_; }  ///< unit frame: no vertex was moved further
+  double unit_volume() const { return unit_moments().volume; }  ///< unit frame³
   const MeshMoments& unit_moments() const;
   /// Triangles of the mesh intersect, or may: they were not looked for.
-  bool meets_itself() const;
+  bool meets_itself() const { return meets_itself_; }
   /// ClosedMesh::meeting_pairs, where they are those of the unit frame too: no coordinate was
   /// rounded on the way there. Null where they are not known.
-  const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const;
-  bool may_overlap() const;      ///< it winds around some point twice, or may: several shells
+  const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const {
+    return meeting_pairs_ ? &*meeting_pairs_ : nullptr;
+  }
+  /// It winds around some point twice, or may: several shells.
+  bool may_overlap() const { return may_overlap_; }
   std::uint64_t hash() const;    ///< XXH3-64 of vertices and triangles
   const MeshView& view() const;  ///< plain arrays for host code, the hierarchy included
   /// The vertices and triangles of view() alone, without the hierarchy: nodes and blocks are null.
-  const MeshView& arrays() const;
+  const MeshView& arrays() const { return arrays_; }
 
-  /// Exact to double rounding, over every triangle (inner walls included).
-  ClosestPoint closest_point(const Eigen::Vector3d& unit) const;
-  /// Same, but gives up early: returns distance ≥ limit as soon as nothing is closer than `limit`.
-  ClosestPoint closest_point(const Eigen::Vector3d& unit, double limit) const;
+  /// Exact to double rounding, over every triangle (inner walls included). Returns distance ≥ limit
+  /// as soon as nothing is closer than `limit`.
+  ClosestPoint closest_point(const Eigen::Vector3d& unit,
+                             double limit = std::numeric_limits<double>::infinity()) const;
 
   /// Winding number of a point off the surface (any integer; ≥ 1 is inside). Robust: edges and
   /// vertices on the test ray are counted consistently.
   int winding_number(const Eigen::Vector3d& unit) const;
   bool inside(const Eigen::Vector3d& unit) const { return winding_number(unit) >= 1; }
 
-  /// All crossings of the line {(x, y, z) : x ∈ ℝ}, sorted by x (equal x: +1 first). The signs sum
-  /// to zero for every line. Appends nothing; replaces the content of `out`.
-  void line_crossings(double y, double z, std::vector<Crossing>& out) const;
-
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  UnitFrame frame_;
+  Eigen::AlignedBox3d bounds_;
+  RawArray<double> vertices_;  // unit frame
+  RawArray<std::uint32_t> triangles_;
+  MeshView arrays_;
+  double rounding_ = 0;  // unit frame
+  bool meets_itself_ = false, may_overlap_ = false;
+  std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs_;
+
+  // Made when first asked for.
+  mutable oneapi::tbb::collaborative_once_flag hierarchy_made_, moments_made_, hash_made_;
+  mutable std::uint64_t hash_ = 0;
+  mutable Bvh bvh_;
+  mutable MeshView view_;  // arrays and bvh
+  mutable MeshMoments moments_;
 };
 
 }  // namespace ist

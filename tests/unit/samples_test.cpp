@@ -11,7 +11,7 @@
 #include <ist/error.h>
 #include <ist/solid.h>
 
-#include "mesh/mesh_solid.h"
+#include "mesh/winding.h"
 
 namespace {
 
@@ -101,7 +101,7 @@ std::vector<std::pair<double, double>> inside_parts(const ist::MeshSolid& solid,
   const ist::UnitFrame& frame = solid.frame();
   const Eigen::Vector3d unit = frame.to_unit({0, y, z});
   std::vector<ist::Crossing> crossings;
-  solid.line_crossings(unit.y(), unit.z(), crossings);
+  line_crossings(solid.view(), unit.y(), unit.z(), crossings);
   std::vector<std::pair<double, double>> parts;
   for (std::size_t i = 0; i + 1 < crossings.size(); i += 2)
     parts.emplace_back(frame.from_unit({crossings[i].x, 0, 0}).x(),

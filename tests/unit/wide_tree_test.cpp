@@ -13,6 +13,7 @@
 #include "mesh/mesh_solid.h"
 #include "mesh/wide_nearest.h"
 #include "mesh/wide_rays.h"
+#include "mesh/winding.h"
 #include "numerics/team.h"
 #include "support/host_wide_tree.h"
 #include "support/test_meshes.h"
@@ -227,7 +228,7 @@ TEST_P(WideTree, LineCrossingsAreTheCpus) {
   int sign[kCapacity];
   std::vector<ist::Crossing> expected;
   for (const Vector3d& x : points_) {
-    solid_.line_crossings(x.y(), x.z(), expected);
+    line_crossings(solid_.view(), x.y(), x.z(), expected);
     const int count = line_crossings(SerialTeam(), tree_, x.y(), x.z(), where, sign, kCapacity);
     ASSERT_EQ(std::size_t(count), expected.size());
     if (count > kCapacity) continue;

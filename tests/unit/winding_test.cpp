@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mesh/exact_sign.h"
-#include "mesh/mesh_solid.h"
+#include "mesh/winding.h"
 #include "support/test_meshes.h"
 
 namespace {
@@ -142,7 +142,7 @@ TEST(LineCrossings, SumToZeroAndAgreeWithTheWindingNumber) {
         y = corner[1];
         z = corner[2];
       }
-      solid.line_crossings(y, z, crossings);
+      line_crossings(solid.view(), y, z, crossings);
       int winding = 0;
       for (std::size_t k = 0; k < crossings.size(); ++k) {
         winding += crossings[k].sign;
@@ -164,7 +164,8 @@ TEST(LineCrossings, IntegrateToTheVolume) {
   double sum = 0;
   for (int i = 0; i < kLines; ++i) {
     for (int j = 0; j < kLines; ++j) {
-      solid.line_crossings((2 * i + 1.0) / kLines - 1, (2 * j + 1.0) / kLines - 1, crossings);
+      line_crossings(solid.view(), (2 * i + 1.0) / kLines - 1, (2 * j + 1.0) / kLines - 1,
+                     crossings);
       for (const Crossing& c : crossings) sum -= c.sign * c.x;
     }
   }
