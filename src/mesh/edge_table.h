@@ -30,9 +30,6 @@ class EdgeTable {
 
  private:
   struct Edge {
-    Edge() {}  // left as it is, for threads to fill
-    Edge(std::uint32_t low_vertex, std::uint32_t high_vertex, std::uint32_t side)
-        : low(low_vertex), high(high_vertex), first_side(side) {}
     std::uint32_t low, high, first_side;
   };
   RawArray<Edge> edges_;

@@ -3,54 +3,29 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstddef>
+#include <span>
 #include <utility>
 
 #include "mesh/exact_sign.h"
+#include "mesh/item_groups.h"
 
 namespace ist {
 namespace {
 
 constexpr std::size_t kMostSpokes = 32;
 
-/// Triangles by their corners: those at vertex v are listed[begin[v]] … listed[begin[v + 1] − 1].
-struct Incidence {
-  std::vector<std::uint32_t> begin, listed;
-
-  Incidence(const std::size_t vertices, const std::vector<Triangle>& triangles)
-      : begin(vertices + 2, 0), listed(3 * triangles.size()) {
-    const auto for_each_corner = [&](const auto& visit) {
-      tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
-        for (const std::uint32_t v : triangles[t]) visit(static_cast<std::uint32_t>(t), v);
-      });
-    };
-    const auto one_more = [](std::uint32_t& count) {
-      return std::atomic_ref<std::uint32_t>(count).fetch_add(1, std::memory_order_relaxed);
-    };
-    for_each_corner([&](std::uint32_t, const std::uint32_t v) { one_more(begin[v + 2]); });
-    for (std::size_t v = 2; v < begin.size(); ++v) begin[v] += begin[v - 1];
-    for_each_corner(
-        [&](const std::uint32_t t, const std::uint32_t v) { listed[one_more(begin[v + 1])] = t; });
-    // In whichever order the threads came.
-    tbb::parallel_for(std::size_t{0}, vertices, [&](const std::size_t v) {
-      std::sort(listed.begin() + begin[v], listed.begin() + begin[v + 1]);
-    });
-  }
-};
-
 /// The sides opposite to a vertex, in the order in which they follow one another. 0: they are no
 /// closed ring, or too many.
-std::size_t ring_about(const std::uint32_t v, const Incidence& incidence,
+std::size_t ring_about(const std::uint32_t v, const std::span<const std::uint32_t> fan,
                        const std::vector<Triangle>& triangles,
                        std::array<std::uint32_t, kMostSpokes>& ring) {
-  const std::size_t count = incidence.begin[v + 1] - incidence.begin[v];
+  const std::size_t count = fan.size();
   if (count < 3 || count > kMostSpokes) return 0;
   std::array<std::uint32_t, kMostSpokes> from, to;
   for (std::size_t i = 0; i < count; ++i) {
-    const Triangle& t = triangles[incidence.listed[incidence.begin[v] + i]];
+    const Triangle& t = triangles[fan[i]];
     const std::size_t k = t[0] == v ? 0 : t[1] == v ? 1 : 2;
     from[i] = t[(k + 1) % 3];
     to[i] = t[(k + 2) % 3];
@@ -98,12 +73,12 @@ bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertic
 
 std::vector<std::uint8_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
                                       const std::vector<Triangle>& triangles) {
-  const Incidence incidence(vertices.size(), triangles);
+  const ItemGroups<> fans = triangles_at_vertices(vertices.size(), triangles);
   std::vector<std::uint8_t> spread(vertices.size(), 0);
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(vertices.size()),
                     [&](const std::uint32_t v) {
                       std::array<std::uint32_t, kMostSpokes> ring;
-                      const std::size_t count = ring_about(v, incidence, triangles, ring);
+                      const std::size_t count = ring_about(v, fans[v], triangles, ring);
                       spread[v] = count > 0 && is_spread(v, vertices, ring, count) ? 1 : 0;
                     });
   return spread;

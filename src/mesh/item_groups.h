@@ -1,42 +1,66 @@
 #pragma once
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <span>
 #include <vector>
 
+#include "stage/raw_array.h"
+
 namespace ist {
 
 /// Items by their groups. Offset: counts all items.
-template <class Offset = std::uint32_t>
+template <class Offset = std::uint32_t, class Item = std::uint32_t>
 struct ItemGroups {
-  std::vector<Offset> first;         ///< of each group's items, and of none behind them
-  std::vector<std::uint32_t> items;  ///< those of a group in the order in which they came
+  std::vector<Offset> first;  ///< of each group's items, and of none behind them
+  RawArray<Item> items;       ///< those of a group in the order in which they came
 
   ItemGroups() = default;
   /// `each(visit)` calls visit(group, item) for all items; it is called twice.
   template <class Each>
-  ItemGroups(std::size_t groups, const Each& each) : first(groups + 1) {
-    each([&](std::size_t group, std::uint32_t) { ++first[group + 1]; });
-    std::partial_sum(first.begin(), first.end(), first.begin());
-    items.resize(first.back());
-    std::vector<Offset> next(first.begin(), first.end() - 1);
-    each([&](std::size_t group, std::uint32_t item) { items[next[group]++] = item; });
+  ItemGroups(std::size_t groups, const Each& each)
+      : ItemGroups(groups, each, [](Offset& count) { return count++; }) {}
+
+  /// The same where `each` visits from many threads: the items of a group are sorted.
+  template <class Each>
+  static ItemGroups in_parallel(std::size_t groups, const Each& each) {
+    ItemGroups made(groups, each, [](Offset& count) {
+      return std::atomic_ref<Offset>(count).fetch_add(1, std::memory_order_relaxed);
+    });
+    tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
+      std::sort(made.items.begin() + made.first[group], made.items.begin() + made.first[group + 1]);
+    });
+    return made;
   }
 
-  std::span<const std::uint32_t> operator[](std::size_t group) const {
+  std::span<const Item> operator[](std::size_t group) const {
     return {items.data() + first[group], items.data() + first[group + 1]};
+  }
+
+ private:
+  template <class Each, class OneMore>
+  ItemGroups(std::size_t groups, const Each& each, const OneMore& one_more) : first(groups + 1) {
+    each([&](std::size_t group, const Item&) { one_more(first[group + 1]); });
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    items = RawArray<Item>(first.back());
+    std::vector<Offset> next(first.begin(), first.end() - 1);
+    each([&](std::size_t group, const Item& item) { items[one_more(next[group])] = item; });
   }
 };
 
-/// The triangles at every vertex of a mesh.
-template <class Mesh>
-ItemGroups<> triangles_at_vertices(const Mesh& mesh) {
-  return {mesh.vertices.size(), [&](const auto& visit) {
-            for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-              for (const std::uint32_t v : mesh.triangles[t]) visit(v, t);
-          }};
+/// The triangles at every vertex of a mesh, ascending.
+template <class Triangles>
+ItemGroups<> triangles_at_vertices(std::size_t vertices, const Triangles& triangles) {
+  return ItemGroups<>::in_parallel(vertices, [&](const auto& visit) {
+    tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
+      for (const std::uint32_t v : triangles[t]) visit(v, static_cast<std::uint32_t>(t));
+    });
+  });
 }
 
 }  // namespace ist

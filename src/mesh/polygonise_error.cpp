@@ -217,7 +217,7 @@ double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleM
 
 double surface_to_mesh(const Solid& solid, const CellGrid& grid,
                        const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh) {
-  const ItemGroups<> fans = triangles_at_vertices(mesh);
+  const ItemGroups<> fans = triangles_at_vertices(mesh.vertices.size(), mesh.triangles);
   std::vector<double> bounds(cells.size());
   const double near = grid.edge * near_enough(bounds.size());
   tbb::parallel_for(std::size_t{0}, bounds.size(), [&](std::size_t c) {

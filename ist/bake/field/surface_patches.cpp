@@ -94,7 +94,7 @@ class Growth {
  public:
   explicit Growth(const FieldMesh& mesh)
       : mesh_(mesh),
-        stars_(triangles_at_vertices(mesh)),
+        stars_(triangles_at_vertices(mesh.vertices.size(), mesh.triangles)),
         left_(mesh.vertices.size()),
         taken_(mesh.triangles.size()),
         last_patch_(mesh.vertices.size()),

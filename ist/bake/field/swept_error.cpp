@@ -73,7 +73,7 @@ SweptError::SweptError(const MeshView& mesh, const Clustered& field,
       field_(field),
       hierarchy_(hierarchy),
       cuts_(hierarchy.view(), frames_of(hierarchy.view())),
-      stars_(triangles_at_vertices(field.mesh)),
+      stars_(triangles_at_vertices(field.mesh.vertices.size(), field.mesh.triangles)),
       near_(mesh.vertex_count, kNoTriangle),
       last_near_(field.vertex_of.size(), kNoTriangle) {}
 

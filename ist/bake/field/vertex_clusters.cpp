@@ -106,27 +106,6 @@ AreaVector area_vector(const MeshView& mesh, std::size_t triangle) {
   return area;
 }
 
-/// For each key from 0 the places at which it stands, ascending: few of each. By all threads.
-ItemGroups<> places_of(std::size_t keys, std::span<const std::uint32_t> key_at) {
-  const auto fetch_and_add_one = [](std::uint32_t& count) {
-    return std::atomic_ref(count).fetch_add(1, std::memory_order_relaxed);
-  };
-  ItemGroups<> lists;
-  lists.first.resize(keys + 1);
-  lists.items.resize(key_at.size());
-  tbb::parallel_for(std::size_t{0}, key_at.size(),
-                    [&](std::size_t i) { fetch_and_add_one(lists.first[key_at[i] + 1]); });
-  std::partial_sum(lists.first.begin(), lists.first.end(), lists.first.begin());
-  std::vector<std::uint32_t> next(lists.first.begin(), lists.first.end() - 1);
-  tbb::parallel_for(std::size_t{0}, key_at.size(), [&](std::size_t i) {
-    lists.items[fetch_and_add_one(next[key_at[i]])] = static_cast<std::uint32_t>(i);
-  });
-  tbb::parallel_for(std::size_t{0}, keys, [&](std::size_t key) {
-    std::sort(lists.items.begin() + lists.first[key], lists.items.begin() + lists.first[key + 1]);
-  });
-  return lists;
-}
-
 /// Sorts numbers; `work` is overwritten.
 void sort_numbers(std::vector<std::uint32_t>& numbers, std::vector<std::uint32_t>& work) {
   constexpr std::size_t kFew = 256;  // are sorted faster by comparing
@@ -226,8 +205,10 @@ VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels
     : mesh_(mesh), areas_(mesh.triangle_count), levels_(static_cast<std::size_t>(levels)) {
   tbb::parallel_invoke(
       [&] {
-        corners_ =
-            places_of(mesh.vertex_count, {mesh.triangles, 3 * std::size_t{mesh.triangle_count}});
+        corners_ = ItemGroups<>::in_parallel(mesh.vertex_count, [&](const auto& visit) {
+          tbb::parallel_for(std::uint32_t{0}, 3 * mesh.triangle_count,
+                            [&](std::uint32_t i) { visit(mesh.triangles[i], i); });
+        });
       },
       [&] {
         tbb::parallel_for(std::size_t{0}, levels_.size(), [&](std::size_t l) {
