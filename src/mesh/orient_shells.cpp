@@ -14,8 +14,8 @@
 
 #include "mesh/edge_table.h"
 #include "mesh/exact_sign.h"
-#include "mesh/item_groups.h"
 #include "mesh/shells.h"
+#include "mesh/triangle_columns.h"
 #include "stage/raw_array.h"
 
 namespace ist {
@@ -48,35 +48,17 @@ class LineWinding {
   /// Keeps references.
   LineWinding(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
               const Shells& shells)
-      : vertices_(vertices), triangles_(triangles), shells_(shells) {
-    Eigen::AlignedBox2d box;
-    for (const Triangle& t : triangles)
-      for (const std::uint32_t v : t) box.extend(vertices[v].tail<2>());
-    cells_ = std::clamp<std::size_t>(
-        static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles.size()) / 2)), 1, 1024);
-    low_ = box.min();
-    for (int k = 0; k < 2; ++k) {
-      const double width = box.max()[k] - box.min()[k];
-      cells_per_unit_[k] = width > 0 ? static_cast<double>(cells_) / width : 0;
-    }
-    at_cells_ = ItemGroups<std::size_t>(cells_ * cells_, [&](const auto& visit) {
-      for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
-        Eigen::AlignedBox2d of_triangle;
-        for (const std::uint32_t v : triangles_[i]) of_triangle.extend(vertices_[v].tail<2>());
-        const std::size_t first = column(of_triangle.min()[0], of_triangle.min()[1]);
-        const std::size_t last = column(of_triangle.max()[0], of_triangle.max()[1]);
-        for (std::size_t y = first / cells_; y <= last / cells_; ++y)
-          for (std::size_t z = first % cells_; z <= last % cells_; ++z) visit(y * cells_ + z, i);
-      }
-    });
-  }
+      : vertices_(vertices),
+        triangles_(triangles),
+        shells_(shells),
+        columns_(triangles, 0, [&](const std::uint32_t v) { return vertices[v]; }) {}
 
   /// Sets numbers[s] to the winding number of shell s around p, for every shell in `shells_met`,
   /// which lists those where it may differ from 0. `numbers` must come in as zeros.
   void around(const Eigen::Vector3d& p, std::vector<int>& numbers,
               std::vector<std::uint32_t>& shells_met) const {
     shells_met.clear();
-    for (const std::uint32_t i : at_cells_[column(p[1], p[2])]) {
+    for (const std::uint32_t i : columns_.about(p)) {
       const Triangle& t = triangles_[i];
       const std::array<Eigen::Vector3d, 3> corners{vertices_[t[0]], vertices_[t[1]],
                                                    vertices_[t[2]]};
@@ -93,21 +75,10 @@ class LineWinding {
   }
 
  private:
-  std::size_t column(const double y, const double z) const {
-    const auto cell = [&](const double offset, const double per_unit) {
-      const double c = std::floor(offset * per_unit);
-      return static_cast<std::size_t>(std::clamp(c, 0.0, static_cast<double>(cells_ - 1)));
-    };
-    return cell(y - low_[0], cells_per_unit_[0]) * cells_ + cell(z - low_[1], cells_per_unit_[1]);
-  }
-
   const std::vector<Eigen::Vector3d>& vertices_;
   const std::vector<Triangle>& triangles_;
   const Shells& shells_;
-  // Triangles by the cells that their projection onto the yz plane may touch.
-  Eigen::Vector2d low_ = Eigen::Vector2d::Zero(), cells_per_unit_ = Eigen::Vector2d::Zero();
-  std::size_t cells_ = 1;  ///< in each direction
-  ItemGroups<std::size_t> at_cells_;
+  const TriangleColumns columns_;
 };
 
 struct Shell {

@@ -14,12 +14,12 @@
 #include <ist/error.h>
 
 #include "mesh/disjoint_sets.h"
-#include "mesh/item_groups.h"
 #include "mesh/message_text.h"
 #include "mesh/resolve/arrangement.h"
 #include "mesh/resolve/unresolvable.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
+#include "mesh/triangle_columns.h"
 #include "mesh/usable_mesh.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
@@ -28,58 +28,6 @@ namespace ist {
 namespace {
 
 constexpr double kPatches = 0.1;  // share of the whole work, about
-
-/// Triangles by the cells of a grid that they may cover, seen along an axis.
-class Columns {
- public:
-  Columns(const std::vector<Triangle>& triangles, const ExactPoints& points, const int axis)
-      : axes_{(axis + 1) % 3, (axis + 2) % 3} {
-    Eigen::Array2d high;
-    for (const int i : {0, 1}) {
-      low_[i] = HUGE_VAL;
-      high[i] = -HUGE_VAL;
-      for (const Triangle& t : triangles)
-        for (const std::uint32_t v : t) {
-          low_[i] = std::min(low_[i], points.rounded(v)[axes_[i]]);
-          high[i] = std::max(high[i], points.rounded(v)[axes_[i]]);
-        }
-    }
-    cells_ = std::clamp<std::size_t>(
-        static_cast<std::size_t>(std::sqrt(static_cast<double>(triangles.size()))), 1, 1024);
-    const Eigen::Array2d size = high - low_;
-    for (const int i : {0, 1})
-      per_unit_[i] = size[i] > 0 ? static_cast<double>(cells_) / size[i] : 0;
-    at_cells_ = ItemGroups<std::size_t>(cells_ * cells_, [&](const auto& visit) {
-      for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-        std::array<std::size_t, 2> from = {cells_, cells_}, to = {0, 0};
-        for (const std::uint32_t v : triangles[t])
-          for (const std::size_t i : {std::size_t{0}, std::size_t{1}}) {
-            from[i] = std::min(from[i], cell(points.rounded(v), static_cast<int>(i)));
-            to[i] = std::max(to[i], cell(points.rounded(v), static_cast<int>(i)));
-          }
-        for (std::size_t y = from[1]; y <= to[1]; ++y)
-          for (std::size_t x = from[0]; x <= to[0]; ++x) visit(y * cells_ + x, t);
-      }
-    });
-  }
-
-  /// Those that a line along the axis through p may meet.
-  std::span<const std::uint32_t> about(const Eigen::Vector3d& p) const {
-    return at_cells_[cell(p, 1) * cells_ + cell(p, 0)];
-  }
-
- private:
-  /// Grows with the coordinate, whatever is rounded.
-  std::size_t cell(const Eigen::Vector3d& p, const int i) const {
-    const double at = (p[axes_[i]] - low_[i]) * per_unit_[i];
-    return at > 0 ? std::min(cells_ - 1, static_cast<std::size_t>(at)) : 0;
-  }
-
-  int axes_[2];
-  Eigen::Array2d low_ = {0, 0}, per_unit_ = {0, 0};
-  std::size_t cells_ = 1;
-  ItemGroups<std::size_t> at_cells_;
-};
 
 class Rays {
  public:
@@ -154,9 +102,12 @@ class Rays {
     return winding;
   }
 
-  const Columns& columns(const int axis) {
+  const TriangleColumns& columns(const int axis) {
     const auto k = static_cast<std::size_t>(axis);
-    std::call_once(made_[k], [&] { columns_[k].emplace(triangles_, points_, axis); });
+    std::call_once(made_[k], [&] {
+      columns_[k].emplace(triangles_, axis,
+                          [&](const std::uint32_t v) { return points_.rounded(v); });
+    });
     return *columns_[k];
   }
 
@@ -164,7 +115,7 @@ class Rays {
   const Arrangement& arrangement_;
   const ExactPoints& points_;
   std::array<std::once_flag, 3> made_;
-  std::array<std::optional<Columns>, 3> columns_;
+  std::array<std::optional<TriangleColumns>, 3> columns_;
 };
 
 /// Pieces that hang together where nothing else meets them, so that the winding numbers on their
