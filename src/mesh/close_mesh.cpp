@@ -280,7 +280,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   report.meets_itself = !surface.met || surface.met->count > 0;
   report.closed = true;
   if (report.repaired)
-    weld_equal(mesh);
+    mesh = weld(std::move(mesh), 0);
   else if (mesh.triangles.size() != report.triangles)
     drop_unused(mesh);
   ClosedMesh closed = {std::move(mesh), std::move(report), name,

@@ -107,8 +107,8 @@ TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) 
   if (!(settings.weld_tolerance >= 0) || settings.weld_tolerance > 0.1)
     throw Error(path + ": the weld tolerance must be 0 to 0.1 of the diagonal");
   if (ending_of(path) == ".vdb") {
-    const ClosedMesh level_set = load_vdb(path).mesh;
-    return weld(level_set.mesh,
+    ClosedMesh level_set = load_vdb(path).mesh;
+    return weld(std::move(level_set.mesh),
                 settings.weld_tolerance * level_set.report.bounds.diagonal().norm());
   }
   return read_mesh(read_source_file(path), settings);
@@ -122,11 +122,7 @@ TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
   std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
   TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};
-  const double tolerance = settings.weld_tolerance * bounds.diagonal().norm();
-  if (tolerance > 0)
-    mesh = weld(mesh, tolerance);
-  else
-    weld_equal(mesh);
+  mesh = weld(std::move(mesh), settings.weld_tolerance * bounds.diagonal().norm());
   mesh.declared = polygons.declared;
   return mesh;
 }

@@ -317,7 +317,7 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
     ++report.filled_holes;
   }
   mesh.triangles = std::move(result);
-  mesh = weld(mesh, 0);
+  mesh = weld(std::move(mesh), 0);
   if (sheets > 0)
     report.notes.push_back("repair: " + counted(sheets, "open sheet") +
                            " removed: they enclose no volume");

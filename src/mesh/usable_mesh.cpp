@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <utility>
 
 #include <ist/error.h>
 
@@ -67,7 +68,7 @@ double largest_coordinate(const Eigen::AlignedBox3d& bounds) {
 
 void weld_usable(TriangleMesh& mesh, const std::string& name) {
   check_indices_and_coordinates(mesh, name);
-  weld_equal(mesh);
+  mesh = weld(std::move(mesh), 0);
   refuse_unusable_size(mesh, name);
 }
 

@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// One vertex for equal coordinates, as weld_equal() has it, of a mesh of which nothing is known.
+/// One vertex for equal coordinates, as weld() has it, of a mesh of which nothing is known.
 /// Throws Error for no triangles, indices that lead nowhere, coordinates that are not finite, and
 /// sizes and offsets that double cannot compute with.
 void weld_usable(TriangleMesh& mesh, const std::string& name);

@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <unordered_map>
 #include <vector>
 
 #include "numerics/hashing.h"
@@ -92,44 +93,6 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
   return first;
 }
 
-constexpr std::uint32_t kNoEntry = UINT32_MAX;
-
-std::uint64_t mix(std::uint64_t h, const std::uint64_t value) {
-  h = (h ^ value) * 0x9e3779b97f4a7c15u;
-  return h ^ (h >> 32);
-}
-
-/// Kept vertices by hash of their cell: chains in one array, newest first.
-class CellTable {
- public:
-  explicit CellTable(const std::size_t vertices)
-      : mask_(std::bit_ceil(std::max<std::size_t>(vertices, 16)) - 1),
-        heads_(mask_ + 1, kNoEntry) {}
-
-  void add(const std::uint64_t hash, const std::uint32_t vertex) {
-    if (vertex >= next_.size()) next_.resize(vertex + 1, kNoEntry);
-    next_[vertex] = heads_[hash & mask_];
-    heads_[hash & mask_] = vertex;
-  }
-
-  template <class Visit>
-  void visit(const std::uint64_t hash, const Visit& visit) const {
-    for (std::uint32_t v = heads_[hash & mask_]; v != kNoEntry; v = next_[v]) visit(v);
-  }
-
- private:
-  std::size_t mask_;
-  std::vector<std::uint32_t> heads_, next_;
-};
-
-using Cell = std::array<double, 3>;
-
-std::uint64_t hash_of(const Cell& cell) {
-  std::uint64_t h = 0;
-  for (const double c : cell) h = mix(h, std::bit_cast<std::uint64_t>(c + 0.0));  // −0 + 0 = 0
-  return h;
-}
-
 /// [vertex] 1 where a triangle has it as a corner.
 std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
@@ -169,19 +132,14 @@ void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
 
 }  // namespace
 
-TriangleMesh weld(const TriangleMesh& mesh, const double tolerance) {
+TriangleMesh weld(TriangleMesh mesh, const double tolerance) {
   if (tolerance > 0)
     return weld_among(mesh, tolerance, std::vector<bool>(mesh.vertices.size(), true));
-  TriangleMesh welded = mesh;
-  weld_equal(welded);
-  return welded;
-}
-
-void weld_equal(TriangleMesh& mesh) {
   mesh.declared = {};
   const std::vector<std::uint8_t> used = referenced(mesh);
   std::vector<std::uint32_t> name = first_equal(mesh.vertices, used);
   keep_first(mesh, used, name);
+  return mesh;
 }
 
 void drop_unused(TriangleMesh& mesh) {
@@ -194,43 +152,34 @@ void drop_unused(TriangleMesh& mesh) {
 
 TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
                         const std::vector<bool>& among) {
+  constexpr std::uint32_t kNone = UINT32_MAX;
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
-  std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNoEntry);
-  CellTable table(mesh.vertices.size());
-  // Cells as wide as the tolerance: what is near enough lies in one of 27.
-  const auto cell_of = [&](const Eigen::Vector3d& p) {
-    if (tolerance == 0) return Cell{p[0], p[1], p[2]};
-    return Cell{std::floor(p[0] / tolerance), std::floor(p[1] / tolerance),
-                std::floor(p[2] / tolerance)};
-  };
-  const int reach = tolerance > 0 ? 1 : 0;
+  std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
+  // Kept vertices by the hash of their cell. Cells are as wide as the tolerance: what is near
+  // enough lies in one of 27.
+  std::unordered_multimap<std::uint64_t, std::uint32_t> kept;
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (used[i] == 0) continue;
     const Eigen::Vector3d& p = mesh.vertices[i];
-    std::uint32_t first = kNoEntry;
-    if (among[i]) {
-      const Cell cell = cell_of(p);
-      for (int dx = -reach; dx <= reach; ++dx)
-        for (int dy = -reach; dy <= reach; ++dy)
-          for (int dz = -reach; dz <= reach; ++dz)
-            table.visit(hash_of({cell[0] + dx, cell[1] + dy, cell[2] + dz}),
-                        [&](const std::uint32_t v) {
-                          const Eigen::Vector3d& q = result.vertices[v];
-                          const bool near = tolerance > 0 ? (q - p).norm() <= tolerance : q == p;
-                          if (near && v < first) first = v;
-                        });
+    const Eigen::Vector3d cell = (p / tolerance).array().floor();
+    std::uint32_t first = kNone;
+    for (int k = 0; among[i] && k < 27; ++k) {
+      const Eigen::Vector3d step(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
+      const auto [begin, end] = kept.equal_range(hash_of_bits(cell + step));
+      for (auto near = begin; near != end; ++near)
+        if ((result.vertices[near->second] - p).norm() <= tolerance)
+          first = std::min(first, near->second);
     }
-    if (first == kNoEntry) {
+    if (first == kNone) {
       first = static_cast<std::uint32_t>(result.vertices.size());
       result.vertices.emplace_back(p + Eigen::Vector3d::Zero());
-      if (among[i]) table.add(hash_of(cell_of(p)), first);
+      if (among[i]) kept.emplace(hash_of_bits(cell), first);
     }
     kept_as[i] = first;
   }
-  result.triangles.reserve(mesh.triangles.size());
-  for (const auto& t : mesh.triangles)
-    result.triangles.push_back({kept_as[t[0]], kept_as[t[1]], kept_as[t[2]]});
+  result.triangles = mesh.triangles;
+  rename_corners(result, kept_as);
   return result;
 }
 
