@@ -6,17 +6,16 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
-#include <future>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <ist/error.h>
 
+#include "bake/aside.h"
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/bounding_ball.h"
@@ -70,13 +69,17 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// Stages of a bake on the host's threads. Each starts when all that it waits for is done: while a
-/// backend leaves the caller's threads idle, or when they are free.
+/// What a bake does: the caller, by the backend, the first three in turn; the host's threads the
+/// others.
+enum class Step { pack, calibrate, cover, order, bounds, finest_tree, inner_tree };
+
+/// Runs a table of stages on the host's threads. Each starts when all that it waits for is done:
+/// at once if the backend leaves these threads idle, else not before finish().
 class HostStages {
  public:
   struct Stage {
-    std::string_view name;
-    std::vector<std::string_view> waits_for;  ///< stages, or steps of the caller's
+    Step step;
+    std::vector<Step> waits_for;
     std::function<void()> work;
   };
 
@@ -90,12 +93,13 @@ class HostStages {
   ~HostStages() {
     try {
       group_.wait();
-    } catch (...) {  // the scope is left by an exception already
+    } catch (...) {  // finish() reports; without it the scope is left by an exception already
     }
   }
   HostStages(const HostStages&) = delete;
   HostStages& operator=(const HostStages&) = delete;
 
+  /// Work that waits for nothing.
   void add(std::function<void()> work) {
     if (at_once_)
       group_.run(std::move(work));
@@ -103,12 +107,12 @@ class HostStages {
       waiting_.push_back(std::move(work));
   }
 
-  void done(std::string_view name) {
+  void done(Step step) {
     for (std::size_t i = 0; i < table_.size(); ++i)
-      if (std::ranges::count(table_[i].waits_for, name) != 0 && --left_[i] == 0)
+      if (std::ranges::count(table_[i].waits_for, step) != 0 && --left_[i] == 0)
         add([this, i] {
           table_[i].work();
-          done(table_[i].name);
+          done(table_[i].step);
         });
   }
 
@@ -124,29 +128,6 @@ class HostStages {
   std::vector<std::atomic<int>> left_;
   std::vector<std::function<void()>> waiting_;
   tbb::task_group group_;
-};
-
-/// A part of a bake that is done on another thread, and stopped where the scope is left before it
-/// has come to its end.
-class Aside {
- public:
-  Aside(unsigned threads, const std::function<void(const ProgressCallback&)>& work)
-      : done_(do_aside(threads, [this, work] {
-          work([this](const Progress&) { return !stopped_.load(std::memory_order_relaxed); });
-        })) {}
-  ~Aside() { stopped_.store(true, std::memory_order_relaxed); }
-  Aside(const Aside&) = delete;
-  Aside& operator=(const Aside&) = delete;
-
-  /// Waits for the end, and asks `meanwhile` twenty times a second.
-  void finish(const std::function<void()>& meanwhile) {
-    wait_for(done_, meanwhile);
-    done_.get();
-  }
-
- private:
-  std::atomic<bool> stopped_ = false;
-  std::future<void> done_;  ///< last: waits for the thread
 };
 
 }  // namespace
@@ -195,19 +176,21 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   // of coarser levels follow their calibration.
   HostStages host(
       backend.leaves_threads_idle(),
-      {{"moments", {"start"}, [&] { solid.unit_moments(); }},
-       {"order", {"pack"}, [&] { inner_order = sphere_order(arrays.inner_spheres); }},
-       {"bounds", {"pack"}, [&] { describe_bounds(solid, 0, arrays.header); }},
-       {"finest tree",
-        {"order", "calibrate"},
+      {{Step::order, {Step::pack}, [&] { inner_order = sphere_order(arrays.inner_spheres); }},
+       {Step::bounds, {Step::pack}, [&] { describe_bounds(solid, 0, arrays.header); }},
+       {Step::finest_tree,
+        {Step::order, Step::calibrate},
         [&] { arrays.matched_tree = build_tree_like(arrays.matched_spheres, inner_order); }},
-       {"inner tree", {"order", "cover"}, [&] {
+       {Step::inner_tree, {Step::order, Step::cover}, [&] {
           arrays.inner_tree =
               tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
         }}});
+  // Where the host's threads are idle, they make the surface and the moments from here on;
+  // elsewhere the packing, which is the first to ask, computes the moments, and the surface follows
+  // the covers.
   if (backend.leaves_threads_idle()) {
     field.start();
-    host.done("start");
+    host.add([&] { solid.unit_moments(); });
   }
 
   const SpherePacking packing = backend.pack(settings, progress);
@@ -218,7 +201,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
                 "allow more time");
   arrays.header = describe_bake(mesh, solid, settings, packing);
   arrays.inner_spheres = packing.spheres;
-  host.done("pack");
+  host.done(Step::pack);
 
   const std::vector<std::size_t> counts = detail_counts(count);
   arrays.details.resize(counts.size() - 1);
@@ -228,7 +211,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
       if (first + i == 0) {
         arrays.matched_spheres = std::move(made.matched);
         arrays.header.protrusion = made.protrusion;
-        host.done("calibrate");
+        host.done(Step::calibrate);
         return;
       }
       DetailArrays& detail = arrays.details[first + i - 1];
@@ -239,26 +222,28 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
     calibrate_prefixes(solid, on, packing.spheres, std::span(counts).subspan(first, end - first),
                        report, take);
   };
-  std::optional<Aside> levels;
+  std::optional<Aside<void>> levels;
   if (const auto beside = backend.beside(); beside && counts.size() > 1) {
-    levels.emplace(settings.threads, [&, beside](const ProgressCallback& report) {
+    levels.emplace(settings.threads, [&, beside](const WorkStop& stop) {
       const std::unique_ptr<SolidBackend> other = beside();
       HostStages trees(true, {});  // a task group belongs to the threads of one arena
-      calibrate_levels(1, counts.size(), *other, trees, report);
+      calibrate_levels(1, counts.size(), *other, trees,
+                       [&](const Progress&) { return !stop.stopped(); });
       trees.finish();
     });
+    levels->start();
     calibrate_levels(0, 1, backend, host, progress);
   } else {
     // The finest first: while its tree grows, the largest, the others are calibrated.
     calibrate_levels(0, counts.size(), backend, host, progress);
   }
   arrays.cover_radii = cover_radii(solid, backend, packing.spheres, progress);
-  host.done("cover");
+  host.done(Step::cover);
 
   Stage stage("tree", progress);
   stage.step(count, 0);
   field.start();
-  if (levels) levels->finish([&] { stage.step(count, 0); });
+  if (levels) levels->wait([&] { stage.step(count, 0); });
   host.finish();
   keep(field.wait([&] { stage.step(count, 0.5); }), arrays);
   stage.step(count, 1);

@@ -14,7 +14,6 @@
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
 #include "numerics/rounding.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {
@@ -336,19 +335,6 @@ KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
   }
   if (with_field && field) kept.field = std::make_shared<FieldArrays>(std::move(field->arrays));
   return kept;
-}
-
-void SolidField::start() {
-  if (made_.valid()) return;
-  made_ = do_aside(threads_, [this] {
-            return keep_surface(solid_, resolution_, settings_, true, stop_);
-          }).share();
-}
-
-KeptSurface SolidField::wait(const std::function<void()>& meanwhile) {
-  start();
-  wait_for(made_, meanwhile);
-  return made_.get();
 }
 
 }  // namespace ist

@@ -3,10 +3,9 @@
 #include <ist/packing.h>
 #include <ist/tree_view.h>
 
-#include <functional>
-#include <future>
 #include <memory>
 
+#include "bake/aside.h"
 #include "bake/asset/asset_writer.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"
@@ -30,36 +29,17 @@ KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
                          const SurfaceSettings& settings, bool with_field,
                          const WorkStop& stop = WorkStop());
 
-/// A solid's surface, made once on threads of its own and shared by all its assets. It ends with
-/// this.
-class SolidField {
- public:
-  /// `threads`: 0 = all cores. `time_limit` [s] from now, after which there is no field; 0: no
-  /// limit.
+/// A solid's surface with its field, made once and shared by all its assets. `time_limit`: after it
+/// there is no field. wait() throws Error as keep_surface() does.
+struct SolidField : Aside<KeptSurface> {
   SolidField(const MeshSolid& solid, const Resolution& resolution, const SurfaceSettings& settings,
              unsigned threads, double time_limit = 0)
-      : solid_(solid),
-        resolution_(resolution),
-        settings_(settings),
-        threads_(threads),
-        stop_(time_limit) {}
-  ~SolidField() { stop_.stop(); }
-  SolidField(const SolidField&) = delete;
-  SolidField& operator=(const SolidField&) = delete;
-
-  void start();
-
-  /// Starts it if nobody has, and asks `meanwhile` twenty times a second until it is there. Throws
-  /// Error as keep_surface() does.
-  KeptSurface wait(const std::function<void()>& meanwhile);
-
- private:
-  const MeshSolid& solid_;
-  const Resolution& resolution_;
-  const SurfaceSettings settings_;
-  const unsigned threads_;
-  WorkStop stop_;
-  std::shared_future<KeptSurface> made_;  ///< last: waits for the thread
+      : Aside(
+            threads,
+            [&solid, &resolution, settings](const WorkStop& stop) {
+              return keep_surface(solid, resolution, settings, true, stop);
+            },
+            time_limit) {}
 };
 
 }  // namespace ist

@@ -18,10 +18,13 @@ class WorkStop {
 
   void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
 
-  /// Throws Stopped once stop() was called or the time is over.
+  /// Whether stop() was called or the time is over.
+  bool stopped() const noexcept {
+    return stopped_.load(std::memory_order_relaxed) || (timed_ && Clock::now() >= end_);
+  }
+  /// Throws Stopped then.
   void look() const {
-    if (stopped_.load(std::memory_order_relaxed) || (timed_ && Clock::now() >= end_))
-      throw Stopped();
+    if (stopped()) throw Stopped();
   }
 
  private:
