@@ -24,9 +24,9 @@ struct JobResult {
   std::vector<std::string> warnings;
 
   // Of an asset that was written; else empty.
-  std::string asset;                          ///< path
-  std::uint64_t content_hash = 0, bytes = 0;  ///< of the asset
-  std::uint64_t spheres = 0;
+  std::string asset;         ///< path
+  std::string content_hash;  ///< AssetHeader's, in 16 digits
+  std::uint64_t bytes = 0, spheres = 0;
   double coverage = 0;                        ///< share of the solid's volume
   double volume = 0, protrusion = 0;          ///< as TreeView has them
   double surface_error = 0;                   ///< TreeView::field_error()

@@ -64,7 +64,7 @@ bool was_out_of_time(const TreeView& tree) {
 
 void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& result) {
   const TreeView& tree = entry.asset.view();
-  result.content_hash = tree.header().content_hash;
+  result.content_hash = hash_of(entry.asset);
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
   result.coverage = tree.coverage();

@@ -22,37 +22,53 @@ constexpr int kSchema = 1;
 constexpr JobStatus kStatuses[] = {JobStatus::baked, JobStatus::cached, JobStatus::failed,
                                    JobStatus::not_baked};
 
-template <class T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json();
+/// Calls visit(key, member, whether null if not done, whether early summaries lack it), in order.
+template <class Result, class Visit>
+void for_each_field(Result& result, const Visit& visit) {
+  constexpr bool kIfDone = true, kLater = true;
+  visit("name", result.name);
+  visit("status", result.status);
+  visit("mesh", result.mesh);
+  visit("asset", result.asset, kIfDone);
+  visit("content_hash", result.content_hash, kIfDone);
+  visit("bytes", result.bytes, kIfDone);
+  visit("spheres", result.spheres, kIfDone);
+  visit("coverage", result.coverage, kIfDone);
+  visit("volume", result.volume, kIfDone, kLater);
+  visit("protrusion", result.protrusion, kIfDone, kLater);
+  visit("has_surface", result.has_surface, kIfDone, kLater);
+  visit("surface_error", result.surface_error, kIfDone, kLater);
+  visit("mesh_state", result.mesh_state, kIfDone, kLater);
+  visit("mesh_triangles", result.mesh_triangles, kIfDone, kLater);
+  visit("mesh_error", result.mesh_error, kIfDone, kLater);
+  visit("counted_twice", result.counted_twice, kIfDone, kLater);
+  visit("target_error", result.target_error);
+  visit("measured_error", result.error);
+  visit("target_met", result.target_met);
+  visit("confidence", result.confidence, !kIfDone, kLater);
+  visit("seconds", result.seconds);
+  visit("warnings", result.warnings);
+  visit("message", result.message);
 }
 
+template <class T>
+Json json_of(const T& value) {
+  return value;
+}
+template <class T>
+Json json_of(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
+}
+Json json_of(JobStatus status) { return name_of(status); }
+
 Json to_json(const JobResult& result) {
-  const bool done = result.done();
-  const auto if_done = [&](const auto& value) { return done ? Json(value) : Json(); };
-  return {{"name", result.name},
-          {"status", name_of(result.status)},
-          {"mesh", result.mesh},
-          {"asset", if_done(result.asset)},
-          {"content_hash", if_done(fmt::format("{:016x}", result.content_hash))},
-          {"bytes", if_done(result.bytes)},
-          {"spheres", if_done(result.spheres)},
-          {"coverage", if_done(result.coverage)},
-          {"volume", if_done(result.volume)},
-          {"protrusion", if_done(result.protrusion)},
-          {"has_surface", if_done(result.has_surface)},
-          {"surface_error", if_done(result.surface_error)},
-          {"mesh_state", if_done(result.mesh_state)},
-          {"mesh_triangles", if_done(result.mesh_triangles)},
-          {"mesh_error", if_done(result.mesh_error)},
-          {"counted_twice", if_done(result.counted_twice)},
-          {"target_error", or_null(result.target_error)},
-          {"measured_error", or_null(result.error)},
-          {"target_met", or_null(result.target_met)},
-          {"confidence", or_null(result.confidence)},
-          {"seconds", result.seconds},
-          {"warnings", result.warnings},
-          {"message", result.message.empty() ? Json() : Json(result.message)}};
+  Json json;
+  for_each_field(result,
+                 [&](const char* key, const auto& value, bool if_done = false, bool = false) {
+                   json[key] = if_done && !result.done() ? Json() : json_of(value);
+                 });
+  if (result.message.empty()) json["message"] = nullptr;
+  return json;
 }
 
 template <class T>
@@ -63,42 +79,19 @@ template <class T>
 void take(const Json& from, const char* key, std::optional<T>& to) {
   if (!from.at(key).is_null()) to = from.at(key).get<T>();
 }
-
-JobResult result_from(const Json& json) {
-  JobResult result;
-  take(json, "name", result.name);
-  const std::string status = json.at("status");
+void take(const Json& from, const char* key, JobStatus& to) {
+  const std::string status = from.at(key);
   const auto* const known = std::find_if(std::begin(kStatuses), std::end(kStatuses),
                                          [&](JobStatus one) { return status == name_of(one); });
   if (known == std::end(kStatuses)) throw Error("unknown status '" + status + "'");
-  result.status = *known;
-  take(json, "mesh", result.mesh);
-  take(json, "asset", result.asset);
-  std::string hash = "0";
-  take(json, "content_hash", hash);
-  result.content_hash = std::stoull(hash, nullptr, 16);
-  take(json, "bytes", result.bytes);
-  take(json, "spheres", result.spheres);
-  take(json, "coverage", result.coverage);
-  if (json.contains("has_surface")) take(json, "has_surface", result.has_surface);
-  if (json.contains("volume")) {
-    take(json, "volume", result.volume);
-    take(json, "protrusion", result.protrusion);
-    take(json, "surface_error", result.surface_error);
-  }
-  if (json.contains("mesh_state")) {
-    take(json, "mesh_state", result.mesh_state);
-    take(json, "mesh_triangles", result.mesh_triangles);
-    take(json, "mesh_error", result.mesh_error);
-    take(json, "counted_twice", result.counted_twice);
-  }
-  take(json, "target_error", result.target_error);
-  take(json, "measured_error", result.error);
-  take(json, "target_met", result.target_met);
-  if (json.contains("confidence")) take(json, "confidence", result.confidence);
-  take(json, "seconds", result.seconds);
-  take(json, "warnings", result.warnings);
-  take(json, "message", result.message);
+  to = *known;
+}
+
+JobResult result_from(const Json& json) {
+  JobResult result;
+  for_each_field(result, [&](const char* key, auto& value, bool = false, bool later = false) {
+    if (!later || json.contains(key)) take(json, key, value);
+  });
   return result;
 }
 
