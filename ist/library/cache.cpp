@@ -12,7 +12,6 @@
 #include <sys/stat.h>
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <span>
 #include <string_view>
@@ -82,57 +81,26 @@ void add_loaded(const std::string& path, Hash& hash) {
 
 namespace fs = std::filesystem;
 
-constexpr char kMagic[8] = {'I', 'S', 'T', 'C', 'A', 'C', 'H', 'E'};
-constexpr std::uint64_t kEntryVersion = 2;
+using Json = nlohmann::ordered_json;
 
-/// The start of an entry; a JSON object of what was found about the mesh, and the asset follow.
-struct EntryHeader {
-  char magic[8];
-  std::uint64_t version;
-  std::uint64_t hash_high, hash_low;  ///< XXH3-128 of all that follows this field
-  std::uint64_t key_high, key_low;
-  std::uint64_t found_bytes, asset_bytes;
-};
-static_assert(sizeof(EntryHeader) == 64);
-constexpr std::size_t kHashed = offsetof(EntryHeader, key_high);
+constexpr int kEntryFormat = 3;  ///< entries of others are not found
 
-XXH128_hash_t hash_of(std::span<const std::byte> entry) {
-  return XXH3_128bits(entry.data() + kHashed, entry.size() - kHashed);
+/// Of a line's other fields and of the asset.
+std::string hash_of(const Json& line, const Asset& asset) {
+  Hash hash;
+  hash.add_text(app::json_text(line, -1));
+  hash.add(asset.bytes().data(), asset.bytes().size());
+  return hash.key().text();
 }
 
-/// Throws Error that says what is wrong with the bytes.
-CacheEntry parse(const std::vector<std::byte>& bytes, const CacheKey& key) {
-  EntryHeader header;
-  if (bytes.size() < sizeof(header)) throw Error("the entry is truncated");
-  std::memcpy(&header, bytes.data(), sizeof(header));
-  if (std::memcmp(header.magic, kMagic, sizeof(kMagic)) != 0 || header.version != kEntryVersion)
-    throw Error("the entry is of another version");
-  const XXH128_hash_t hash = hash_of(bytes);
-  if (hash.high64 != header.hash_high || hash.low64 != header.hash_low)
-    throw Error("the entry does not match its checksum");
-  const std::uint64_t rest = bytes.size() - sizeof(header);
-  if (header.found_bytes > rest || header.asset_bytes != rest - header.found_bytes ||
-      CacheKey{header.key_high, header.key_low} != key)
-    throw Error("the entry belongs to another mesh");
-  const auto* const text = reinterpret_cast<const char*>(bytes.data() + sizeof(header));
-  const nlohmann::ordered_json found =
-      nlohmann::ordered_json::parse(text, text + header.found_bytes);
-  CacheEntry entry = {
-      Asset(std::span(bytes).subspan(sizeof(header) + header.found_bytes), "the asset"),
-      found.at("notes").get<std::vector<std::string>>()};
-  if (const auto& confidence = found.at("confidence"); !confidence.is_null())
-    entry.confidence = confidence.get<double>();
-  return entry;
-}
-
-std::optional<std::vector<std::byte>> read_file(const fs::path& path) {
+std::optional<std::string> read_file(const fs::path& path) {
   std::ifstream file(path, std::ios::binary | std::ios::ate);
   if (!file) return std::nullopt;
   const std::streamoff size = file.tellg();
   if (size < 0) return std::nullopt;
-  std::vector<std::byte> bytes(static_cast<std::size_t>(size));
+  std::string bytes(static_cast<std::size_t>(size), '\0');
   file.seekg(0);
-  if (!file.read(reinterpret_cast<char*>(bytes.data()), size)) return std::nullopt;
+  if (!file.read(bytes.data(), size)) return std::nullopt;
   return bytes;
 }
 
@@ -195,8 +163,8 @@ std::string CacheKey::text() const { return fmt::format("{:016x}{:016x}", high, 
 
 CacheKey cache_key(const Job& job) {
   Hash hash;
-  hash.add_text(fmt::format("format {}.{} bake {}\n{}", kFormatMajor, kFormatMinor, kBakeRevision,
-                            describe_exactly(job.settings)));
+  hash.add_text(fmt::format("format {}.{} bake {} entry {}\n{}", kFormatMajor, kFormatMinor,
+                            kBakeRevision, kEntryFormat, describe_exactly(job.settings)));
   if (job.shape) {
     const Eigen::Vector3d &s = std::get<LinkMesh>(job.shape->shape).scale,
                           &t = job.shape->translation;
@@ -216,6 +184,25 @@ CacheKey cache_key(const Job& job) {
   return hash.key();
 }
 
+std::string line_of(const CacheKey& key, const CacheEntry& entry) {
+  Json line = {{"key", key.text()}, {"notes", entry.notes}, {"confidence", nullptr}};
+  if (entry.confidence) line["confidence"] = *entry.confidence;
+  line["hash"] = hash_of(line, entry.asset);
+  return app::json_text(line, -1);
+}
+
+CacheEntry entry_from(std::string_view text, const CacheKey& key, Asset asset) {
+  Json line = Json::parse(text);
+  const Json hash = line.at("hash");
+  line.erase("hash");
+  if (hash != hash_of(line, asset)) throw Error("the entry does not match its checksum");
+  if (line.at("key") != key.text()) throw Error("the entry belongs to another mesh");
+  CacheEntry entry = {std::move(asset), line.at("notes").get<std::vector<std::string>>()};
+  if (const Json& confidence = line.at("confidence"); !confidence.is_null())
+    entry.confidence = confidence.get<double>();
+  return entry;
+}
+
 AssetCache::AssetCache(fs::path folder, std::uint64_t limit)
     : folder_(std::move(folder)), limit_(limit) {
   std::error_code error;
@@ -231,10 +218,14 @@ fs::path AssetCache::file_of(const CacheKey& key) const {
 
 std::optional<CacheEntry> AssetCache::find(const CacheKey& key, std::string& damage) const {
   const fs::path path = file_of(key);
-  const std::optional<std::vector<std::byte>> bytes = read_file(path);
+  const std::optional<std::string> bytes = read_file(path);
   if (!bytes) return std::nullopt;
   try {
-    CacheEntry entry = parse(*bytes, key);
+    const std::size_t line = bytes->find('\n');
+    if (line == std::string::npos) throw Error("the entry is truncated");
+    CacheEntry entry =
+        entry_from(std::string_view(*bytes).substr(0, line), key,
+                   Asset(std::as_bytes(std::span(*bytes)).subspan(line + 1), "the asset"));
     utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // a cache that may only be read is one too
     return entry;
   } catch (const std::exception& error) {
@@ -244,26 +235,9 @@ std::optional<CacheEntry> AssetCache::find(const CacheKey& key, std::string& dam
 }
 
 void AssetCache::store(const CacheKey& key, const CacheEntry& entry) {
-  nlohmann::ordered_json about = {{"notes", entry.notes}, {"confidence", nullptr}};
-  if (entry.confidence) about["confidence"] = *entry.confidence;
-  const std::string found = app::json_text(about, -1);
   const std::span<const std::byte> asset = entry.asset.bytes();
-  EntryHeader header = {};
-  std::memcpy(header.magic, kMagic, sizeof(kMagic));
-  header.version = kEntryVersion;
-  header.key_high = key.high;
-  header.key_low = key.low;
-  header.found_bytes = found.size();
-  header.asset_bytes = asset.size();
-  std::vector<std::byte> bytes(sizeof(header) + found.size() + asset.size());
-  std::memcpy(bytes.data(), &header, sizeof(header));
-  std::memcpy(bytes.data() + sizeof(header), found.data(), found.size());
-  std::memcpy(bytes.data() + sizeof(header) + found.size(), asset.data(), asset.size());
-  const XXH128_hash_t hash = hash_of(bytes);
-  header.hash_high = hash.high64;
-  header.hash_low = hash.low64;
-  std::memcpy(bytes.data(), &header, sizeof(header));
-
+  std::string bytes = line_of(key, entry) + '\n';
+  bytes.append(reinterpret_cast<const char*>(asset.data()), asset.size());
   const fs::path path = file_of(key);
   std::error_code error;
   fs::create_directory(path.parent_path(), error);

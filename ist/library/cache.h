@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "library/job.h"
@@ -15,8 +16,7 @@
 // and any of them may die at any moment: an entry is a file that has its name only once it is whole
 // and on the disk, nothing is locked, and what is read is held against its hash.
 //
-//   DIR/ab/abcdef….entry   the entry of the key abcdef…: what was found about the mesh, and the
-//   asset
+//   DIR/ab/abcdef….entry   the entry of the key abcdef…: its line, and after that the asset
 
 namespace ist {
 
@@ -38,6 +38,13 @@ struct CacheEntry {
   std::vector<std::string> notes;         ///< MeshReport::notes of the mesh
   std::optional<double> confidence = {};  ///< Judgement's, of a mesh that was not closed
 };
+
+/// An entry but for its asset as a line of JSON: the key, what was found about the mesh, and a hash
+/// of these and of the asset.
+std::string line_of(const CacheKey& key, const CacheEntry& entry);
+/// The entry of such a line. Throws an exception that says what is wrong where the line is damaged,
+/// or is another key's or another asset's.
+CacheEntry entry_from(std::string_view line, const CacheKey& key, Asset asset);
 
 class AssetCache {
  public:

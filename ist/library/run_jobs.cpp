@@ -24,17 +24,12 @@
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
-#include "library/text.h"
 #include "robot/link_mesh.h"
 
 namespace ist {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string hash_of(const Asset& asset) {
-  return fmt::format("{:016x}", asset.view().header().content_hash);
-}
 
 /// The asset of an input mesh. Throws Error; `progress` may cancel.
 using BakeMesh = std::function<Asset(const ClosedMesh&, const BakeSettings&)>;
@@ -64,7 +59,7 @@ bool was_out_of_time(const TreeView& tree) {
 
 void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& result) {
   const TreeView& tree = entry.asset.view();
-  result.content_hash = hash_of(entry.asset);
+  result.content_hash = fmt::format("{:016x}", tree.header().content_hash);
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
   result.coverage = tree.coverage();
@@ -163,7 +158,7 @@ JobResult do_job(const Job& job, const RunSettings& settings, const BakeMesh& ba
   check_demands(job, *entry);
   const fs::path path = settings.output / (job.name + ".ist");
   write_asset(path, entry->asset);
-  if (settings.record && lasts) settings.record->add(job.name, *key, *entry);
+  if (settings.record && lasts) settings.record->add(*key, *entry);
   result.asset = path.string();
   describe(*entry, settings, result);
   return result;
@@ -318,35 +313,25 @@ OutputRecord::OutputRecord(const std::filesystem::path& folder) : folder_(folder
   std::ifstream file(folder / ".ist-bakes");
   for (std::string text; std::getline(file, text);) {
     try {
-      const Json json = Json::parse(text);
-      Line line = {json.at("key"), json.at("hash"), json.at("notes"), std::nullopt};
-      if (!json.at("confidence").is_null()) line.confidence = json.at("confidence").get<double>();
-      lines_[json.at("name")] = std::move(line);
+      lines_[Json::parse(text).at("key")] = text;
     } catch (const Json::exception&) {
     }
   }
 }
 
 std::optional<CacheEntry> OutputRecord::find(const std::string& name, const CacheKey& key) const {
-  const auto line = lines_.find(name);
-  if (line == lines_.end() || line->second.key != key.text()) return std::nullopt;
+  const auto line = lines_.find(key.text());
+  if (line == lines_.end()) return std::nullopt;
   try {
-    Asset asset = Asset::load((folder_ / (name + ".ist")).string());
-    if (hash_of(asset) != line->second.hash) return std::nullopt;
-    return CacheEntry{std::move(asset), line->second.notes, line->second.confidence};
-  } catch (const Error&) {
+    return entry_from(line->second, key, Asset::load((folder_ / (name + ".ist")).string()));
+  } catch (const std::exception&) {
     return std::nullopt;
   }
 }
 
-void OutputRecord::add(const std::string& name, const CacheKey& key, const CacheEntry& entry) {
-  const Json json = {{"name", name},
-                     {"key", key.text()},
-                     {"hash", hash_of(entry.asset)},
-                     {"notes", entry.notes},
-                     {"confidence", entry.confidence ? Json(*entry.confidence) : Json()}};
+void OutputRecord::add(const CacheKey& key, const CacheEntry& entry) {
   // The end of the line comes first: a line that was cut short does not take this one with it.
-  const std::string text = fmt::format("\n{}", app::json_text(json, -1));
+  const std::string text = '\n' + line_of(key, entry);
   const std::lock_guard lock(mutex_);
   std::ofstream file(folder_ / ".ist-bakes", std::ios::app);
   file.write(text.data(), static_cast<std::streamsize>(text.size())).flush();

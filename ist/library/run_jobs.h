@@ -19,7 +19,7 @@
 
 namespace ist {
 
-/// What the assets of a folder were baked from, in its file .ist-bakes: a line an asset, appended
+/// What the assets of a folder were baked from, in its file .ist-bakes: line_of() each, appended
 /// when it is written. A line that is not whole is passed over.
 class OutputRecord {
  public:
@@ -30,16 +30,11 @@ class OutputRecord {
   std::optional<CacheEntry> find(const std::string& name, const CacheKey& key) const;
 
   /// From any thread. Throws Error.
-  void add(const std::string& name, const CacheKey& key, const CacheEntry& entry);
+  void add(const CacheKey& key, const CacheEntry& entry);
 
  private:
-  struct Line {
-    std::string key, hash;
-    std::vector<std::string> notes;
-    std::optional<double> confidence;
-  };
   const std::filesystem::path folder_;
-  std::map<std::string, Line> lines_;  ///< as they were before this run
+  std::map<std::string, std::string> lines_;  ///< [key] as they were before this run
   std::mutex mutex_;
 };
 
