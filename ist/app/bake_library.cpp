@@ -199,7 +199,7 @@ RunSettings settings_for(const LibraryRun& run) {
   settings.device = usable_device(run.device);
   settings.threads = run.threads;
   settings.jobs = run.library.jobs;
-  settings.memory = run.library.memory;
+  settings.memory = run.library.memory.value_or(0);
   settings.warnings_of = warnings_of;
   return settings;
 }
@@ -264,12 +264,13 @@ void run_library(const LibraryRun& run) {
   const Manifest manifest = read_sound_manifest(run.library.manifest);
   RunSettings settings = settings_for(run);
   const std::string cache = cache_folder(run.library);
-  if (cache.empty() && run.library.cache_size != 0)
+  const std::uint64_t cache_size = run.library.cache_size.value_or(0);
+  if (cache.empty() && cache_size != 0)
     throw CLI::ValidationError("--cache-size", "has no effect without --cache or IST_CACHE");
   make_folder(run.output);
   announce_device(settings.device);
   if (!cache.empty())
-    settings.cache = std::make_shared<AssetCache>(cache, run.library.cache_size);
+    settings.cache = std::make_shared<AssetCache>(cache, cache_size);
   else
     settings.record = std::make_shared<OutputRecord>(run.output);
 
@@ -285,8 +286,7 @@ void run_library(const LibraryRun& run) {
   LibraryProgress progress(jobs.size(), run.quiet);
   RunOutcome outcome = run_jobs(jobs, settings, progress);
   progress.end();
-  if (settings.cache && run.library.cache_size != 0 && !outcome.stopped)
-    prune_cache(cache, run.library.cache_size);
+  if (settings.cache && cache_size != 0 && !outcome.stopped) prune_cache(cache, cache_size);
   summary.results = std::move(outcome.results);
   if (!outcome.stopped)
     summary.stale =

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace ist::app {
 struct LibraryOptions {
   std::string manifest, cache, shard;
   unsigned jobs = 0;
-  std::uint64_t memory = 0, cache_size = 0;
+  std::optional<std::uint64_t> memory, cache_size;
   bool remove_stale = false;
 };
 

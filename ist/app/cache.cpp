@@ -68,15 +68,10 @@ void add_cache(CLI::App& app) {
   CLI::Option* const prune = command->add_flag(
       "--prune", options->prune,
       "Remove unfinished files that are at least one hour old; with --max-size also assets");
-  add_parsed(
-      command, "--max-size", "a number of bytes such as 4096, 512M or 10G",
-      [options](const std::string& text) {
-        options->most = parse_bytes(text);
-        return options->most.has_value();
-      },
-      "Remove the least recently used assets until the cache is at most this large, in bytes, e.g. "
-      "10G; 0 = remove all")
-      ->type_name("BYTES")
+  add_bytes(
+      command, "--max-size", options->most,
+      "Remove the least recently used assets until the cache is at most this large, in bytes, "
+      "e.g. 10G; 0 = remove all")
       ->needs(prune);
   command->add_flag("--json", options->json, "Print JSON");
   command->footer("Example: ist cache ~/.cache/ist --prune --max-size 10G");

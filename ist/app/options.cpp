@@ -14,6 +14,7 @@
 #include "bake/asset/atomic_file.h"
 
 namespace ist::app {
+
 CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::string& meaning,
                         const std::function<bool(const std::string&)>& take,
                         const std::string& help) {
@@ -25,26 +26,6 @@ CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::s
       },
       help);
 }
-
-namespace {
-
-CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
-                        const Range& range, const std::string& words,
-                        std::optional<double> (*parse)(std::string_view), const std::string& help) {
-  return add_parsed(
-             command, name, words,
-             [&value, range, parse](const std::string& text) {
-               const std::optional<double> parsed = parse(text);
-               if (!parsed || !range.holds(*parsed)) return false;
-               value = *parsed;
-               return true;
-             },
-             help)
-      ->type_name("NUMBER")
-      ->default_str(fmt::format("{:g}", value));
-}
-
-}  // namespace
 
 void add_setting_options(CLI::App* command, SettingOptions& options,
                          std::span<const Setting> settings) {
@@ -183,24 +164,25 @@ void announce_device(Device device) {
     spdlog::info("baking on the CPU: {}", why);
 }
 
-CLI::Option* add_real(CLI::App* command, const std::string& name, double& value, const Range& range,
-                      const std::string& help) {
-  return add_number(command, name, value, range, number_in_words(range), parse_number, help);
+CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
+                        const Range& range, const std::string& help, bool is_share) {
+  return add_parsed(
+             command, name, in_words(range, is_share),
+             [&value, range, is_share](const std::string& text) {
+               return take_number(text, range, is_share, value);
+             },
+             help)
+      ->type_name("NUMBER")
+      ->default_str(fmt::format("{:g}", value));
 }
 
-CLI::Option* add_share(CLI::App* command, const std::string& name, double& value,
-                       const Range& range, const std::string& help) {
-  return add_number(command, name, value, range, share_in_words(range), parse_share, help);
-}
-
-CLI::Option* add_bytes(CLI::App* command, const std::string& name, std::uint64_t& value,
-                       const std::string& help) {
+CLI::Option* add_bytes(CLI::App* command, const std::string& name,
+                       std::optional<std::uint64_t>& value, const std::string& help) {
   return add_parsed(
              command, name, "a number of bytes such as 4096, 512M or 10G",
              [&value](const std::string& text) {
-               const std::optional<std::uint64_t> parsed = parse_bytes(text);
-               if (parsed) value = *parsed;
-               return parsed.has_value();
+               value = parse_bytes(text);
+               return value.has_value();
              },
              help)
       ->type_name("BYTES");

@@ -85,26 +85,19 @@ CLI::Option* add_whole(CLI::App* command, const std::string& name, T& value,
   return add_parsed(
              command, name, "a whole number from " + range,
              [&value, least, most](const std::string& text) {
-               const std::optional<T> parsed = parse_whole<T>(text);
-               if (!parsed || *parsed < least || *parsed > most) return false;
-               value = *parsed;
-               return true;
+               return take_whole(text, least, most, value);
              },
              help)
       ->type_name("INT")
       ->default_str(std::to_string(value));
 }
 
-/// A number in a range; `value` holds the default.
-CLI::Option* add_real(CLI::App* command, const std::string& name, double& value, const Range& range,
-                      const std::string& help);
+/// A number in a range, or a share: 0.005 or 0.5%. `value` holds the default.
+CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
+                        const Range& range, const std::string& help, bool is_share = false);
 
-/// A share in a range, 0.005 or 0.5%; `value` holds the default.
-CLI::Option* add_share(CLI::App* command, const std::string& name, double& value,
-                       const Range& range, const std::string& help);
-
-/// Bytes: 4096, 512M, 10G. `value` holds the default; 0 is said to be none.
-CLI::Option* add_bytes(CLI::App* command, const std::string& name, std::uint64_t& value,
-                       const std::string& help);
+/// Bytes: 4096, 512M, 10G.
+CLI::Option* add_bytes(CLI::App* command, const std::string& name,
+                       std::optional<std::uint64_t>& value, const std::string& help);
 
 }  // namespace ist::app

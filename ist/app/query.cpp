@@ -247,8 +247,8 @@ void add_query(CLI::App& app) {
   file->check([](const std::string& text) { return text.empty() ? "'' is not a file name" : ""; });
   poses->require_option(1);
   CLI::Option* const scale =
-      add_real(command, "--scale-b", options->scale_b, {.least = 0, .without_least = true},
-               "Uniform scale of B about its origin");
+      add_number(command, "--scale-b", options->scale_b, {.least = 0, .without_least = true},
+                 "Uniform scale of B about its origin");
   command->add_option("--class", options->classes, "Only rows of this class. Repeatable")
       ->take_all()
       ->allow_extra_args(false)
@@ -280,12 +280,13 @@ void add_query(CLI::App& app) {
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
             "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
             "Matched measure only");
-  add_share(
+  add_number(
       command, "--error", options->settings.penetration.relative_error,
       {.least = 0, .most = 1, .without_most = true},
       "Accepted relative error of the volume, e.g. 0.5%; 0 = all spheres. The query uses the "
       "coarsest level of detail whose predicted error is smaller, or the kept meshes if those are "
-      "cheaper. Matched measure only");
+      "cheaper. Matched measure only",
+      true);
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
   add_whole<std::size_t>(command, "--repeat", options->repeat,

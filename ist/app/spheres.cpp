@@ -270,9 +270,9 @@ void add_spheres(CLI::App& app) {
                              1, 1'000'000);
   total->default_str("");
   CLI::Option* const most =
-      add_real(command, "--max-protrusion", options->cover.max_protrusion,
-               {.least = 0, .without_least = true},
-               "[u] Use few spheres that stick out of the link by at most this");
+      add_number(command, "--max-protrusion", options->cover.max_protrusion,
+                 {.least = 0, .without_least = true},
+                 "[u] Use few spheres that stick out of the link by at most this");
   most->default_str("");
   CLI::Option* const cover = command->add_flag_callback(
       "--cover", [options] { options->kind = Kind::cover; },

@@ -22,7 +22,6 @@ using Member = std::remove_reference_t<std::invoke_result_t<Of, BakeSettings&>>;
 template <class Of>
 Setting whole(const char* name, Of of, Member<Of> least, Member<Of> most, const char* help) {
   BakeSettings defaults;
-  using T = Member<Of>;
   return {name,
           "INT",
           fmt::format("a whole number from {} to {}", least, most),
@@ -30,10 +29,7 @@ Setting whole(const char* name, Of of, Member<Of> least, Member<Of> most, const 
           help,
           SettingKind::whole,
           [of, least, most](BakeSettings& settings, const std::string& text) {
-            const std::optional<T> value = parse_whole<T>(text);
-            if (!value || *value < least || *value > most) return false;
-            of(settings) = *value;
-            return true;
+            return take_whole(text, least, most, of(settings));
           },
           [of](BakeSettings settings) { return fmt::to_string(of(settings)); }};
 }
@@ -44,15 +40,12 @@ Setting number(const char* name, SettingKind kind, Of of, const Range& range, co
   const bool is_share = kind == SettingKind::share;
   return {name,
           is_share ? "SHARE" : "NUMBER",
-          is_share ? share_in_words(range) : number_in_words(range),
+          in_words(range, is_share),
           fmt::format("{:g}", of(defaults)),
           help,
           kind,
           [of, range, is_share](BakeSettings& settings, const std::string& text) {
-            const std::optional<double> value = is_share ? parse_share(text) : parse_number(text);
-            if (!value || !range.holds(*value)) return false;
-            of(settings) = *value;
-            return true;
+            return take_number(text, range, is_share, of(settings));
           },
           [of](BakeSettings settings) { return fmt::to_string(of(settings)); }};
 }
@@ -355,13 +348,12 @@ std::optional<SurfaceSettings> parse_surface(const std::string& text) {
   surface.wanted = text != "none";
   if (text == "all" || text == "none") return surface;
   const bool is_share = text.ends_with('%');
-  const std::optional<double> value = is_share ? parse_share(text) : parse_number(text);
   const Range range = {.least = 0,
                        .most = is_share ? 1 : std::numeric_limits<double>::infinity(),
                        .without_least = true,
                        .without_most = is_share};
-  if (!value || !range.holds(*value)) return std::nullopt;
-  (is_share ? surface.share : surface.error) = *value;
+  if (!take_number(text, range, is_share, is_share ? surface.share : surface.error))
+    return std::nullopt;
   return surface;
 }
 

@@ -63,14 +63,19 @@ std::optional<std::uint64_t> parse_bytes(std::string_view text) {
   return *count << shift;
 }
 
-std::string number_in_words(const Range& range) {
-  if (std::isfinite(range.most)) return "a number " + in_words(range, 1, "");
-  return range.without_least ? fmt::format("a finite number above {:g}", range.least)
-                             : fmt::format("a finite number, {:g} or more", range.least);
+bool take_number(const std::string& text, const Range& range, bool is_share, double& value) {
+  const std::optional<double> parsed = is_share ? parse_share(text) : parse_number(text);
+  if (!parsed || !range.holds(*parsed)) return false;
+  value = *parsed;
+  return true;
 }
 
-std::string share_in_words(const Range& range) {
-  return number_in_words(range) + ", or " + in_words(range, 100, "%");
+std::string in_words(const Range& range, bool is_share) {
+  if (!std::isfinite(range.most))
+    return range.without_least ? fmt::format("a finite number above {:g}", range.least)
+                               : fmt::format("a finite number, {:g} or more", range.least);
+  return "a number " + in_words(range, 1, "") +
+         (is_share ? ", or " + in_words(range, 100, "%") : "");
 }
 
 }  // namespace ist

@@ -34,7 +34,19 @@ std::optional<Eigen::Vector3d> parse_factors(std::string_view text);
 /// Bytes as people write them: 4096, 512M, 10G; units K, M, G and T are powers of 1024.
 std::optional<std::uint64_t> parse_bytes(std::string_view text);
 
-std::string number_in_words(const Range& range);  ///< "a number from 0 to below 1"
-std::string share_in_words(const Range& range);   ///< the same, and in percent
+/// Sets `value` to a whole number in [least, most]; false where the text is none.
+template <class T>
+bool take_whole(const std::string& text, T least, T most, T& value) {
+  const std::optional<T> parsed = parse_whole<T>(text);
+  if (!parsed || *parsed < least || *parsed > most) return false;
+  value = *parsed;
+  return true;
+}
+
+/// The same for a number in a range, or a share.
+bool take_number(const std::string& text, const Range& range, bool is_share, double& value);
+
+/// "a number from 0 to below 1"; of a share also in percent.
+std::string in_words(const Range& range, bool is_share);
 
 }  // namespace ist
