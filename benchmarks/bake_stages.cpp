@@ -57,9 +57,8 @@ class Stages {
 void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& stages) {
   const auto solid = stages.time("1 solid", [&] { return std::make_unique<MeshSolid>(mesh); });
   stages.time("2 volume", [&] { return solid->unit_volume(); });
-  const auto backend = stages.time("3 backend", [&] {
-    return make_backend(*solid, {settings.device, settings.gpu});
-  });
+  const auto backend =
+      stages.time("3 backend", [&] { return make_backend(*solid, settings.device, settings.gpu); });
   const auto inner = stages.time("4 pack", [&] { return backend->pack(settings, {}).spheres; });
   const auto calibration =
       stages.time("5 calibrate", [&] { return testing::calibrate(*solid, *backend, inner, {}); });

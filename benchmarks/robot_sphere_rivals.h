@@ -44,7 +44,7 @@ inline CoverSphere ball_of(const Points& points) {
 
 /// The first spheres of the packing, with the library's own cover radii.
 inline Balls packing_with_covers(const MeshSolid& solid, std::size_t count) {
-  const auto backend = make_backend(solid, {Device::cpu, {}});
+  const auto backend = make_backend(solid, Device::cpu);
   PackingSettings settings;
   settings.max_spheres = count;
   const SpherePacking packing = backend->pack(settings, {});

@@ -278,7 +278,7 @@ Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& fie
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress) {
-  const auto backend = make_backend(solid, {settings.device, settings.gpu});
+  const auto backend = make_backend(solid, settings.device, settings.gpu);
   SolidField field(solid, resolution, settings.surface, settings.threads);
   return bake_solid(mesh, solid, field, *backend, settings, progress);
 }

@@ -112,7 +112,7 @@ class TargetBake {
         solid_(mesh_),
         field_(solid_, resolved_.resolution, settings.surface, settings.threads,
                settings.time_limit),
-        backend_(make_backend(solid_, {settings.device, settings.gpu})) {}
+        backend_(make_backend(solid_, settings.device, settings.gpu)) {}
 
   TargetedAsset run() {
     find_near_poses();

@@ -16,7 +16,7 @@ std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& s
     throw Error("medial axis: resolution is " + std::to_string(settings.resolution) +
                 ", must be at most " + std::to_string(kMostGridCells) + " (0 = automatic)");
   return thread_arena(settings.threads).execute([&] {
-    return make_backend(solid, {settings.device, settings.gpu})->medial_nodes(settings);
+    return make_backend(solid, settings.device, settings.gpu)->medial_nodes(settings);
   });
 }
 
@@ -24,7 +24,7 @@ SpherePacking pack(const Solid& solid, const PackingSettings& settings,
                    const ProgressCallback& progress) {
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
-    return make_backend(solid, {settings.device, settings.gpu})->pack(settings, progress);
+    return make_backend(solid, settings.device, settings.gpu)->pack(settings, progress);
   });
 }
 

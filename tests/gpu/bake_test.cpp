@@ -33,7 +33,7 @@ void expect_same(const ClosedMesh& mesh, std::size_t count) {
   SCOPED_TRACE(mesh.name + ", " + std::to_string(count));
   const MeshSolid solid(mesh);
   const std::vector<Sphere> inner = packed_on_cpu(solid, count);
-  const auto on_gpu = make_backend(solid, {Device::cuda, {}});
+  const auto on_gpu = make_backend(solid, Device::cuda);
   const Calibration host = testing::calibrate_on_host(solid, inner);
   const Calibration card = testing::calibrate(solid, *on_gpu, inner, {});
   EXPECT_EQ(
@@ -101,7 +101,7 @@ TEST_F(GpuBake, CancellingEndsAWholeBake) {
 
 TEST_F(GpuBake, CancellingEndsIt) {
   const MeshSolid solid(closed(testing::cube_mesh(), "cube"));
-  const auto on_gpu = make_backend(solid, {Device::cuda, {}});
+  const auto on_gpu = make_backend(solid, Device::cuda);
   const Sphere ball = {0, 0, 0, 0.5f};
   const auto cancel = [](const Progress&) { return false; };
   EXPECT_THROW(testing::calibrate(solid, *on_gpu, {&ball, 1}, cancel), Error);

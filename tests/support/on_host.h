@@ -11,7 +11,7 @@ namespace ist::testing {
 
 /// A solid's host backend.
 inline std::unique_ptr<SolidBackend> host_backend(const MeshSolid& solid) {
-  return make_backend(solid, {Device::cpu, {}});
+  return make_backend(solid, Device::cpu);
 }
 
 /// Calibrates a whole packing.

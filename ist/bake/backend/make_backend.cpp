@@ -16,25 +16,6 @@
 namespace ist {
 namespace {
 
-SpherePacking packed(const Solid& solid, const UnitFrame& frame, const PackingSettings& settings,
-                     const ProgressCallback& progress) {
-  const MeshSolid* const mesh = solid.mesh();
-  Stage stage("pack", progress, settings.time_limit);
-  if (settings.grid != GridMode::banded) {
-    if (mesh == nullptr)
-      throw Error(
-          "packing: only the banded mode packs solids that are not meshes; set grid to banded");
-    return packing::pack_grids(*mesh, settings, stage);
-  }
-  const packing::PackingLimits limits = packing::packing_limits(solid, frame.scale(), settings);
-  if (mesh != nullptr) {
-    const packing::MeshSurface surface(*mesh);
-    return packing::BandedPacker(surface, limits, stage).run();
-  }
-  const packing::FieldSurface surface(solid, frame);
-  return packing::BandedPacker(surface, limits, stage).run();
-}
-
 class HostBackend final : public SolidBackend {
  public:
   explicit HostBackend(const Solid& solid) : solid_(solid) {}
@@ -82,7 +63,21 @@ SpherePacking pack_on_host(const Solid& solid, const PackingSettings& settings,
                            const ProgressCallback& progress) {
   const MeshSolid* const mesh = solid.mesh();
   const UnitFrame frame = mesh != nullptr ? mesh->frame() : unit_frame(solid.bounds());
-  SpherePacking result = packed(solid, frame, settings, progress);
+  Stage stage("pack", progress, settings.time_limit);
+  SpherePacking result;
+  const auto pack_banded = [&](const auto& surface) {
+    const packing::PackingLimits limits = packing::packing_limits(solid, frame.scale(), settings);
+    result = packing::BandedPacker(surface, limits, stage).run();
+  };
+  if (settings.grid != GridMode::banded && mesh == nullptr)
+    throw Error(
+        "packing: only the banded mode packs solids that are not meshes; set grid to banded");
+  if (settings.grid != GridMode::banded)
+    result = packing::pack_grids(*mesh, settings, stage);
+  else if (mesh != nullptr)
+    pack_banded(packing::MeshSurface(*mesh));
+  else
+    pack_banded(packing::FieldSurface(solid, frame));
   result.frame = frame;
   return result;
 }
@@ -92,11 +87,12 @@ std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid) {
 }
 
 // The one place that knows which backends there are.
-std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const BackendChoice& choice) {
-  const bool on_gpu = solid.mesh() != nullptr &&
-                      (choice.device == Device::cuda ||
-                       (choice.device == Device::automatic && gpu_available(choice.gpu.device)));
-  return on_gpu ? gpu::make_cuda_backend(*solid.mesh(), choice.gpu) : make_host_backend(solid);
+std::unique_ptr<SolidBackend> make_backend(const Solid& solid, Device device,
+                                           const GpuSettings& gpu) {
+  const bool on_gpu =
+      solid.mesh() != nullptr &&
+      (device == Device::cuda || (device == Device::automatic && gpu_available(gpu.device)));
+  return on_gpu ? ist::gpu::make_cuda_backend(*solid.mesh(), gpu) : make_host_backend(solid);
 }
 
 }  // namespace ist

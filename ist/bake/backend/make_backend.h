@@ -15,15 +15,10 @@ SpherePacking pack_on_host(const Solid& solid, const PackingSettings& settings,
 /// The seam's host implementation. What only meshes can be asked throws Error for other solids.
 std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid);
 
-/// Where a solid's work is to be done.
-struct BackendChoice {
-  Device device = Device::automatic;
-  GpuSettings gpu = {};
-};
-
 /// The backend for a solid, which must outlive it: a GPU's where one is asked for, or left open
 /// and there, and the solid is a mesh; else the host's. Throws Error where a GPU is asked for by
 /// name and cannot be used, with the way out.
-std::unique_ptr<SolidBackend> make_backend(const Solid& solid, const BackendChoice& choice);
+std::unique_ptr<SolidBackend> make_backend(const Solid& solid, Device device,
+                                           const GpuSettings& gpu = {});
 
 }  // namespace ist
