@@ -66,12 +66,9 @@ ClosedMesh close_or_advise(TriangleMesh mesh, const std::string& name,
 }
 
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
-  TriangleMesh mesh = load_mesh(path);
-  place(mesh, settings);
-  const DeclaredFrame declared = mesh.declared;
-  ClosedMesh closed = close_or_advise(std::move(mesh), path, settings);
-  for (const std::string& note : closed.report.notes) spdlog::warn("{}: {}", path, note);
-  return {declared, std::move(closed)};
+  InputMesh mesh = read_input_mesh(path, settings, close_or_advise);
+  for (const std::string& note : mesh.closed.report.notes) spdlog::warn("{}: {}", path, note);
+  return mesh;
 }
 
 std::string describe_closing(const MeshReport& report) {

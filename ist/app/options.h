@@ -43,7 +43,8 @@ void refuse_idle_options(const RobotOptions& options, const std::string& input);
 /// It ends in .urdf. Throws Error for .xacro, which is to be expanded.
 bool is_robot_file(const std::string& path);
 
-/// A required argument or option that names a file to read; "" and "-" are refused.
+/// An argument or option that names a file to read, required unless the caller says otherwise; ""
+/// and "-" are refused.
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,
                        const std::string& help);
 

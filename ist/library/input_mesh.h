@@ -14,12 +14,13 @@ struct InputMesh {
   ClosedMesh closed;
 };
 
-/// Loads, scales, turns and closes a mesh. Throws Error.
-InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings);
-
 /// close_mesh() as `settings` have it; where it throws and a wrap is asked for, wrap_mesh(), with a
 /// note of why. Throws Error.
 ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
+
+/// Loads, scales, turns and closes a mesh. Throws Error.
+InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings,
+                          decltype(close_as_asked)& close = close_as_asked);
 
 /// What load_mesh() gives, scaled by scale_mesh() and then turned: the quarter turn about the third
 /// axis that takes up_axis to world_up.
