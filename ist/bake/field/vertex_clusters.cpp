@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "mesh/exact_triangle.h"
@@ -283,14 +282,12 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
   off = farthest_plane(planes, x);
 }
 
-const std::vector<std::uint32_t>* VertexClusters::chosen(double tolerance, std::size_t most) {
-  if (tolerance == chosen_within_) return &chosen_;
-  chosen_within_ = -1;
-  chosen_.assign(mesh_.vertex_count, kOpen);
+std::vector<std::uint32_t> VertexClusters::chosen(double tolerance) {
+  std::vector<std::uint32_t> cluster_of(mesh_.vertex_count, kOpen);
   for (;;) {
     tbb::concurrent_vector<Doubt> doubts;
-    for_chunks(chosen_.size(), [&](std::size_t, std::size_t v) {
-      if (chosen_[v] != kOpen) return;
+    for_chunks(cluster_of.size(), [&](std::size_t, std::size_t v) {
+      if (cluster_of[v] != kOpen) return;
       std::size_t before = 0;
       for (std::uint32_t l = 0; l < levels_.size(); ++l) {
         Level& level = levels_[l];
@@ -298,26 +295,20 @@ const std::vector<std::uint32_t>* VertexClusters::chosen(double tolerance, std::
         if (level.off[cluster] <= tolerance) {
           const std::atomic_ref<std::uint8_t> known(level.known[cluster]);
           const std::uint8_t was = known.load(std::memory_order_relaxed);
-          if (was == kKnown) chosen_[v] = static_cast<std::uint32_t>(before + cluster);
+          if (was == kKnown) cluster_of[v] = static_cast<std::uint32_t>(before + cluster);
           if (was == kUnknown && known.exchange(kInDoubt, std::memory_order_relaxed) == kUnknown)
             doubts.push_back({l, cluster});
           return;
         }
         before += level.place.size();
       }
-      chosen_[v] = static_cast<std::uint32_t>(before + v);
+      cluster_of[v] = static_cast<std::uint32_t>(before + v);
     });
-    if (doubts.empty()) break;
-    if (doubts.size() > most) {  // in each of them there is one at least, or nearly
-      for (const Doubt& doubt : doubts) levels_[doubt.level].known[doubt.cluster] = kUnknown;
-      return nullptr;
-    }
+    if (doubts.empty()) return cluster_of;
     tbb::parallel_for(std::size_t{0}, doubts.size(), [&](std::size_t i) {
       settle(levels_[doubts[i].level], doubts[i].cluster, tolerance);
     });
   }
-  chosen_within_ = tolerance;
-  return &chosen_;
 }
 
 void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
@@ -331,7 +322,6 @@ void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
       cluster -= level.off.size();
     }
   }
-  chosen_within_ = -1;
 }
 
 std::vector<FieldMesh::Triangle> VertexClusters::spanning(
@@ -349,8 +339,7 @@ std::vector<FieldMesh::Triangle> VertexClusters::spanning(
 }
 
 Clustered VertexClusters::within(double tolerance) {
-  const std::vector<std::uint32_t>& cluster_of =
-      *chosen(tolerance, std::numeric_limits<std::size_t>::max());
+  const std::vector<std::uint32_t> cluster_of = chosen(tolerance);
   std::size_t names = mesh_.vertex_count;
   for (const Level& level : levels_) names += level.place.size();
   // Only clusters that are chosen become vertices, in the order of their first vertices.

@@ -82,9 +82,8 @@ class VertexClusters {
   /// Finds out whether a cluster is within the tolerance.
   void settle(Level& level, std::uint32_t cluster, double tolerance) const;
   CornerPlane plane_of(std::uint32_t corner, std::uint32_t vertex) const;
-  /// Names of clusters of all levels, and of single vertices after them, for every vertex. Nothing
-  /// where there are more clusters than `most`, seen early.
-  const std::vector<std::uint32_t>* chosen(double tolerance, std::size_t most);
+  /// Names of clusters of all levels, and of single vertices after them, for every vertex.
+  std::vector<std::uint32_t> chosen(double tolerance);
   std::array<double, 3> place_of(std::size_t cluster, std::uint32_t vertex) const;
   std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
 
@@ -92,8 +91,6 @@ class VertexClusters {
   ItemGroups<> corners_;        ///< [vertex] 3 triangle + k
   RawArray<AreaVector> areas_;  ///< [triangle]
   std::vector<Level> levels_;
-  std::vector<std::uint32_t> chosen_;
-  double chosen_within_ = -1;         ///< the tolerance of chosen_
   std::vector<std::uint32_t> names_;  ///< of the clusters of the last within()
 };
 
