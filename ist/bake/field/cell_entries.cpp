@@ -6,59 +6,13 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "mesh/triangle_frame.h"
 
 namespace ist {
 namespace {
-
-/// Tells which boxes a triangle meets, by separating axes; in double, rounding not included: ask
-/// about boxes that are a little larger.
-class CellOverlap {
- public:
-  CellOverlap(const double a[3], const double b[3], const double c[3]) {
-    for (int k = 0; k < 3; ++k) {
-      corner_[0][k] = a[k];
-      corner_[1][k] = b[k];
-      corner_[2][k] = c[k];
-    }
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) side_[i][k] = corner_[(i + 1) % 3][k] - corner_[i][k];
-    cross3(side_[0], side_[1], normal_);
-  }
-
-  /// Whether the triangle and the box (centre, half-edges) have a point in common.
-  bool meets(const double centre[3], const double half[3]) const {
-    double p[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) p[i][k] = corner_[i][k] - centre[k];
-    for (int k = 0; k < 3; ++k)
-      if (apart(p[0][k], p[1][k], p[2][k], half[k])) return false;
-    const double off = dot3(normal_, p[0]);
-    if (std::fabs(off) > std::fabs(normal_[0]) * half[0] + std::fabs(normal_[1]) * half[1] +
-                             std::fabs(normal_[2]) * half[2])
-      return false;
-    for (const auto& e : side_)
-      for (int k = 0; k < 3; ++k) {
-        // The axis k × e: across both the side and an edge of the box.
-        const int i = (k + 1) % 3, j = (k + 2) % 3;
-        const double reach = std::fabs(e[j]) * half[i] + std::fabs(e[i]) * half[j];
-        const auto along = [&](const double x[3]) { return e[i] * x[j] - e[j] * x[i]; };
-        if (apart(along(p[0]), along(p[1]), along(p[2]), reach)) return false;
-      }
-    return true;
-  }
-
- private:
-  static bool apart(double a, double b, double c, double reach) {
-    return (a > reach && b > reach && c > reach) || (a < -reach && b < -reach && c < -reach);
-  }
-
-  double corner_[3][3];
-  double side_[3][3];
-  double normal_[3];
-};
 
 /// Cells are taken to be larger by this where triangles are looked for: of a cell, and of the unit
 /// frame.
@@ -69,16 +23,16 @@ struct CellRange {
   std::uint32_t begin[3], end[3];
 };
 
-constexpr std::uint32_t kRow = 16;  ///< cells along an edge of ranges that are not halved
+constexpr std::uint32_t kRow = 16;  ///< cells along an edge of a small range
 
-/// Tells which cells of a small range a triangle meets: CellOverlap's axes, each looked at once for
-/// all cells that it does not tell apart.
+/// Tells which cells of a small range a triangle meets, by separating axes, each looked at once for
+/// all cells that it does not tell apart. In double, rounding not included: cells are enlarged.
 class RangeOverlap {
  public:
-  RangeOverlap(const BrickGrid& grid, const LaneCorners& t) {
-    const double half = grid.cell / 2 + (kEnlarged * grid.cell + kEnlargedBy);
-    for (int k = 0; k < 3; ++k) first_[k] = grid.low[k] + grid.cell / 2;
-    step_ = grid.cell;
+  /// Cells of edge `cell` from `low` on.
+  RangeOverlap(const double low[3], double cell, const LaneCorners& t) : step_(cell) {
+    const double half = cell / 2 + (kEnlarged * cell + kEnlargedBy);
+    for (int k = 0; k < 3; ++k) first_[k] = low[k] + cell / 2;
     double side[3][3];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) side[i][k] = t.p[(i + 1) % 3][k] - t.p[i][k];
@@ -154,29 +108,32 @@ class RangeOverlap {
   Axis across_[3][3];
 };
 
-/// Calls visit(x, y, z) for the cells of a range that the triangle meets, large ranges by halves.
+/// Calls visit(part) for small parts of a range that hold all cells that the triangle meets: of a
+/// large one those in cells kRow times as large that it meets.
 template <class Visit>
-void for_cells(const BrickGrid& grid, const CellOverlap& triangle, const RangeOverlap& cells,
-               const CellRange& range, const Visit& visit) {
-  int longest = 0;
-  for (int k = 1; k < 3; ++k)
-    if (range.end[k] - range.begin[k] > range.end[longest] - range.begin[longest]) longest = k;
-  const std::uint32_t length = range.end[longest] - range.begin[longest];
-  if (length <= kRow) {
-    cells.for_cells(range, visit);
-    return;
-  }
-  double centre[3], half[3];
+void for_parts(const double low[3], double cell, const LaneCorners& t, const CellRange& range,
+               const Visit& visit) {
+  CellRange large;
+  bool is_small = true;
   for (int k = 0; k < 3; ++k) {
-    centre[k] = grid.low[k] + (double{1} * range.begin[k] + range.end[k]) / 2 * grid.cell;
-    half[k] = double{1} * (range.end[k] - range.begin[k]) / 2 * grid.cell +
-              (kEnlarged * grid.cell + kEnlargedBy);
+    is_small = is_small && range.end[k] - range.begin[k] <= kRow;
+    large.begin[k] = range.begin[k] / kRow;
+    large.end[k] = (range.end[k] - 1) / kRow + 1;
   }
-  if (!triangle.meets(centre, half)) return;
-  CellRange first = range, second = range;
-  first.end[longest] = second.begin[longest] = range.begin[longest] + length / 2;
-  for_cells(grid, triangle, cells, first, visit);
-  for_cells(grid, triangle, cells, second, visit);
+  if (is_small) return visit(range);
+  const RangeOverlap overlap(low, kRow * cell, t);
+  const std::function<void(const CellRange&)> visit_parts = [&](const CellRange& some) {
+    overlap.for_cells(some, [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+      const std::uint32_t at[3] = {x, y, z};
+      CellRange part;
+      for (int k = 0; k < 3; ++k) {
+        part.begin[k] = std::max(range.begin[k], kRow * at[k]);
+        part.end[k] = std::min(range.end[k], kRow * (at[k] + 1));
+      }
+      visit(part);
+    });
+  };
+  for_parts(low, kRow * cell, t, large, visit_parts);
 }
 
 /// The cells that may hold a point of a triangle's box.
@@ -200,8 +157,12 @@ template <class Visit>
 void for_cells_of(const BrickGrid& grid, const SurfaceBlock& block, std::uint32_t lane,
                   const Visit& visit) {
   const LaneCorners t = corners_of(block, lane);
-  for_cells(grid, CellOverlap(t.p[0], t.p[1], t.p[2]), RangeOverlap(grid, t), range_of(grid, t),
-            [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) { visit(grid.name(x, y, z)); });
+  const RangeOverlap overlap(grid.low, grid.cell, t);
+  for_parts(grid.low, grid.cell, t, range_of(grid, t), [&](const CellRange& part) {
+    overlap.for_cells(part, [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
+      visit(grid.name(x, y, z));
+    });
+  });
 }
 
 }  // namespace
