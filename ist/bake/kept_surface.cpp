@@ -41,18 +41,6 @@ struct Box {
   }
 };
 
-FieldMesh in_floats(const MeshView& surface) {
-  FieldMesh mesh;
-  mesh.vertices.resize(surface.vertex_count);
-  mesh.triangles.resize(surface.triangle_count);
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      mesh.vertices[v][k] = static_cast<float>(surface.vertices[3 * v + k]);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
-    std::copy_n(surface.triangles + 3 * t, 3, mesh.triangles[t].begin());
-  return mesh;
-}
-
 /// Patches in an order whose groups of 16, 256, … lie together.
 std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
   std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface), true);
@@ -92,9 +80,8 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
     for (std::size_t k = 0; k < 3; ++k) {
       std::fill_n(block.corner[k], kWidth, std::uint8_t{0});
       for (std::size_t i = 0; i < patch.triangles.size(); ++i) {
-        const std::uint32_t v = surface.triangles[3 * std::size_t{patch.triangles[i]} + k];
-        block.corner[k][i] = static_cast<std::uint8_t>(
-            std::find(patch.vertices.begin(), patch.vertices.end(), v) - patch.vertices.begin());
+        block.corner[k][i] =
+            patch.place_of(surface.triangles[3 * std::size_t{patch.triangles[i]} + k]);
       }
     }
     arrays.header.triangle_count += block.triangles;

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "bake/check/check_field.h"
 #include "bake/check/check_surface.h"
 
 namespace ist {

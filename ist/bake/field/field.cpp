@@ -38,11 +38,8 @@ SurfaceBlock block_of(const FieldMesh& mesh, const BlockPatch& patch) {
     block.z[v] = x[2];
   }
   for (std::size_t i = 0; i < patch.triangles.size(); ++i)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t vertex = mesh.triangles[patch.triangles[i]][k];
-      block.corner[k][i] = static_cast<std::uint8_t>(
-          std::find(patch.vertices.begin(), patch.vertices.end(), vertex) - patch.vertices.begin());
-    }
+    for (std::size_t k = 0; k < 3; ++k)
+      block.corner[k][i] = patch.place_of(mesh.triangles[patch.triangles[i]][k]);
   return block;
 }
 
@@ -140,21 +137,15 @@ FieldArrays laid_out(const FieldMesh& mesh, const Hierarchy& hierarchy) {
 
 /// The triangles themselves over vertices rounded to float: no point moves further than a vertex.
 Approximation own_triangles(const MeshView& surface) {
-  Approximation out;
-  out.mesh.vertices.resize(surface.vertex_count);
+  Approximation out{in_floats(surface)};
   for (std::size_t v = 0; v < out.mesh.vertices.size(); ++v) {
     double moved2 = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-      const double exact = surface.vertices[3 * v + k];
-      const auto rounded = static_cast<float>(exact);
-      out.mesh.vertices[v][k] = rounded;
-      moved2 += (exact - double{rounded}) * (exact - double{rounded});
+      const double moved = surface.vertices[3 * v + k] - double{out.mesh.vertices[v][k]};
+      moved2 += moved * moved;
     }
     out.error = std::max(out.error, std::sqrt(moved2) * (1 + 1e-12));
   }
-  out.mesh.triangles.resize(surface.triangle_count);
-  for (std::size_t t = 0; t < out.mesh.triangles.size(); ++t)
-    std::copy_n(surface.triangles + 3 * t, 3, out.mesh.triangles[t].begin());
   reduce(out.mesh);
   return out;
 }

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "mesh/mesh_view.h"
+
 namespace ist {
 
 /// A closed, oriented surface over float vertices, unit frame: every edge is run as often one way
@@ -15,6 +17,9 @@ struct FieldMesh {
   std::vector<Vertex> vertices;
   std::vector<Triangle> triangles;
 };
+
+/// A closed mesh over its vertices rounded to float.
+FieldMesh in_floats(const MeshView& mesh);
 
 /// Makes vertices of equal coordinates one, and reduces triangles: those with two equal corners
 /// vanish, of those with the same three corners the signed sum stays. A closed surface stays closed

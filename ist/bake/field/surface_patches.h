@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -13,6 +14,12 @@ namespace ist {
 struct BlockPatch {
   std::vector<std::uint32_t> triangles;
   std::vector<std::uint32_t> vertices;  ///< theirs, each once
+
+  /// Where a vertex stands in `vertices`.
+  std::uint8_t place_of(std::uint32_t vertex) const {
+    return static_cast<std::uint8_t>(std::find(vertices.begin(), vertices.end(), vertex) -
+                                     vertices.begin());
+  }
 };
 
 /// Cuts a surface into patches that are full and compact: each grows from a triangle by neighbours
