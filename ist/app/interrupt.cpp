@@ -19,7 +19,7 @@ void on_timer(int) { _exit(kExitInterrupted); }
 /// 0: no timer.
 void set_timer(std::sig_atomic_t microseconds) {
   itimerval timer = {};
-  timer.it_value.tv_usec = microseconds;
+  timer.it_value = {microseconds / 1'000'000, microseconds % 1'000'000};
   setitimer(ITIMER_REAL, &timer, nullptr);
 }
 
