@@ -86,12 +86,9 @@ void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
   const PackagePaths paths = package_paths(options.mesh, options.robot);
   LinkMeshes meshes(options.mesh, settings.mesh);
   std::vector<std::optional<ClosedMesh>> closed;
-  for (std::size_t i = 0; i < all.jobs.size(); ++i) {
-    closed.emplace_back();
-    for (const std::string& link : all.links[i])
-      closed[i] =
-          meshes.close(link, [&] { return mesh_of(*all.jobs[i].shape, paths, options.mesh).mesh; });
-  }
+  for (std::size_t i = 0; i < all.jobs.size(); ++i)
+    closed.push_back(meshes.close(
+        all.links[i], [&] { return mesh_of(*all.jobs[i].shape, paths, options.mesh).mesh; }));
   meshes.finish();
   std::vector<Asset> assets;
   for (const auto& mesh : closed)

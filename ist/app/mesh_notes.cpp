@@ -20,25 +20,30 @@ std::string without_numbers(std::string text) {
 
 }  // namespace
 
-std::optional<ClosedMesh> LinkMeshes::close(const std::string& link,
+std::optional<ClosedMesh> LinkMeshes::close(const std::vector<std::string>& links,
                                             const std::function<TriangleMesh()>& make) {
-  try {
-    ClosedMesh closed =
-        close_or_advise(make(), fmt::format("{}: link {}", robot_, link), settings_);
-    for (const std::string& note : closed.report.notes) {
-      Warning& warning = warnings_[without_numbers(note)];
-      warning.differs |= !warning.links.empty() && note != warning.note;
-      if (warning.links.empty() || note < warning.note) {
-        warning.note = note;
-        warning.link = link;
-      }
-      if (warning.links.empty() || warning.links.back() != link) warning.links.push_back(link);
+  for (const std::string& name : links) {
+    try {
+      ClosedMesh closed =
+          close_or_advise(make(), fmt::format("{}: link {}", robot_, name), settings_);
+      for (const std::string& link : links)
+        for (const std::string& note : closed.report.notes) warn(link, note);
+      return closed;
+    } catch (const Error& error) {
+      faults_.push_back(error.what());
     }
-    return closed;
-  } catch (const Error& error) {
-    faults_.push_back(error.what());
-    return std::nullopt;
   }
+  return std::nullopt;
+}
+
+void LinkMeshes::warn(const std::string& link, const std::string& note) {
+  Warning& warning = warnings_[without_numbers(note)];
+  warning.differs |= !warning.links.empty() && note != warning.note;
+  if (warning.links.empty() || note < warning.note) {
+    warning.note = note;
+    warning.link = link;
+  }
+  if (warning.links.empty() || warning.links.back() != link) warning.links.push_back(link);
 }
 
 void LinkMeshes::finish() const {

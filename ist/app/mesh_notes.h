@@ -21,14 +21,17 @@ class LinkMeshes {
   LinkMeshes(std::string robot, MeshSettings settings)
       : robot_(std::move(robot)), settings_(settings) {}
 
-  /// The mesh that `make` returns, closed; nothing where that or closing it throws Error.
-  std::optional<ClosedMesh> close(const std::string& link,
+  /// The mesh of these links that `make` returns, closed; nothing where that or closing it throws
+  /// Error, which is a fault of each link.
+  std::optional<ClosedMesh> close(const std::vector<std::string>& links,
                                   const std::function<TriangleMesh()>& make);
 
   /// Throws Error if any link failed.
   void finish() const;
 
  private:
+  void warn(const std::string& link, const std::string& note);
+
   struct Warning {
     /// The first of its kind by its letters, so that of the lowest confidence, and whose it is.
     std::string note, link;

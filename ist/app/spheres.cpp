@@ -76,7 +76,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
     };
     if (!one.has_mesh)
       geometry();
-    else if (std::optional<ClosedMesh> closed = meshes.close(link.name, geometry))
+    else if (std::optional<ClosedMesh> closed = meshes.close({link.name}, geometry))
       out.meshes.push_back(std::move(*closed));
   }
   meshes.finish();
