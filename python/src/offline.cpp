@@ -35,31 +35,14 @@ struct Job {
 
 /// Stages that run, those included that nobody waits for any more: the interpreter does not end
 /// before them.
-class Running {
- public:
-  void begin() {
-    const std::lock_guard lock(mutex_);
-    ++count_;
-  }
-  void end() {
-    const std::lock_guard lock(mutex_);
-    --count_;
-    ended_.notify_all();
-  }
-  void wait() {
-    std::unique_lock lock(mutex_);
-    ended_.wait(lock, [&] { return count_ == 0; });
-  }
+std::atomic<int>& running() {
+  static auto* const count = new std::atomic<int>(0);  // outlives every thread
+  return *count;
+}
 
- private:
-  std::mutex mutex_;
-  std::condition_variable ended_;
-  int count_ = 0;
-};
-
-Running& running() {
-  static Running* const all = new Running;  // outlives every thread
-  return *all;
+void end_running() {
+  --running();
+  running().notify_all();
 }
 
 void work_apart(OfflineWork work, const std::shared_ptr<Job>& job) {
@@ -95,14 +78,14 @@ void give_up(Job& job) {
 
 void run_offline(OfflineWork work, const py::object& progress, bool rounds) {
   const auto job = std::make_shared<Job>();
-  running().begin();
+  ++running();
   try {
     std::thread([work = std::move(work), job]() mutable {
       work_apart(std::move(work), job);
-      running().end();
+      end_running();
     }).detach();
   } catch (...) {
-    running().end();
+    end_running();
     throw;
   }
   app::WholeProgress whole(rounds);
@@ -151,7 +134,7 @@ void add_offline(py::module_& module) {
       .def_ro("elapsed", &Progress::elapsed, "[s] since the stage began.");
   py::module_::import_("atexit").attr("register")(py::cpp_function([] {
     const py::gil_scoped_release released;
-    running().wait();
+    while (const int left = running()) running().wait(left);
   }));
 }
 
