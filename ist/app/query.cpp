@@ -15,7 +15,7 @@
 #include "app/commands.h"
 #include "app/field_spec.h"
 #include "app/options.h"
-#include "app/query_output.h"
+#include "app/query_rows.h"
 #include "library/asset_summary.h"
 
 namespace ist::app {

@@ -10,12 +10,24 @@
 #include <limits>
 #include <span>
 
-#include "bake/field/hull_cuts.h"
+#include "bake/field/hull.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/exact_triangle.h"
 
 namespace ist {
 namespace {
+
+constexpr double kSmallestPart = 0.2;  // of the target: smaller prisms are taken for their centres
+constexpr double kSlack = 1.02;        // of a target over what is seen of its part
+constexpr double kSquareRounding = 1e-15;  // of a squared distance, with room
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
+std::vector<TriangleFrame<double>> frames_of(const MeshView& surface) {
+  std::vector<TriangleFrame<double>> frames(surface.triangle_count);
+  tbb::parallel_for(std::uint32_t{0}, surface.triangle_count,
+                    [&](std::uint32_t t) { frames[t] = frame_of(corners_of(surface, t)); });
+  return frames;
+}
 
 constexpr double kDistanceRounding = 1e-12;  // of a distance in the unit frame, with room
 constexpr double kTrialSlack = 1.25;  // of the bound that is tried over what is seen at samples
@@ -113,6 +125,189 @@ void raise(const std::atomic_ref<double>& value, double to) {
 }
 
 }  // namespace
+
+SweptError::Point SweptError::Prism::centre() const {
+  Point c = {};
+  for (const Point& p : corner)
+    for (std::size_t k = 0; k < 3; ++k) c[k] += p[k] / 6;
+  return c;
+}
+
+double SweptError::Prism::radius(const Point& centre) const {
+  double most = 0;
+  for (const Point& p : corner) most = std::max(most, between(centre, p));
+  return most;
+}
+
+std::array<SweptError::Prism, 2> SweptError::Prism::halves() const {
+  double way = 0, longest = 0;
+  std::size_t from = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    way = std::max(way, between(corner[k], corner[k + 3]));
+    const std::size_t next = (k + 1) % 3;
+    const double side =
+        std::max(between(corner[k], corner[next]), between(corner[k + 3], corner[next + 3]));
+    if (side > longest) {
+      longest = side;
+      from = k;
+    }
+  }
+  std::array<Prism, 2> out = {*this, *this};
+  if (way > longest) {
+    for (std::size_t k = 0; k < 3; ++k)
+      out[0].corner[k + 3] = out[1].corner[k] = half_way(corner[k], corner[k + 3]);
+    return out;
+  }
+  const std::size_t to = (from + 1) % 3;
+  for (const std::size_t at : {std::size_t{0}, std::size_t{3}})
+    out[0].corner[to + at] = out[1].corner[from + at] =
+        half_way(corner[from + at], corner[to + at]);
+  return out;
+}
+
+SweptError::SweptError(const MeshView& mesh, const Clustered& field,
+                       const FieldHierarchy& hierarchy)
+    : mesh_(mesh),
+      field_(field),
+      hierarchy_(hierarchy),
+      cuts_(hierarchy.view(), frames_of(hierarchy.view())),
+      stars_(triangles_at_vertices(field.mesh.vertices.size(), field.mesh.triangles)),
+      near_(mesh.vertex_count, kNoTriangle),
+      last_near_(field.vertex_of.size(), kNoTriangle) {}
+
+double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) {
+  const double* x = mesh_.vertices + 3 * std::size_t{vertex};
+  const double known2 = known * known * (1 - kSquareRounding);
+  double least2 = kFar * kFar;
+  const auto is_near = [&](std::uint32_t t) {
+    const double d2 = distance2(t, {x[0], x[1], x[2]});
+    if (d2 >= least2) return false;
+    least2 = d2;
+    near_[vertex] = t;
+    return d2 <= known2;
+  };
+  // What was near to the vertex before is, more often than not.
+  const std::atomic_ref<std::uint32_t> last(last_near_[field_.cluster_of[vertex]]);
+  const std::uint32_t first = last.load(std::memory_order_relaxed);
+  if (first != kNoTriangle && is_near(first)) return known;
+  for (const std::uint32_t t : stars_[field_.image(vertex)])
+    if (t != first && is_near(t)) {
+      last.store(t, std::memory_order_relaxed);
+      return known;
+    }
+  const double least = std::sqrt(least2);
+  if (least <= enough) return least;
+  return exact_closest_point(hierarchy_.view(), {x[0], x[1], x[2]}, least).distance;
+}
+
+bool SweptError::is_within(std::uint32_t triangle, double distance) const {
+  const double limit2 = distance * distance;
+  const std::uint32_t* const vertices = mesh_.triangles + 3 * std::size_t{triangle};
+  std::uint32_t to[3];
+  for (int i = 0; i < 3; ++i) to[i] = field_.image(vertices[i]);
+  const auto holds_all = [&](std::uint32_t t) {
+    const FieldMesh::Triangle& corners = field_.mesh.triangles[t];
+    for (int i = 0; i < 3; ++i) {
+      const double* x = mesh_.vertices + 3 * std::size_t{vertices[i]};
+      if (distance2(t, {x[0], x[1], x[2]}) > limit2) return false;
+    }
+    for (const std::uint32_t v : to)  // its own corners need no look
+      if (v != corners[0] && v != corners[1] && v != corners[2] &&
+          distance2(t, place_of(v)) > limit2)
+        return false;
+    return true;
+  };
+  for (int i = 0; i < 3; ++i) {
+    const std::uint32_t t = near_[vertices[i]];
+    bool tried = t == kNoTriangle;
+    for (int j = 0; j < i; ++j) tried |= near_[vertices[j]] == t;
+    if (!tried && holds_all(t)) return true;
+  }
+  for (int i = 0; i < 3; ++i) {
+    bool tried = false;
+    for (int j = 0; j < i; ++j) tried |= to[j] == to[i];
+    if (tried) continue;
+    for (const std::uint32_t t : stars_[to[i]])
+      if (holds_all(t)) return true;
+  }
+  return false;
+}
+
+double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
+                             double limit2) const {
+  double most2 = 0;
+  for (const Point& p : prism.corner) {
+    most2 = std::max(most2, distance2(field_triangle, p));
+    if (most2 > limit2) break;
+  }
+  return most2;
+}
+
+double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> candidates,
+                         double target, bool one_may_do) const {
+  const Point c = prism.centre();
+  double least2 = kInfinite;
+  std::uint32_t nearest = kNoTriangle;
+  for (const std::uint32_t t : candidates) {
+    const double d2 = distance2(t, c);
+    if (d2 < least2) {
+      least2 = d2;
+      nearest = t;
+    }
+  }
+  const double radius = prism.radius(c);
+  const double target2 = target * target;
+  if (nearest != kNoTriangle) {
+    if (std::sqrt(least2) + radius <= target) return std::sqrt(least2) + radius;
+    if (one_may_do) {
+      double whole2 = farthest2(nearest, prism, target2);
+      for (const std::uint32_t t : candidates) {
+        if (whole2 <= target2) return std::sqrt(whole2);
+        if (t != nearest) whole2 = farthest2(t, prism, target2);
+      }
+      if (whole2 <= target2) return std::sqrt(whole2);
+    }
+    if (radius > target &&
+        cuts_.is_within(Hull(prism.corner), candidates, target, {c, std::sqrt(least2)}))
+      return target;
+  }
+  // The field may have another triangle that is nearer.
+  const ClosestPoint closest = exact_closest_point(
+      hierarchy_.view(), {c[0], c[1], c[2]}, nearest != kNoTriangle ? std::sqrt(least2) : kFar);
+  const double distance = closest.distance;
+  if (distance + radius <= target) return distance + radius;
+  if (closest.triangle != kNoTriangle) {
+    const double whole2 = farthest2(closest.triangle, prism, target2);
+    if (whole2 <= target2) return std::sqrt(whole2);
+  }
+  if (radius <= kSmallestPart * target) return distance + radius;
+  // No bound is less than what is seen, and showing a little more takes far fewer parts.
+  target = std::max(target, kSlack * distance);
+  for (const Point& p : prism.corner)
+    target = std::max(target, kSlack * exact_closest_point(hierarchy_.view(), {p[0], p[1], p[2]},
+                                                           distance + between(c, p))
+                                           .distance);
+  double most = 0;
+  for (const Prism& half : prism.halves())
+    most = std::max(most, bound(half, candidates, target, true));
+  return most;
+}
+
+double SweptError::bound(std::uint32_t triangle, double target, bool one_may_do) const {
+  Prism prism;
+  std::vector<std::uint32_t> candidates;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t v = mesh_.triangles[3 * std::size_t{triangle} + i];
+    const std::uint32_t to = field_.image(v);
+    std::copy_n(mesh_.vertices + 3 * std::size_t{v}, 3, prism.corner[i].begin());
+    prism.corner[i + 3] = place_of(to);
+    bool seen = false;
+    for (std::size_t j = 0; j < i; ++j)
+      seen |= field_.image(mesh_.triangles[3 * std::size_t{triangle} + j]) == to;
+    if (!seen) candidates.insert(candidates.end(), stars_[to].begin(), stars_[to].end());
+  }
+  return bound(prism, candidates, target, one_may_do);
+}
 
 std::size_t KnownDistances::Hash::operator()(const HullPoint& p) const {
   std::uint64_t hash = 0;

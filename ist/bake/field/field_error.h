@@ -4,15 +4,72 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "bake/field/field_hierarchy.h"
-#include "bake/field/swept_error.h"
+#include "bake/field/hull_cuts.h"
 #include "bake/field/vertex_clusters.h"
+#include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
+#include "mesh/triangle_frame.h"
 #include "stage/work_stop.h"
 
 namespace ist {
+
+/// How far from a field's surface the triangles of a mesh come while their vertices move straight
+/// to their places in the field. Distances in the unit frame, before rounding.
+class SweptError {
+ public:
+  /// All must outlive this.
+  SweptError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy);
+
+  /// Of a used vertex of the mesh where it starts from: exact where above `enough`, else no less;
+  /// at most `known` where it is not more. Safe from several threads for different vertices.
+  double at_vertex(std::uint32_t vertex, double known, double enough);
+
+  /// All that a triangle of the mesh sweeps is within `distance` of one triangle near its vertices'
+  /// places: bound() for that target is no more.
+  bool is_within(std::uint32_t triangle, double distance) const;
+
+  /// A bound for all points that a triangle of the mesh sweeps, at most `target` where that can be
+  /// shown. `one_may_do`: false where is_within() says no.
+  double bound(std::uint32_t triangle, double target, bool one_may_do) const;
+
+ private:
+  using Point = std::array<double, 3>;
+
+  /// What a part of a triangle sweeps in a part of the time: it lies in the hull of six points.
+  struct Prism {
+    Point corner[6];  ///< at the start, at the end
+    Point centre() const;
+    double radius(const Point& centre) const;
+    /// Halved across its longest side, or in time.
+    std::array<Prism, 2> halves() const;
+  };
+
+  double distance2(std::uint32_t field_triangle, const Point& p) const {
+    return closest_in_frame(cuts_.frame(field_triangle), p.data()).distance2;
+  }
+  /// Farthest corner from a triangle, squared; any value > limit2 once one is further. The distance
+  /// to a triangle is convex, so that no point of the hull is further.
+  double farthest2(std::uint32_t field_triangle, const Prism& prism, double limit2) const;
+  double bound(const Prism& prism, std::span<const std::uint32_t> candidates, double target,
+               bool one_may_do) const;
+  Point place_of(std::uint32_t field_vertex) const {
+    const FieldMesh::Vertex& x = field_.mesh.vertices[field_vertex];
+    return {x[0], x[1], x[2]};
+  }
+
+  const MeshView& mesh_;
+  const Clustered& field_;
+  const FieldHierarchy& hierarchy_;
+  HullCuts cuts_;                         ///< of the field
+  const ItemGroups<> stars_;              ///< the triangles around each field vertex
+  std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
+  std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone
+};
 
 /// Distances of points from a mesh, each found once: most triangles of a field stay as they are
 /// while a few of its clusters are divided. Safe from several threads.
