@@ -12,7 +12,7 @@
 #include "bake/predict/trial_poses.h"
 #include "library/text.h"
 
-namespace ist::app {
+namespace ist {
 namespace {
 
 constexpr double kCoarse = 0.4;  // covered by inner spheres: less says that walls are thinner
@@ -353,4 +353,4 @@ std::string describe_target(const TreeView& tree) {
                      why_missed(static_cast<StopReason>(tree.header().search_stop)));
 }
 
-}  // namespace ist::app
+}  // namespace ist

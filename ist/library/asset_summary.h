@@ -7,7 +7,7 @@
 
 #include <ist/tree_view.h>
 
-namespace ist::app {
+namespace ist {
 
 /// The header of an asset, lengths and volumes in the mesh's own unit, for a person.
 std::string describe_asset(const TreeView& tree);
@@ -35,4 +35,4 @@ std::optional<std::uint64_t> enough_spheres(const TreeView& tree);
 /// would do"; "" where they are not.
 std::string describe_coarseness(const TreeView& tree);
 
-}  // namespace ist::app
+}  // namespace ist

@@ -88,7 +88,7 @@ constexpr int kEntryFormat = 3;  ///< entries of others are not found
 /// Of a line's other fields and of the asset.
 std::string hash_of(const Json& line, const Asset& asset) {
   Hash hash;
-  hash.add_text(app::json_text(line, -1));
+  hash.add_text(json_text(line, -1));
   hash.add(asset.bytes().data(), asset.bytes().size());
   return hash.key().text();
 }
@@ -188,7 +188,7 @@ std::string line_of(const CacheKey& key, const CacheEntry& entry) {
   Json line = {{"key", key.text()}, {"notes", entry.notes}, {"confidence", nullptr}};
   if (entry.confidence) line["confidence"] = *entry.confidence;
   line["hash"] = hash_of(line, entry.asset);
-  return app::json_text(line, -1);
+  return json_text(line, -1);
 }
 
 CacheEntry entry_from(std::string_view text, const CacheKey& key, Asset asset) {

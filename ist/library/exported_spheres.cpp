@@ -10,7 +10,7 @@
 
 #include <ist/asset_layout.h>
 
-namespace ist::app {
+namespace ist {
 namespace {
 
 constexpr std::array kColumns = {"x", "y", "z", "r", "ex", "ey", "ez", "er", "c"};
@@ -115,4 +115,4 @@ std::string spheres_json(std::span<const ExportedSphere> spheres) {
   return out + "\n ]}\n";
 }
 
-}  // namespace ist::app
+}  // namespace ist

@@ -7,7 +7,7 @@
 
 #include <ist/tree_view.h>
 
-namespace ist::app {
+namespace ist {
 
 /// A sphere of an asset in the mesh's own unit and frame.
 struct ExportedSphere {
@@ -27,4 +27,4 @@ std::string spheres_csv(std::span<const ExportedSphere> spheres);
 std::string spheres_ply(std::span<const ExportedSphere> spheres);
 std::string spheres_json(std::span<const ExportedSphere> spheres);
 
-}  // namespace ist::app
+}  // namespace ist

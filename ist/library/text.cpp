@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace ist::app {
+namespace ist {
 
 std::string json_text(const nlohmann::ordered_json& json, int indent) {
   return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
@@ -73,4 +73,4 @@ const char* name_of(TrialPartner partner) noexcept {
   return "unknown";
 }
 
-}  // namespace ist::app
+}  // namespace ist

@@ -12,7 +12,7 @@
 
 // How numbers and names are printed: for people, and as JSON.
 
-namespace ist::app {
+namespace ist {
 
 /// For files and --json. Names that are not UTF-8 are written with replacement characters.
 std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
@@ -20,9 +20,8 @@ std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 
-using ist::name_of;  // of a GridMode or a MeshState
 const char* name_of(StopReason reason) noexcept;
 const char* name_of(QueryStatus status) noexcept;
 const char* name_of(TrialPartner partner) noexcept;
 
-}  // namespace ist::app
+}  // namespace ist

@@ -4,7 +4,7 @@
 #include <array>
 #include <string_view>
 
-namespace ist::app {
+namespace ist {
 namespace {
 
 struct StageShare {
@@ -39,4 +39,4 @@ double WholeProgress::share(const Progress& progress) {
   return share_ = std::max(share_, begin_ + rest_ * of_round * (rounds_ ? 0.5 : 1));
 }
 
-}  // namespace ist::app
+}  // namespace ist

@@ -2,7 +2,7 @@
 
 #include <ist/progress.h>
 
-namespace ist::app {
+namespace ist {
 
 /// Where a call of several stages stands as a whole.
 class WholeProgress {
@@ -20,4 +20,4 @@ class WholeProgress {
   double share_ = 0;
 };
 
-}  // namespace ist::app
+}  // namespace ist

@@ -54,10 +54,10 @@ const PyType_Slot kAssetSlots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(sho
 /// (n, 4): centre and radius in the mesh's own unit and frame.
 py::object spheres_of(const Asset& asset, const std::string& which) {
   const bool matched = named(which, "which", kSpheres);
-  const auto spheres = app::exported_spheres(asset.view(), 0);
+  const auto spheres = exported_spheres(asset.view(), 0);
   const Column<double, 4> rows({spheres.size()});
   for (std::size_t i = 0; i < spheres.size(); ++i) {
-    const app::ExportedSphere& s = spheres[i];
+    const ExportedSphere& s = spheres[i];
     rows.vector(i) << (matched ? s.matched_centre : s.centre),
         (matched ? s.matched_radius : s.radius);
   }
@@ -122,7 +122,7 @@ void add_bodies(py::module_& module) {
       .def_ro("violations", &Invariant::violations, "Number of violations.");
   py::class_<PartnerError>(module, "PartnerError", "Error of an asset against one kind of partner.")
       .def_prop_ro(
-          "partner", [](const PartnerError& e) { return app::name_of(e.partner); },
+          "partner", [](const PartnerError& e) { return name_of(e.partner); },
           "'copy', 'plane', 'ball', 'edge', 'corner' or 'plate'.")
       .def_ro("median", &PartnerError::median, "Median relative error.")
       .def_ro("poses", &PartnerError::poses, "Number of poses.");
@@ -192,7 +192,7 @@ void add_bakes(py::module_& module) {
       .def_ro("partners", &Targeted::partners, "A PartnerError for each kind.")
       .def_ro("met", &Targeted::met, "poses > 0 and measured_error is at most the requested error.")
       .def_prop_ro(
-          "stop", [](const Targeted& t) { return app::name_of(t.stop); },
+          "stop", [](const Targeted& t) { return name_of(t.stop); },
           "Reason for the end of the search.");
   add_bake(
       module, "bake_to_error",
@@ -283,7 +283,7 @@ void add_assets(py::module_& module) {
       .def(
           "info",
           [](const Asset& self) {
-            return py::module_::import_("json").attr("loads")(app::asset_json(self.view()).dump());
+            return py::module_::import_("json").attr("loads")(asset_json(self.view()).dump());
           },
           "The output of `ist info --json` as a dict: docs/json.md.")
       .def("__repr__",
@@ -294,7 +294,7 @@ void add_assets(py::module_& module) {
                     std::to_string(view.mesh_triangles()) + " triangles" +
                     (view.has_field() ? "" : ", no surface for queries of spheres") + ">";
            })
-      .def("__str__", [](const Asset& self) { return app::describe_asset(self.view()); })
+      .def("__str__", [](const Asset& self) { return describe_asset(self.view()); })
       .def("surface", &surface_of,
            "The surface that queries of spheres use, or the mesh of a surface alone: (n, 3) "
            "float64 vertices [u] in the mesh's own "
@@ -341,7 +341,7 @@ void add_assets(py::module_& module) {
           "mesh_error", [](const Asset& self) { return self.view().mesh_error(); },
           "[u] largest distance between the kept mesh's surface and the solid's.")
       .def_prop_ro(
-          "mesh_state", [](const Asset& self) { return app::name_of(self.view().mesh_state()); },
+          "mesh_state", [](const Asset& self) { return name_of(self.view().mesh_state()); },
           "'own', 'resolved', 'simplified', 'none', or 'unresolved' (its parts overlap).")
       .def_prop_ro(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },

@@ -88,7 +88,7 @@ void run_offline(OfflineWork work, const py::object& progress, bool rounds) {
     end_running();
     throw;
   }
-  app::WholeProgress whole(rounds);
+  WholeProgress whole(rounds);
   CallProgress last;
   for (bool done = false; !done;) {
     std::optional<Progress> news;

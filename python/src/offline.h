@@ -18,7 +18,7 @@ using OfflineWork = std::function<void(const ProgressCallback&)>;
 ///
 /// `progress` is called on the calling thread with a Progress; False from it cancels as the stage
 /// says, what it raises is raised.
-/// Its last call, once the work is done, says so. `rounds`: see app::WholeProgress.
+/// Its last call, once the work is done, says so. `rounds`: see WholeProgress.
 /// Ctrl-C raises KeyboardInterrupt within 0.2 s: the stage is told to end, and where it is in a
 /// step that cannot be cut short it ends unseen, after this call has returned.
 void run_offline(OfflineWork work, const py::object& progress, bool rounds = false);
