@@ -24,8 +24,8 @@ class LargestPart {
 /// The penetration from levels of detail. Under a wanted error they and the exact measure are
 /// blended by what they err (WantedError), under a pair budget by what they need (DetailChain), and
 /// without either the finest answers; copies of one asset that all but coincide are asked as unlike
-/// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null if
-/// no part is more than the others. No allocation, lock or exception.
+/// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null
+/// where that part is summed as the others. No allocation, lock or exception.
 Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                           const PenetrationSettings& settings, Workspace& workspace,
                           LargestPart* largest = nullptr) noexcept;
