@@ -36,7 +36,8 @@ inline PlainGrid plain(const DistanceGridField& f) noexcept {
 /// A plain shape with all that a descent calls.
 template <class Plain>
 struct ShapeOf : Plain {
-  explicit ShapeOf(const auto& field) noexcept : Plain(plain(field)), sound(is_sound(field)) {}
+  [[gnu::always_inline]] explicit ShapeOf(const auto& field) noexcept
+      : Plain(plain(field)), sound(is_sound(field)) {}
 
   FieldSample sample(const Eigen::Vector3d& x) noexcept { return eigen(seen({x[0], x[1], x[2]})); }
   [[gnu::always_inline]] FieldSample nearest(const Eigen::Vector3d& x) noexcept {
