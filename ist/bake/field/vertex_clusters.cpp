@@ -172,34 +172,6 @@ double farthest_plane(std::span<const CornerPlane> planes, const std::array<doub
   return most;
 }
 
-// Weights that take four unit normals to zero take heights over the planes to a number that is the
-// same everywhere.
-double nearest_of_any(std::span<const CornerPlane> planes, double size) {
-  constexpr double kLeast = 1e-7;     // of all weights: normals that tell nothing
-  constexpr double kRounding = 1e-7;  // of the size, with room
-  double most = 0;
-  for (std::size_t i = 0; i + 3 < planes.size(); ++i) {
-    double n[4][3], height[4], u[3];
-    for (std::size_t j = 0; j < 4; ++j) {
-      const CornerPlane& plane = planes[i + j];
-      for (std::size_t k = 0; k < 3; ++k) {
-        n[j][k] = plane.triangle.n[k] / plane.triangle.length;
-        u[k] = plane.x[k] - planes[i].x[k];
-      }
-      height[j] = dot3(n[j], u);
-    }
-    double all = 0, sum = 0;
-    for (std::size_t j = 0; j < 4; ++j) {
-      cross3(n[(j + 1) % 4], n[(j + 2) % 4], u);
-      const double weight = (j % 2 == 0 ? 1 : -1) * dot3(u, n[(j + 3) % 4]);
-      all += std::fabs(weight);
-      sum += weight * height[j];
-    }
-    if (all > kLeast) most = std::max(most, std::fabs(sum) / all - kRounding * size);
-  }
-  return most;
-}
-
 VertexClusters::VertexClusters(const MeshView& mesh, double coarsest, int levels)
     : mesh_(mesh), areas_(mesh.triangle_count), levels_(static_cast<std::size_t>(levels)) {
   tbb::parallel_invoke(
@@ -243,23 +215,11 @@ CornerPlane VertexClusters::plane_of(std::uint32_t corner, std::uint32_t vertex)
   return plane;
 }
 
-void VertexClusters::settle(Level& level, std::uint32_t cluster, double tolerance) const {
-  constexpr std::size_t kSamples = 24;
+void VertexClusters::settle(Level& level, std::uint32_t cluster) const {
   const std::span<const std::uint32_t> vertices = level.vertices[cluster];
-  double& off = level.off[cluster];
-  thread_local std::vector<CornerPlane> planes;
-  if (vertices.size() >= 4 * kSamples) {  // else to look at all takes no longer
-    planes.clear();
-    for (std::size_t i = 0; i < kSamples; ++i) {
-      const std::uint32_t v = vertices[i * vertices.size() / kSamples];
-      const auto corners = corners_[v];
-      if (!corners.empty()) planes.push_back(plane_of(corners[i % corners.size()], v));
-    }
-    off = std::max(off, nearest_of_any(planes, 4 * level.cell));
-  }
-  level.known[cluster] = off > tolerance ? kUnknown : kKnown;
-  if (off > tolerance) return;
+  level.known[cluster] = kKnown;
   // What is summed is summed in the order of corners.
+  thread_local std::vector<CornerPlane> planes;
   thread_local std::vector<std::uint32_t> corners, work;
   corners.clear();
   for (const std::uint32_t v : vertices)
@@ -279,7 +239,7 @@ void VertexClusters::settle(Level& level, std::uint32_t cluster, double toleranc
     x[k] = std::clamp(x[k], low, low + 2 * level.cell);
   }
   level.place[cluster] = x;
-  off = farthest_plane(planes, x);
+  level.off[cluster] = farthest_plane(planes, x);
 }
 
 std::vector<std::uint32_t> VertexClusters::chosen(double tolerance) {
@@ -305,9 +265,8 @@ std::vector<std::uint32_t> VertexClusters::chosen(double tolerance) {
       cluster_of[v] = static_cast<std::uint32_t>(before + v);
     });
     if (doubts.empty()) return cluster_of;
-    tbb::parallel_for(std::size_t{0}, doubts.size(), [&](std::size_t i) {
-      settle(levels_[doubts[i].level], doubts[i].cluster, tolerance);
-    });
+    tbb::parallel_for(std::size_t{0}, doubts.size(),
+                      [&](std::size_t i) { settle(levels_[doubts[i].level], doubts[i].cluster); });
   }
 }
 

@@ -32,10 +32,6 @@ std::array<double, 3> placed(std::span<const CornerPlane> planes);
 /// Distance of p from the plane that passes farthest from it.
 double farthest_plane(std::span<const CornerPlane> planes, const std::array<double, 3>& p);
 
-/// A distance that no point within `size` of the corners comes nearer to all planes than. Looks at
-/// four planes in a row at a time.
-double nearest_of_any(std::span<const CornerPlane> planes, double size);
-
 /// A surface with its vertices clustered.
 struct Clustered {
   FieldMesh mesh;
@@ -79,8 +75,8 @@ class VertexClusters {
   };
 
   Level level_of(double cell) const;
-  /// Finds out whether a cluster is within the tolerance.
-  void settle(Level& level, std::uint32_t cluster, double tolerance) const;
+  /// Finds out where a cluster goes and how far that is off.
+  void settle(Level& level, std::uint32_t cluster) const;
   CornerPlane plane_of(std::uint32_t corner, std::uint32_t vertex) const;
   /// Names of clusters of all levels, and of single vertices after them, for every vertex.
   std::vector<std::uint32_t> chosen(double tolerance);
