@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -27,13 +28,14 @@ struct ItemGroups {
       : ItemGroups(groups, each, [](Offset& count) { return count++; }) {}
 
   /// The same where `each` visits from many threads: the items of a group are sorted.
-  template <class Each>
-  static ItemGroups in_parallel(std::size_t groups, const Each& each) {
+  template <class Each, class Before = std::less<>>
+  static ItemGroups in_parallel(std::size_t groups, const Each& each, const Before& before = {}) {
     ItemGroups made(groups, each, [](Offset& count) {
       return std::atomic_ref<Offset>(count).fetch_add(1, std::memory_order_relaxed);
     });
     tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t group) {
-      std::sort(made.items.begin() + made.first[group], made.items.begin() + made.first[group + 1]);
+      std::sort(made.items.begin() + made.first[group], made.items.begin() + made.first[group + 1],
+                before);
     });
     return made;
   }

@@ -2,8 +2,8 @@
 
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
+#include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/ray_crossing.h"
 #include "numerics/host_device.h"
@@ -86,11 +86,8 @@ IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t,
   return {crossing_x(t, yz), -facing};
 }
 
-/// The crossings of every line: those of line (i, j) start at first[j ny + i], in order.
-struct LatticeCrossings {
-  std::vector<std::uint32_t> first;  ///< lines + 1
-  std::vector<Crossing> crossings;
-};
+/// The crossings of every line, in order: line (i, j) is group j ny + i.
+using LatticeCrossings = ItemGroups<std::uint32_t, Crossing>;
 
 /// All crossings of a mesh (its arrays suffice) with a lattice. Runs on the caller's TBB threads.
 LatticeCrossings cross_lattice(const MeshView& mesh, const LineLattice& lattice);

@@ -113,11 +113,8 @@ class ExcessIntegral {
     if (flat) return;
     const LatticeCrossings lines = cross_lattice(arrays, lattice_);
     at_line_.resize(lattice_.lines());
-    tbb::parallel_for(std::size_t{0}, at_line_.size(), [&](std::size_t line) {
-      at_line_[line] =
-          line_excess(std::span(lines.crossings)
-                          .subspan(lines.first[line], lines.first[line + 1] - lines.first[line]));
-    });
+    tbb::parallel_for(std::size_t{0}, at_line_.size(),
+                      [&](std::size_t line) { at_line_[line] = line_excess(lines[line]); });
   }
 
   double plane() const { return size(1) * size(2); }

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "mesh/ray_crossing.h"
+#include "mesh/line_lattice.h"
 #include "mesh/triangles_in_box.h"
 
 namespace ist {
@@ -26,9 +26,7 @@ void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossi
     if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
     return false;
   });
-  std::sort(out.begin(), out.end(), [](const Crossing& a, const Crossing& b) {
-    return a.x != b.x ? a.x < b.x : a.sign > b.sign;
-  });
+  std::sort(out.begin(), out.end(), comes_before);
 }
 
 }  // namespace ist

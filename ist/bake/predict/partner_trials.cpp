@@ -224,8 +224,7 @@ std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
       int winding = 0;
       double since = 0;
       const std::size_t line = std::size_t{j} * lattice.ny + i;
-      for (std::uint32_t c = all.first[line]; c < all.first[line + 1]; ++c) {
-        const Crossing& crossing = all.crossings[c];
+      for (const Crossing& crossing : all[line]) {
         if (winding >= 1)
           for (double k = std::ceil((since - low.x()) / along - turned);
                low.x() + (k + turned) * along < crossing.x; ++k)

@@ -70,7 +70,7 @@ ColumnLattice cut_columns(const MeshSolid& solid, const ColumnPlan& plan) {
   const std::size_t lines = plan.lines.lines();
   lattice.first.resize(lines + 1);
   const auto for_spans_of = [&](std::size_t line, const auto& add) {
-    for_spans(cut.crossings.data() + cut.first[line], cut.first[line + 1] - cut.first[line], add);
+    for_spans(cut[line].data(), static_cast<std::uint32_t>(cut[line].size()), add);
   };
   std::uint64_t length = 0;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines), [&](const auto& range) {
