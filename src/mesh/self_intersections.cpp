@@ -9,7 +9,6 @@
 #include <atomic>
 #include <bit>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "mesh/surface_reduction.h"
@@ -146,36 +145,6 @@ std::uint64_t key_of(const RawArray<FloatPoint>& points, const Triangle& t) {
   return key;
 }
 
-/// Sorts keys that are not left out, by the curve's first cells, then within each.
-RawArray<std::uint64_t> sorted(const RawArray<std::uint64_t>& keys) {
-  constexpr std::size_t kDrawers = 4096, kChunk = 16'384;
-  constexpr int kShift = kIndexBits + 42 - 12;  // of the curve 42 bits, of a drawer 12
-  const std::size_t chunks = (keys.size() + kChunk - 1) / kChunk;
-  std::vector<std::uint32_t> place(chunks * kDrawers);
-  const auto for_each = [&](const auto& visit) {
-    tbb::parallel_for(std::size_t{0}, chunks, [&](const std::size_t c) {
-      std::uint32_t* const of_chunk = place.data() + c * kDrawers;
-      for (std::size_t i = c * kChunk; i < std::min((c + 1) * kChunk, keys.size()); ++i)
-        if (keys[i] != kLeftOut) visit(of_chunk[keys[i] >> kShift], keys[i]);
-    });
-  };
-  for_each([](std::uint32_t& count, std::uint64_t) { ++count; });
-  std::vector<std::uint32_t> begin(kDrawers + 1);
-  for (std::size_t c = 0; c < chunks; ++c)
-    for (std::size_t d = 0; d < kDrawers; ++d) begin[d + 1] += place[c * kDrawers + d];
-  std::partial_sum(begin.begin(), begin.end(), begin.begin());
-  std::vector<std::uint32_t> next = begin;
-  for (std::size_t c = 0; c < chunks; ++c)
-    for (std::size_t d = 0; d < kDrawers; ++d)
-      next[d] += std::exchange(place[c * kDrawers + d], next[d]);
-  RawArray<std::uint64_t> out(begin.back());
-  for_each([&](std::uint32_t& at, const std::uint64_t key) { out[at++] = key; });
-  tbb::parallel_for(std::size_t{0}, kDrawers, [&](const std::size_t d) {
-    tbb::parallel_sort(out.begin() + begin[d], out.begin() + begin[d + 1]);
-  });
-  return out;
-}
-
 EightBoxes no_boxes() {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   EightBoxes boxes;
@@ -212,9 +181,9 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                   ? kLeftOut
                   : key_of(points, triangles[t]) << kIndexBits | t;
   });
-  keys = sorted(keys);
-  order_.resize(keys.size());
-  tbb::parallel_for(std::size_t{0}, keys.size(), [&](const std::size_t i) {
+  tbb::parallel_sort(keys.begin(), keys.end());
+  order_.resize(std::lower_bound(keys.begin(), keys.end(), kLeftOut) - keys.begin());
+  tbb::parallel_for(std::size_t{0}, order_.size(), [&](const std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
   });
 
