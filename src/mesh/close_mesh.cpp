@@ -28,10 +28,7 @@ namespace ist {
 namespace {
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
-  DisjointSets sets(mesh.triangles.size());
-  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
-    for (const std::uint32_t side : edges.sides(e)) sets.unite(edges.sides(e)[0] / 3, side / 3);
-  });
+  DisjointSets sets = connected_pieces(edges);
   return count_where(mesh.triangles.size(), [&](const std::size_t t) {
     return sets.find(static_cast<std::uint32_t>(t)) == t && !has_repeated_corner(mesh.triangles[t]);
   });

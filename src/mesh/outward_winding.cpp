@@ -135,7 +135,7 @@ std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
 void orient_soup(TriangleMesh& soup) {
   const EdgeTable edges(soup.triangles);
   make_consistent(soup.triangles, manifold_partners(edges));
-  DisjointSets patches = manifold_patches(soup.triangles, edges);
+  DisjointSets patches = connected_pieces(edges, 2);
   Eigen::AlignedBox3d bounds;
   for (const Triangle& t : soup.triangles)
     for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);

@@ -210,7 +210,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
 /// right for one changes what is right for its neighbours, so those wait. Returns how many went.
 std::size_t drop_fins_once(TriangleMesh& mesh) {
   const EdgeTable edges(mesh.triangles);
-  DisjointSets patches = manifold_patches(mesh.triangles, edges);
+  DisjointSets patches = connected_pieces(edges, 2);
   std::vector<int> gain(mesh.triangles.size(), 0);  // odd edges fewer without this patch
   std::vector<std::vector<std::uint32_t>> shared_edges(mesh.triangles.size());
   for (std::uint32_t e = 0; e < edges.size(); ++e) {
@@ -253,15 +253,6 @@ double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
   return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
 }
 
-/// Edge-connected pieces; each triangle by the first of its piece.
-DisjointSets pieces_of(const std::vector<Triangle>& triangles) {
-  const EdgeTable edges(triangles);
-  DisjointSets pieces(triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const std::uint32_t side : edges.sides(e)) pieces.unite(edges.sides(e)[0] / 3, side / 3);
-  return pieces;
-}
-
 /// Gives each piece vertices of its own, so that no walk along a border leaves its piece.
 void separate(TriangleMesh& mesh, DisjointSets& pieces) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;  // vertex, piece
@@ -286,7 +277,7 @@ void separate(TriangleMesh& mesh, DisjointSets& pieces) {
 /// has is an open sheet, no solid with a hole, and is dropped.
 void cap_holes(TriangleMesh& mesh, MeshReport& report) {
   constexpr double kSheet = 0.95;  // caps to own area
-  DisjointSets pieces = pieces_of(mesh.triangles);
+  DisjointSets pieces = connected_pieces(EdgeTable(mesh.triangles));
   separate(mesh, pieces);
   const EdgeTable edges(mesh.triangles);
   const auto loops = border_loops(edges);

@@ -25,12 +25,14 @@ SidePartners manifold_partners(const EdgeTable& edges) {
   return partners;
 }
 
-DisjointSets manifold_patches(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  DisjointSets patches(triangles.size());
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    if (const auto sides = edges.sides(e); sides.size() == 2)
-      patches.unite(sides[0] / 3, sides[1] / 3);
-  return patches;
+DisjointSets connected_pieces(const EdgeTable& edges, const std::size_t most) {
+  DisjointSets pieces(edges.side_count() / 3);
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
+    const auto sides = edges.sides(e);
+    if (sides.size() > most) return;
+    for (const std::uint32_t side : sides) pieces.unite(sides[0] / 3, side / 3);
+  });
+  return pieces;
 }
 
 namespace {
@@ -152,11 +154,7 @@ std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& t
 }
 
 Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edges) {
-  DisjointSets pieces(triangles.size());
-  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
-    const auto sides = edges.sides(e);
-    if (sides.size() == 2) pieces.unite(sides[0] / 3, sides[1] / 3);
-  });
+  DisjointSets pieces = connected_pieces(edges, 2);
   std::vector<std::pair<std::uint32_t, int>> sums;  // piece, balance at this edge
   const std::vector<std::uint32_t> crowded =
       indices_where(edges.size(), [&](std::size_t e) { return edges.sides(e).size() > 2; });

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -32,8 +33,8 @@ SidePartners manifold_partners(const EdgeTable& edges);
 SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
                           const std::vector<Triangle>& triangles, const EdgeTable& edges);
 
-/// Triangles that hang together by edges of exactly two sides.
-DisjointSets manifold_patches(const std::vector<Triangle>& triangles, const EdgeTable& edges);
+/// Triangles that hang together by edges of no more sides than `most`. 2: patches of a manifold.
+DisjointSets connected_pieces(const EdgeTable& edges, std::size_t most = SIZE_MAX);
 
 /// Turns triangles so that partners agree about the outside; the smaller part of each connected
 /// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and

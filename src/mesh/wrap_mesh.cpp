@@ -192,8 +192,7 @@ ClosedMesh wrap_mesh(TriangleMesh mesh, const std::string& name, double detail) 
     throw Error(name + ": a wrap detail of " + shortest(detail) + " is out of range; use " +
                 shortest(kFinest) + " to " + shortest(kCoarsest) + " of the diagonal");
   weld_usable(mesh, name);
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& v : mesh.vertices) bounds.extend(v);
+  const Eigen::AlignedBox3d bounds = bounds_of(mesh.vertices);
   const double step = detail * bounds.diagonal().norm();
   const double offset = largest_coordinate(bounds);
   if (!(step > 1e-12 * offset))

@@ -137,7 +137,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
       balance += (runs_up(pieces, side) ? 1 : -1) * arrangement.winding_step[side / 3];
     if (balance != 0) throw Unresolvable{"the pieces of the surface do not form a closed surface"};
   }
-  DisjointSets sets = manifold_patches(pieces, edges);
+  DisjointSets sets = connected_pieces(edges, 2);
   Patches patches;
   patches.of_piece.resize(pieces.size());
   std::vector<std::uint32_t> largest;  // [patch] a piece
@@ -206,10 +206,7 @@ struct Volume {
 
 /// The triangles of a mesh that hang together by edges or meet have the same number.
 std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, const Pairs& pairs) {
-  DisjointSets sets(triangles.size());
-  const EdgeTable edges(triangles);
-  for (std::size_t e = 0; e < edges.size(); ++e)
-    for (const std::uint32_t side : edges.sides(e)) sets.unite(edges.sides(e)[0] / 3, side / 3);
+  DisjointSets sets = connected_pieces(EdgeTable(triangles));
   for (const auto& [a, b] : pairs) sets.unite(a, b);
   std::vector<std::uint32_t> groups(triangles.size());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) groups[t] = sets.find(t);
