@@ -1,3 +1,5 @@
+#include <tbb/parallel_for.h>
+
 #include <bit>
 #include <cctype>
 #include <cstring>
@@ -30,17 +32,16 @@ PolygonMesh read_binary(const SourceFile& file) {
                    std::to_string(needed) + " bytes, here are " +
                    std::to_string(file.bytes.size()));
   PolygonMesh mesh;
-  mesh.vertices.reserve(3 * count);
-  mesh.corners.reserve(3 * count);
-  mesh.ends.reserve(count);
-  for (std::uint64_t i = 0; i < count; ++i) {
+  mesh.vertices.resize(3 * count);
+  mesh.triangles.resize(count);
+  tbb::parallel_for(std::uint64_t{0}, count, [&](const std::uint64_t i) {
     float corners[9];
     std::memcpy(corners, file.bytes.data() + kHeaderBytes + kFacetBytes * i + 12, sizeof corners);
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    for (int k = 0; k < 3; ++k)
-      mesh.vertices.emplace_back(corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]);
-    mesh.add_triangle(first, first + 1, first + 2);
-  }
+    const auto first = static_cast<std::uint32_t>(3 * i);
+    mesh.triangles[i] = {first, first + 1, first + 2};
+    for (std::size_t k = 0; k < 3; ++k)
+      mesh.vertices[first + k] = {corners[3 * k], corners[3 * k + 1], corners[3 * k + 2]};
+  });
   return mesh;
 }
 

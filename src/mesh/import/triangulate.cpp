@@ -1,5 +1,3 @@
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <vector>
@@ -141,25 +139,8 @@ void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices,
   });
 }
 
-namespace {
-
-bool has_triangles_only(const PolygonMesh& mesh) {
-  // No polygon has fewer than three corners.
-  return mesh.corners.size() == 3 * mesh.ends.size() &&
-         (mesh.ends.empty() || mesh.ends.back() == mesh.corners.size());
-}
-
-}  // namespace
-
 Triangles triangulate(PolygonMesh& mesh) {
   if (!mesh.triangles.empty()) return std::move(mesh.triangles);
-  if (has_triangles_only(mesh)) {
-    Triangles triangles(mesh.ends.size());
-    tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
-      for (std::size_t k = 0; k < 3; ++k) triangles[t][k] = mesh.corners[3 * t + k];
-    });
-    return triangles;
-  }
   Triangles triangles;
   triangles.reserve(mesh.corners.size() - 2 * mesh.ends.size());
   std::size_t begin = 0;
