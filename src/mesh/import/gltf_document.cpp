@@ -29,25 +29,16 @@ bool is_harmless(const std::string_view extension) {
 }
 
 std::optional<std::string> decode_base64(const std::string_view text) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string bytes;
   std::uint32_t bits = 0;
   int held = 0;
   for (const char c : text) {
     if (c == '=') break;
-    std::uint32_t value = 0;
-    if (c >= 'A' && c <= 'Z')
-      value = static_cast<std::uint32_t>(c - 'A');
-    else if (c >= 'a' && c <= 'z')
-      value = static_cast<std::uint32_t>(c - 'a') + 26;
-    else if (c >= '0' && c <= '9')
-      value = static_cast<std::uint32_t>(c - '0') + 52;
-    else if (c == '+')
-      value = 62;
-    else if (c == '/')
-      value = 63;
-    else
-      return std::nullopt;
-    bits = bits << 6 | value;
+    const std::size_t value = kDigits.find(c);
+    if (value == std::string_view::npos) return std::nullopt;
+    bits = bits << 6 | static_cast<std::uint32_t>(value);
     held += 6;
     if (held < 8) continue;
     held -= 8;
@@ -70,7 +61,7 @@ std::string decode_percent(const std::string& uri) {
 }
 
 struct ComponentType {
-  std::size_t bytes;
+  std::size_t code, bytes;
   double largest;  ///< what 1.0 is stored as, if normalized
   double (*read)(const char*);
 };
@@ -83,28 +74,13 @@ double read_as(const char* const bytes) {
 }
 
 template <class T>
-constexpr ComponentType component() {
-  return {sizeof(T), static_cast<double>(std::numeric_limits<T>::max()), read_as<T>};
+constexpr ComponentType component(const std::size_t code) {
+  return {code, sizeof(T), static_cast<double>(std::numeric_limits<T>::max()), read_as<T>};
 }
 
-std::optional<ComponentType> component_type(const std::size_t code) {
-  switch (code) {
-    case 5120:
-      return component<std::int8_t>();
-    case 5121:
-      return component<std::uint8_t>();
-    case 5122:
-      return component<std::int16_t>();
-    case 5123:
-      return component<std::uint16_t>();
-    case 5125:
-      return component<std::uint32_t>();
-    case 5126:
-      return ComponentType{4, 1, read_as<float>};
-    default:
-      return std::nullopt;
-  }
-}
+constexpr std::array<ComponentType, 6> kComponentTypes = {
+    component<std::int8_t>(5120),   component<std::uint8_t>(5121),  component<std::int16_t>(5122),
+    component<std::uint16_t>(5123), component<std::uint32_t>(5125), {5126, 4, 1, read_as<float>}};
 
 }  // namespace
 
@@ -267,8 +243,10 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
     fail(name + " is sparse, which is not supported. Export it without sparse accessors");
   if (!accessor.contains("bufferView")) fail(name + " has no data");
   const std::size_t code = whole(accessor, "componentType");
-  const auto component = component_type(code);
-  if (!component) fail(name + ": unknown componentType " + std::to_string(code));
+  const auto component = std::find_if(kComponentTypes.begin(), kComponentTypes.end(),
+                                      [&](const auto& c) { return c.code == code; });
+  if (component == kComponentTypes.end())
+    fail(name + ": unknown componentType " + std::to_string(code));
   const std::size_t width = type == "SCALAR" ? 1 : 3;
   const std::size_t element = width * component->bytes;
 

@@ -18,14 +18,41 @@
 namespace ist {
 namespace {
 
-enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 enum class Encoding { ascii, little_endian, big_endian };
+
+template <class T>
+double read_number(const char* const bytes, const Encoding encoding) {
+  static_assert(std::endian::native == std::endian::little);
+  std::array<char, sizeof(T)> raw;
+  std::memcpy(raw.data(), bytes, sizeof(T));
+  if (encoding == Encoding::big_endian) std::reverse(raw.begin(), raw.end());
+  return static_cast<double>(std::bit_cast<T>(raw));
+}
+
+/// A type of numbers, which has two names.
+struct NumberType {
+  std::string_view name, other_name;
+  std::size_t size;
+  double (*read)(const char* bytes, Encoding encoding);
+};
+
+template <class T>
+constexpr NumberType number_type(const std::string_view name, const std::string_view other_name) {
+  return {name, other_name, sizeof(T), read_number<T>};
+}
+
+constexpr std::array kNumberTypes = {
+    number_type<std::int8_t>("char", "int8"),    number_type<std::uint8_t>("uchar", "uint8"),
+    number_type<std::int16_t>("short", "int16"), number_type<std::uint16_t>("ushort", "uint16"),
+    number_type<std::int32_t>("int", "int32"),   number_type<std::uint32_t>("uint", "uint32"),
+    number_type<float>("float", "float32"),      number_type<double>("double", "float64"),
+};
 
 struct Property {
   std::string name;
-  Scalar type{};
+  NumberType type{};
   bool is_list = false;
-  Scalar count_type{};  ///< of a list
+  NumberType count_type{};  ///< of a list
 };
 
 struct Element {
@@ -41,32 +68,9 @@ struct Header {
   std::size_t lines = 0;
 };
 
-std::size_t size_of(const Scalar type) {
-  constexpr std::array<std::size_t, 8> kSizes{1, 1, 2, 2, 4, 4, 4, 8};
-  return kSizes[static_cast<std::size_t>(type)];
-}
-
-Scalar parse_type(const TextScanner& scanner, const std::string_view word) {
-  constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames{{
-      {"char", Scalar::int8},
-      {"int8", Scalar::int8},
-      {"uchar", Scalar::uint8},
-      {"uint8", Scalar::uint8},
-      {"short", Scalar::int16},
-      {"int16", Scalar::int16},
-      {"ushort", Scalar::uint16},
-      {"uint16", Scalar::uint16},
-      {"int", Scalar::int32},
-      {"int32", Scalar::int32},
-      {"uint", Scalar::uint32},
-      {"uint32", Scalar::uint32},
-      {"float", Scalar::float32},
-      {"float32", Scalar::float32},
-      {"double", Scalar::float64},
-      {"float64", Scalar::float64},
-  }};
-  for (const auto& [name, type] : kNames)
-    if (name == word) return type;
+NumberType parse_type(const TextScanner& scanner, const std::string_view word) {
+  for (const NumberType& type : kNumberTypes)
+    if (word == type.name || word == type.other_name) return type;
   scanner.fail("unknown property type " + in_quotes(word));
 }
 
@@ -129,39 +133,21 @@ class Body {
         position_(header.body),
         text_(file, 0, header.body, header.lines + 1) {}
 
-  double read(const Scalar type) {
+  double read(const NumberType& type) {
     if (encoding_ == Encoding::ascii) {
       const std::string_view word = text_.word_anywhere();
       if (word.empty()) fail_early();
       return text_.real(word);
     }
-    if (file_.bytes.size() - position_ < size_of(type)) fail_early();
+    if (file_.bytes.size() - position_ < type.size) fail_early();
     const double value = value_at(position_, type);
-    position_ += size_of(type);
+    position_ += type.size;
     return value;
   }
 
   /// A value of a binary file that lies whole within it.
-  double value_at(const std::size_t position, const Scalar type) const {
-    switch (type) {
-      case Scalar::int8:
-        return binary<std::int8_t>(position);
-      case Scalar::uint8:
-        return binary<std::uint8_t>(position);
-      case Scalar::int16:
-        return binary<std::int16_t>(position);
-      case Scalar::uint16:
-        return binary<std::uint16_t>(position);
-      case Scalar::int32:
-        return binary<std::int32_t>(position);
-      case Scalar::uint32:
-        return binary<std::uint32_t>(position);
-      case Scalar::float32:
-        return binary<float>(position);
-      case Scalar::float64:
-        return binary<double>(position);
-    }
-    return 0;
+  double value_at(const std::size_t position, const NumberType& type) const {
+    return type.read(file_.bytes.data() + position, encoding_);
   }
 
   std::uint64_t read_list_count(const Property& list) {
@@ -180,8 +166,8 @@ class Body {
   }
 
   /// A value takes at least this much of the file. (Text: a digit and a space, the last one aside.)
-  std::size_t least_bytes(const Scalar type) const {
-    return encoding_ == Encoding::ascii ? 1 : size_of(type);
+  std::size_t least_bytes(const NumberType& type) const {
+    return encoding_ == Encoding::ascii ? 1 : type.size;
   }
   std::size_t least_bytes(const Element& element) const {
     std::size_t sum = 0;
@@ -206,15 +192,6 @@ class Body {
 
  private:
   [[noreturn]] void fail_early() const { fail_here("the file ends early"); }
-
-  template <class T>
-  double binary(const std::size_t position) const {
-    std::array<char, sizeof(T)> raw;
-    std::memcpy(raw.data(), file_.bytes.data() + position, sizeof(T));
-    static_assert(std::endian::native == std::endian::little);
-    if (encoding_ == Encoding::big_endian) std::reverse(raw.begin(), raw.end());
-    return static_cast<double>(std::bit_cast<T>(raw));
-  }
 
   const SourceFile& file_;
   Encoding encoding_;
@@ -245,9 +222,9 @@ void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
       tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](const std::size_t i) {
         std::size_t position = *start + bytes * i;
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
-          const Scalar type = element.properties[p].type;
+          const NumberType& type = element.properties[p].type;
           if (axis_of[p] >= 0) mesh.vertices[i][axis_of[p]] = body.value_at(position, type);
-          position += size_of(type);
+          position += type.size;
         }
       });
       return;
@@ -281,7 +258,7 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
   if (body.is_text() || element.properties.size() != 1 || !is_corners(element.properties[0]))
     return false;
   const Property& list = element.properties[0];
-  const std::size_t of_count = size_of(list.count_type), of_corner = size_of(list.type);
+  const std::size_t of_count = list.count_type.size, of_corner = list.type.size;
   const std::size_t bytes = of_count + 3 * of_corner;
   Body ahead = body;
   const auto start = ahead.pass_records(element.count, bytes);
