@@ -179,25 +179,12 @@ class Combined final : public IntegratedSolid {
   }
   double signed_distance(const Eigen::Vector3d& x) const override {
     const double a = a_->signed_distance(x), b = b_->signed_distance(x);
-    switch (combination_) {
-      case Combination::join:
-        return std::max(a, b);
-      case Combination::meet:
-        return std::min(a, b);
-      case Combination::subtract:
-        break;
-    }
-    return std::min(a, -b);
+    if (combination_ == Combination::join) return std::max(a, b);
+    return std::min(a, combination_ == Combination::meet ? b : -b);
   }
   Eigen::AlignedBox3d bounds() const override {
-    switch (combination_) {
-      case Combination::join:
-        return a_->bounds().merged(b_->bounds());
-      case Combination::meet:
-        return a_->bounds().intersection(b_->bounds());
-      case Combination::subtract:
-        break;
-    }
+    if (combination_ == Combination::join) return a_->bounds().merged(b_->bounds());
+    if (combination_ == Combination::meet) return a_->bounds().intersection(b_->bounds());
     return a_->bounds();
   }
 

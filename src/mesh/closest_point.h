@@ -29,6 +29,16 @@ constexpr int kBvhLevels = (kBvhStackSize - 1) / 3;
 /// (largest coordinate), the roundings of the query, the frames and the boxes included.
 IST_HD inline float float_distance_error(float reach) { return (reach + 2.0f) * 0x1p-20f; }
 
+/// The same of queries from p.
+IST_HD inline float distance_error_at(const float p[3]) {
+  float reach = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float a = p[k] < 0 ? -p[k] : p[k];
+    reach = a > reach ? a : reach;
+  }
+  return float_distance_error(reach);
+}
+
 /// Squared box distance beyond which no triangle can have a computed squared distance ≤ distance2.
 IST_HD inline float prune_distance2(float distance2, float error) {
   const float reach = std::sqrt(distance2) * (1 + 0x1p-20f) + error;
@@ -116,12 +126,7 @@ template <class Visit>
 IST_HD void for_triangles_near(const MeshView& mesh, const float p[3], float radius2,
                                Visit&& visit) {
   if (mesh.root == kBvhEmpty) return;
-  float reach = 0;
-  for (int k = 0; k < 3; ++k) {
-    const float a = p[k] < 0 ? -p[k] : p[k];
-    reach = a > reach ? a : reach;
-  }
-  const float error = float_distance_error(reach);
+  const float error = distance_error_at(p);
   float bound = prune_distance2(radius2, error);
   std::uint32_t stack[kBvhStackSize];
   float stack_distance2[kBvhStackSize];

@@ -83,19 +83,9 @@ Moments along_z(const Values<6>& plane, double z) {
   return values;
 }
 
-struct MeshBox {
-  double lower[3], upper[3];
-};
-
-MeshBox box_of(const MeshView& mesh) {
-  const double* p = mesh.vertices;
-  MeshBox box = {{p[0], p[1], p[2]}, {p[0], p[1], p[2]}};
-  for (const double* end = p + 3 * std::size_t{mesh.vertex_count}; p != end; p += 3)
-    for (int k = 0; k < 3; ++k) {
-      box.lower[k] = std::min(box.lower[k], p[k]);
-      box.upper[k] = std::max(box.upper[k], p[k]);
-    }
-  return box;
+Eigen::AlignedBox3d box_of(const MeshView& mesh) {
+  const Eigen::Map<const Eigen::Matrix3Xd> points(mesh.vertices, 3, mesh.vertex_count);
+  return {points.rowwise().minCoeff(), points.rowwise().maxCoeff()};
 }
 
 /// Integrals of the excess: along x exactly, along y and z adaptively. The lines that are looked at
@@ -104,8 +94,8 @@ class ExcessIntegral {
  public:
   ExcessIntegral(const MeshView& arrays, const HierarchyMaker& hierarchy)
       : hierarchy_(hierarchy), box_(box_of(arrays)) {
-    lattice_.y0 = box_.lower[1];
-    lattice_.z0 = box_.lower[2];
+    lattice_.y0 = box_.min()[1];
+    lattice_.z0 = box_.min()[2];
     lattice_.step_y = size(1) / double(2 * kIntervals);
     lattice_.step_z = size(2) / double(2 * kIntervals);
     lattice_.ny = lattice_.nz = 2 * kIntervals + 1;
@@ -145,7 +135,7 @@ class ExcessIntegral {
   }
 
  private:
-  double size(int axis) const { return box_.upper[axis] - box_.lower[axis]; }
+  double size(int axis) const { return box_.sizes()[axis]; }
 
   Values<3> excess_at(double y, double z, std::vector<Crossing>& scratch) const {
     line_crossings(hierarchy_(), y, z, scratch);
@@ -178,7 +168,7 @@ class ExcessIntegral {
   }
 
   const HierarchyMaker& hierarchy_;
-  MeshBox box_;
+  Eigen::AlignedBox3d box_;
   LineLattice lattice_;
   std::vector<Values<3>> at_line_;  // the excess of every line
 };

@@ -93,16 +93,6 @@ struct WideBall {
   }
 };
 
-/// Error of float distances from p, see float_distance_error().
-IST_HD inline float distance_error_at(const float p[3]) {
-  float reach = 0;
-  for (int k = 0; k < 3; ++k) {
-    const float a = p[k] < 0 ? -p[k] : p[k];
-    reach = a > reach ? a : reach;
-  }
-  return float_distance_error(reach);
-}
-
 /// `kLoosely`: also visits every triangle that is no further than the closest one plus two errors,
 /// and knows whether a lane met more than one of these.
 template <class Team, bool kLoosely = false>
