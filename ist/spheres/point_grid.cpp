@@ -28,17 +28,13 @@ PointGrid::PointGrid(std::span<const Eigen::Vector3d> points) {
     }
     return at;
   };
-  start_.assign(cells + 1, 0);
-  for (const Eigen::Vector3d& p : points) ++start_[cell_of(p) + 1];
-  for (std::size_t c = 0; c < cells; ++c) start_[c + 1] += start_[c];
-  std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
-  index_.resize(points.size());
-  for (auto& axis : xyz_) axis.assign(points.size() + kLanes, 1e30f);
-  for (std::uint32_t i = 0; i < points.size(); ++i) {
-    const std::uint32_t place = next[cell_of(points[i])]++;
-    index_[place] = i;
-    for (std::size_t k = 0; k < 3; ++k)
-      xyz_[k][place] = static_cast<float>(points[i][static_cast<int>(k)]);
+  in_cells_ = ItemGroups<>(cells, [&](const auto& visit) {
+    for (std::uint32_t i = 0; i < points.size(); ++i) visit(cell_of(points[i]), i);
+  });
+  for (std::size_t k = 0; k < 3; ++k) {
+    xyz_[k].assign(points.size() + kLanes, 1e30f);
+    for (std::uint32_t place = 0; place < size(); ++place)
+      xyz_[k][place] = static_cast<float>(points[index(place)][static_cast<int>(k)]);
   }
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/item_groups.h"
 #include "numerics/hashing.h"
 
 namespace ist {
@@ -37,10 +38,12 @@ class PointGrid {
 
   explicit PointGrid(std::span<const Eigen::Vector3d> points);
 
-  std::uint32_t size() const { return static_cast<std::uint32_t>(index_.size()); }
+  std::uint32_t size() const { return static_cast<std::uint32_t>(in_cells_.items.size()); }
 
   /// Places of points are numbered by the grid's own order.
-  std::uint32_t index(std::uint32_t place) const { return index_[place]; }  ///< as they were given
+  std::uint32_t index(std::uint32_t place) const {
+    return in_cells_.items[place];
+  }  ///< as they were given
   Eigen::Vector3d point(std::uint32_t place) const {
     return {xyz_[0][place], xyz_[1][place], xyz_[2][place]};
   }
@@ -48,7 +51,7 @@ class PointGrid {
   /// Calls visit(place, distance²) for every point within `radius`, places ascending.
   template <class Visit>
   void within(const Eigen::Vector3d& p, double radius, const Visit& visit) const {
-    if (index_.empty() || !(radius >= 0)) return;
+    if (size() == 0 || !(radius >= 0)) return;
     const Eigen::Vector3f c = p.cast<float>();
     const auto reach = static_cast<float>(radius);
     const float reach2 = reach * reach;
@@ -66,8 +69,8 @@ class PointGrid {
         const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(count_[1]) +
                                  static_cast<std::size_t>(y)) *
                                 static_cast<std::size_t>(count_[0]);
-        scan(c, start_[row + static_cast<std::size_t>(x_from)],
-             start_[row + static_cast<std::size_t>(x_to) + 1], reach2, visit);
+        scan(c, in_cells_.first[row + static_cast<std::size_t>(x_from)],
+             in_cells_.first[row + static_cast<std::size_t>(x_to) + 1], reach2, visit);
       }
     }
   }
@@ -76,7 +79,7 @@ class PointGrid {
   /// further. The smallest place among equals.
   Nearest nearest(const Eigen::Vector3d& p, double guess, double limit) const {
     Nearest best;
-    if (index_.empty()) return best;
+    if (size() == 0) return best;
     for (double reach = std::min(guess, limit);;
          reach = std::min(std::max(1.3 * reach, static_cast<double>(cell_)), limit)) {
       within(p, reach, [&](std::uint32_t i, float d2) {
@@ -123,8 +126,7 @@ class PointGrid {
   std::array<float, 3> low_{};
   std::array<int, 3> count_{};
   float cell_ = 1, per_cell_ = 1;
-  std::vector<std::uint32_t> start_;  ///< of a cell's points; x runs fastest
-  std::vector<std::uint32_t> index_;
+  ItemGroups<> in_cells_;  ///< x runs fastest
   std::array<std::vector<float>, 3> xyz_;
 };
 
