@@ -6,15 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <unordered_map>
 #include <vector>
-
-#include "numerics/hashing.h"
 
 namespace ist {
 namespace {
@@ -25,13 +22,6 @@ constexpr std::size_t kWeldChunk = 16'384;
 struct WeldEntry {
   std::uint32_t hash, point;
 };
-
-std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
-  std::uint64_t hash = 0;
-  for (const double x : p)
-    hash = mixed(hash ^ std::bit_cast<std::uint64_t>(x + 0.0));  // −0 + 0 = 0
-  return hash;
-}
 
 /// The entries of a drawer come in the order of their points: the first of equal ones is kept.
 void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* const entries,

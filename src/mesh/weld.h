@@ -1,10 +1,23 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <bit>
+#include <cstdint>
 #include <vector>
 
 #include <ist/mesh.h>
 
+#include "numerics/hashing.h"
+
 namespace ist {
+
+/// Of a point by its coordinates' bits, −0 = 0.
+inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
+  std::uint64_t hash = 0;
+  for (const double x : p)
+    hash = mixed(hash ^ std::bit_cast<std::uint64_t>(x + 0.0));  // −0 + 0 = 0
+  return hash;
+}
 
 /// One vertex for all that lie within `tolerance` [u] of the first of them in file order (0: equal
 /// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their

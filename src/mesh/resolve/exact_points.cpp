@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mesh/exact_sign.h"
+#include "mesh/weld.h"
 
 namespace ist {
 namespace {
@@ -55,15 +56,6 @@ double determinant(const Double2& a, const Double2& b, const Double2& c, const D
   };
   const double low = rest(a, b, left) - rest(c, d, right);
   return high + (lost + low);
-}
-
-std::size_t hash_of(const Eigen::Vector3d& p) {
-  std::uint64_t hash = 0;
-  for (const double x : p) {
-    hash = (hash ^ std::bit_cast<std::uint64_t>(x + 0.0)) * 0x9e3779b97f4a7c15;
-    hash ^= hash >> 29;
-  }
-  return hash;
 }
 
 bool equal(const ExactPoint& a, const ExactPoint& b) {
@@ -134,7 +126,7 @@ ExactPoints::ExactPoints(const std::vector<Eigen::Vector3d>& vertices)
       any = true;
     }
   by_place_.reserve(at_.size());
-  for (std::uint32_t p = 0; p < given_; ++p) by_place_.emplace(hash_of(at_[p].at), p);
+  for (std::uint32_t p = 0; p < given_; ++p) by_place_.emplace(hash_of_bits(at_[p].at), p);
 }
 
 RoundedPoint ExactPoints::round(const ExactPoint& p) const {
@@ -148,7 +140,7 @@ RoundedPoint ExactPoints::round(const ExactPoint& p) const {
 }
 
 std::uint32_t ExactPoints::add(ExactPoint point, const RoundedPoint& rounded) {
-  const std::size_t hash = hash_of(rounded.at);
+  const std::uint64_t hash = hash_of_bits(rounded.at);
   const auto [begin, end] = by_place_.equal_range(hash);
   for (auto it = begin; it != end; ++it)
     if (at_[it->second].at == rounded.at && equal(exact(it->second), point)) return it->second;

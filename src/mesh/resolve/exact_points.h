@@ -107,7 +107,7 @@ class ExactPoints {
   int exponent_ = 0;  ///< of the lattice's step
   std::vector<RoundedPoint> at_;
   std::vector<ExactPoint> made_;
-  std::unordered_multimap<std::size_t, std::uint32_t> by_place_;
+  std::unordered_multimap<std::uint64_t, std::uint32_t> by_place_;
 };
 
 }  // namespace ist
