@@ -28,6 +28,13 @@ void PlanarTriangulation::set(const std::uint32_t cell, const Cell& value) {
   for (const std::uint32_t p : value.corner) cell_at_[p] = cell;
 }
 
+/// What the cell has beyond one of its sides is another one now.
+void PlanarTriangulation::hand_over(const std::uint32_t cell, const std::uint32_t from,
+                                    const std::uint32_t to) {
+  if (cell == kNoIndex) return;
+  std::replace(cells_[cell].beyond.begin(), cells_[cell].beyond.end(), from, to);
+}
+
 /// The cell that holds p, by a walk that turns at random and so comes to an end.
 std::uint32_t PlanarTriangulation::cell_of(const std::uint32_t p) {
   for (auto at = static_cast<std::uint32_t>(cells_.size() - 1);;) {
@@ -52,13 +59,8 @@ void PlanarTriangulation::insert_point(const std::uint32_t p) {
   set(at, {{a, b, p}, {second, third, beyond_c}});
   set(second, {{b, c, p}, {third, at, beyond_a}});
   set(third, {{c, a, p}, {at, second, beyond_b}});
-  const auto hand_over = [&](const std::uint32_t neighbour, const std::uint32_t to) {
-    if (neighbour == kNoIndex) return;
-    for (std::uint32_t& back : cells_[neighbour].beyond)
-      if (back == at) back = to;
-  };
-  hand_over(beyond_a, second);
-  hand_over(beyond_b, third);
+  hand_over(beyond_a, at, second);
+  hand_over(beyond_b, at, third);
   // On a side: the cell between the side and p is flat.
   for (const std::uint32_t flat : {at, second, third}) {
     const Cell cell = cells_[flat];
@@ -78,15 +80,6 @@ void PlanarTriangulation::flip(const Place edge) {
   const std::uint32_t past_aq = two.beyond[after(j)], past_qb = two.beyond[before(j)];
   set(t, {{p, a, q}, {past_aq, u, past_pa}});
   set(u, {{q, b, p}, {past_bp, t, past_qb}});
-  const auto hand_over = [&](const std::uint32_t cell, const std::uint32_t from,
-                             const std::uint32_t to) {
-    if (cell == kNoIndex) return;
-    for (std::uint32_t& back : cells_[cell].beyond)
-      if (back == from) {
-        back = to;
-        return;
-      }
-  };
   hand_over(past_aq, u, t);
   hand_over(past_bp, t, u);
 }

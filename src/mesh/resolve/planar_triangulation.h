@@ -56,6 +56,7 @@ class PlanarTriangulation {
   Place next_about(Place place) const;
   Place edge_between(std::uint32_t a, std::uint32_t b) const;
   void set(std::uint32_t cell, const Cell& value);
+  void hand_over(std::uint32_t cell, std::uint32_t from, std::uint32_t to);
   static std::uint64_t key(std::uint32_t from, std::uint32_t to) {
     return std::uint64_t{from} << 32 | to;
   }
