@@ -79,10 +79,11 @@ TEST(DeadlineLoop, ARingOnAKnotKeepsItsEnergyAndItsTime) {
     std::size_t spheres;
     bool field;
     double stiffness;
-  } loops[] = {{4000, true, 1e4}, {8000, false, 1e5}};
-  for (const auto& [spheres, field, stiffness] : loops) {
+    std::vector<double> deadlines;
+  } loops[] = {{4000, true, 1e4, {160, 20}}, {8000, false, 1e5, {20}}};
+  for (const auto& [spheres, field, stiffness, deadlines] : loops) {
     Loop loop(spheres, field);
-    for (const double deadline : {160.0, 20.0}) {
+    for (const double deadline : deadlines) {
       SCOPED_TRACE(::testing::Message() << spheres << " spheres, " << deadline << " us");
       const LoopRun run = loop.run(stiffness, deadline);
       EXPECT_GT(run.ring.touching, 1000);

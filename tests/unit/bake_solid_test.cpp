@@ -124,7 +124,7 @@ TEST(BakeSolid, BakesFunctions) {
         return std::min((0.8 - std::abs(wave)) / (5 * std::sqrt(3.0)), 1 - x.norm());
       },
       box);
-  const Asset asset = bake(*gyroid, testing::of_size(400), {}, {.cells = 32});
+  const Asset asset = bake(*gyroid, testing::of_size(300), {}, {.cells = 24});
   EXPECT_GT(asset.view().header().coverage, 0.3);
   expect_sound(check(asset, *gyroid));
   const auto ball = make_function_solid([](const Vector3d& x) { return 1 - x.norm(); }, box);

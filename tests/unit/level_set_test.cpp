@@ -36,7 +36,7 @@ TEST(LevelSet, BandsAndWholeGridsGiveTheSolid) {
                                         ist::make_ball({1, 0.7, 0.4}, 0.5));
   for (const ist::Solid* solid : {torus.get(), cut.get()})
     for (const double band : {10.0, 0.1}) {
-      const DistanceGrid grid = sampled(*solid, 48, band);
+      const DistanceGrid grid = sampled(*solid, 36, band);
       const ist::LevelSetMesh made = ist::mesh_level_set(grid, "grid");
       EXPECT_LE(made.error, 0.8 * grid.spacing);
       EXPECT_EQ(made.mesh.report.boundary_edges, 0u);
@@ -47,7 +47,7 @@ TEST(LevelSet, BandsAndWholeGridsGiveTheSolid) {
         ASSERT_LE(std::abs(solid->signed_distance(v)), made.error + 0.5 * grid.spacing);
       std::mt19937_64 random(1);
       std::uniform_real_distribution<double> coordinate(-1, 1);
-      for (int i = 0; i < 3000; ++i) {
+      for (int i = 0; i < 1500; ++i) {
         const Vector3d x(coordinate(random), coordinate(random), coordinate(random));
         const double s = solid->signed_distance(x);
         ASSERT_TRUE(std::abs(s) <= made.error + 0.5 * grid.spacing ||
