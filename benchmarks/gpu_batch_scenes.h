@@ -22,10 +22,10 @@ namespace ist::benchmark {
 using ist::testing::BatchPair;
 
 inline Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_t spheres,
-                   bool field = false) {
+                   bool surface = false) {
   PackingSettings settings;
   settings.max_spheres = spheres;
-  settings.surface.wanted = field;
+  settings.surface.wanted = surface;
   return bake(close_mesh(mesh, name), settings);
 }
 

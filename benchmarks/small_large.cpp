@@ -23,8 +23,8 @@
 namespace {
 
 using Eigen::Vector3d;
-using ist::FieldUse;
 using ist::PlacedTree;
+using ist::SurfaceUse;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::testing::degrees_between;
@@ -120,9 +120,9 @@ struct Measured {
 };
 
 constexpr std::size_t kMethods = 4;
-constexpr const char* kNames[kMethods] = {"lenses", "fields", "always", "exact"};
-constexpr FieldUse kUses[kMethods] = {FieldUse::never, FieldUse::automatic, FieldUse::always,
-                                      FieldUse::automatic};
+constexpr const char* kNames[kMethods] = {"lenses", "surface", "always", "exact"};
+constexpr SurfaceUse kUses[kMethods] = {SurfaceUse::never, SurfaceUse::automatic,
+                                        SurfaceUse::always, SurfaceUse::automatic};
 constexpr std::size_t kExact = 3;  ///< by Measure::exact
 using Methods = std::array<Measured, kMethods>;
 
@@ -146,7 +146,7 @@ std::map<std::string, Methods> measure(const std::vector<Row>& rows, Assets& ass
     std::shuffle(order.begin(), order.end(), random);
     for (std::size_t method = 0; method < kMethods; ++method) {
       ist::PenetrationSettings settings;
-      settings.field = kUses[method];
+      settings.surface = kUses[method];
       if (method == kExact) settings.measure = ist::Measure::exact;
       for (const std::size_t i : order) {
         const auto start = std::chrono::steady_clock::now();
@@ -351,22 +351,22 @@ void unseen_pairs(Report& report, Assets& assets, int turns) {
     for (const double ratio : {1.0, 0.3, 0.1, 0.03}) {
       const std::vector<Row> rows = unseen_rows(a, b, ratio, assets);
       for (const auto& [kind, methods] : measure(rows, assets, turns)) {
-        const Measured &lenses = methods[0], &fields = methods[1], &exact = methods[kExact];
+        const Measured &lenses = methods[0], &surface = methods[1], &exact = methods[kExact];
         report.row("Unseen pairs",
                    {{"pair", std::string(a) + ", " + b},
                     {"ratio", ratio},
                     {"rows", rows.size()},
                     {"crossing pairs median", median(exact.pairs)},
                     {"lenses volume median %", median(lenses.volume)},
-                    {"fields volume median %", median(fields.volume)},
-                    {"fields volume p95 %", quantile(fields.volume, 0.95)},
-                    {"fields angle median °", median(fields.angle)},
+                    {"surface volume median %", median(surface.volume)},
+                    {"surface volume p95 %", quantile(surface.volume, 0.95)},
+                    {"surface angle median °", median(surface.angle)},
                     {"lenses median µs", median(lenses.time)},
-                    {"fields median µs", median(fields.time)},
-                    {"fields p95 µs", quantile(fields.time, 0.95)},
+                    {"surface median µs", median(surface.time)},
+                    {"surface p95 µs", quantile(surface.time, 0.95)},
                     {"exact median µs", median(exact.time)},
                     {"exact p95 µs", quantile(exact.time, 0.95)},
-                    {"exact over fields", median(exact.time) / median(fields.time)}});
+                    {"exact over surface", median(exact.time) / median(surface.time)}});
       }
     }
 }
@@ -445,10 +445,10 @@ void flat_rests(Report& report, Assets& assets) {
                    ist::PlacedField{ist::BoxField{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1},
                    body, {}, workspace));
     ist::PenetrationSettings settings;
-    settings.field = FieldUse::never;
+    settings.surface = SurfaceUse::never;
     add("cube by lenses", ist::penetration(under, body, settings, workspace));
-    settings.field = FieldUse::automatic;
-    add("cube by fields", ist::penetration(under, body, settings, workspace));
+    settings.surface = SurfaceUse::automatic;
+    add("cube by surface", ist::penetration(under, body, settings, workspace));
     report.row("Flat rests", row);
   }
   report.remark("Flat rests on a half-space or a box: the volume is off by " +
@@ -464,8 +464,8 @@ int main(int argc, char** argv) {
   const std::size_t spheres = report.quick() ? 1'000 : 4'000;
   const int turns = report.quick() ? 3 : 15;
   report.remark(std::to_string(spheres) +
-                " spheres each. Lenses: FieldUse::never; fields: FieldUse::automatic; always: "
-                "FieldUse::always; exact: Measure::exact; in the same run by turns. Every pose "
+                " spheres each. Lenses: SurfaceUse::never; surface: SurfaceUse::automatic; always: "
+                "SurfaceUse::always; exact: Measure::exact; in the same run by turns. Every pose "
                 "stands between others; the "
                 "time of a pose is the median "
                 "of its " +

@@ -273,7 +273,7 @@ int main(int argc, char** argv) {
       "B comes from outside, goes through A's bounding ball and out again while it turns about its "
       "origin at constant speed (FCL's `InterpMotion`); a step is one of 2 % of that way, begun "
       "shortly before the contact. Assets of " +
-      std::to_string(spheres) + " spheres with fields, tolerance 0.1 % of B's bounding radius.");
+      std::to_string(spheres) + " spheres with surfaces, tolerance 0.1 % of B's bounding radius.");
   report.remark(
       "Hits: FCL's surfaces cross at one of " + std::to_string(kSamples) +
       " times of the motion; the first contact by bisection between two of them. Early by: the way "

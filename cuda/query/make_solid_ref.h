@@ -83,8 +83,8 @@ inline std::span<const std::byte> pointed_to(const Field& field) {
 
 inline AssetFrame frame_of(const Field& field) {
   const auto* const mesh = std::get_if<MeshField>(&field);
-  return mesh != nullptr && mesh->tree.has_field() ? frame_of(mesh->tree.header())
-                                                   : AssetFrame{{0, 0, 0}, 1};
+  return mesh != nullptr && mesh->tree.has_surface() ? frame_of(mesh->tree.header())
+                                                     : AssetFrame{{0, 0, 0}, 1};
 }
 
 /// `at`: where who works on the field finds what it points to. `unusable` if out of range.

@@ -27,7 +27,7 @@ IST_HD inline SurfaceNode surface_node(int rank, std::uint32_t number) {
   return static_cast<std::uint32_t>(rank) << kSurfaceBits | number;
 }
 
-/// The field of an asset with its offsets resolved (SurfaceTree, query/asset/surface_tree.h, in
+/// The surface of an asset with its offsets resolved (SurfaceTree, query/asset/surface_tree.h, in
 /// plain numbers).
 struct SurfaceRef {
   const SurfaceBlock* blocks;
@@ -45,34 +45,34 @@ struct SurfaceRef {
   const std::byte* cell_triangles;
   std::uint32_t list_bytes;
 
-  /// `asset`: a header that the host reads, of an asset with a field; `bytes`: where it lies.
+  /// `asset`: a header that the host reads, of an asset with a surface; `bytes`: where it lies.
   static SurfaceRef of(const AssetHeader& asset, const std::byte* bytes) {
-    const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
+    const SurfaceHeader& surface = *at<SurfaceHeader>(asset, asset.surface);
     SurfaceRef ref = {};
-    ref.top = static_cast<int>(field.level_count) - 1;
-    ref.blocks = reinterpret_cast<const SurfaceBlock*>(bytes + field.level[0].blocks);
+    ref.top = static_cast<int>(surface.level_count) - 1;
+    ref.blocks = reinterpret_cast<const SurfaceBlock*>(bytes + surface.level[0].blocks);
     double square = 0;
     for (int k = 0; k < 3; ++k) {
-      const double half = 0.5 * field.cell * static_cast<double>(kBrickWidth * field.bricks[k]);
-      ref.low[k] = field.low[k];
-      ref.bricks[k] = field.bricks[k];
-      ref.root[k] = field.low[k] + half;
+      const double half = 0.5 * surface.cell * static_cast<double>(kBrickWidth * surface.bricks[k]);
+      ref.low[k] = surface.low[k];
+      ref.bricks[k] = surface.bricks[k];
+      ref.root[k] = surface.low[k] + half;
       square += half * half;
     }
     ref.root[3] = std::sqrt(square);
     for (int i = 0; i <= ref.top; ++i) {
-      const double count = field.level[i].count;
+      const double count = surface.level[i].count;
       ref.cube[i] = ref.root[3] * ref.root[3] * ref.root[3] / (count * std::sqrt(count));
       if (i == 0) continue;
-      ref.balls[i] = reinterpret_cast<const BallBlock*>(bytes + field.level[i].blocks);
-      ref.origins[i] = reinterpret_cast<const Origin*>(bytes + field.level[i].origins);
+      ref.balls[i] = reinterpret_cast<const BallBlock*>(bytes + surface.level[i].blocks);
+      ref.origins[i] = reinterpret_cast<const Origin*>(bytes + surface.level[i].origins);
     }
-    ref.cell = field.cell;
-    ref.brick_index = reinterpret_cast<const std::uint32_t*>(bytes + field.brick_index);
-    ref.brick_data = reinterpret_cast<const CellBrick*>(bytes + field.brick_data);
-    ref.cell_ends = bytes + field.cell_ends;
-    ref.cell_triangles = bytes + field.cell_triangles;
-    ref.list_bytes = field.list_bytes;
+    ref.cell = surface.cell;
+    ref.brick_index = reinterpret_cast<const std::uint32_t*>(bytes + surface.brick_index);
+    ref.brick_data = reinterpret_cast<const CellBrick*>(bytes + surface.brick_data);
+    ref.cell_ends = bytes + surface.cell_ends;
+    ref.cell_triangles = bytes + surface.cell_triangles;
+    ref.list_bytes = surface.list_bytes;
     return ref;
   }
 

@@ -14,10 +14,10 @@
 //   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
 //     matched spheres                 Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
-//   field, if there is one            as below
+//   surface, if there is one          as below
 //   mesh, if there is one             as below
 //
-// An asset of a surface alone has no spheres: n = d = 0, neither trees nor a field, but a mesh.
+// An asset without spheres, n = d = 0, has neither trees nor this surface, but a mesh.
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader. Under
 // PenetrationSettings::pair_budget a query may answer from the coarser ones instead.
@@ -34,10 +34,10 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
-// The field, the solid's surface for queries of spheres: triangles, a tree of balls over them, and
+// The surface, the solid's for queries of spheres: triangles, a tree of balls over them, and
 // a grid that separates inside from outside.
 //
-//   FieldHeader
+//   SurfaceHeader
 //   level 0                           SurfaceBlock[m(0)]
 //   level k ≥ 1                       BallBlock[m(k)], Origin[m(k)]   balls around blocks below
 //   brick index                       uint32[bricks[0] · bricks[1] · bricks[2]], x runs fastest
@@ -116,7 +116,7 @@ struct alignas(64) NodeBlock {
 static_assert(sizeof(NodeBlock) == 192);
 
 struct LevelHeader {
-  std::uint64_t blocks = 0;   ///< offset of BallBlock[count], of the field's level 0 SurfaceBlock
+  std::uint64_t blocks = 0;   ///< offset of BallBlock[count], of the surface's level 0 SurfaceBlock
   std::uint64_t origins = 0;  ///< offset of Origin[count]
   std::uint64_t nodes = 0;    ///< offset of NodeBlock[count]; 0 at level 0
   std::uint32_t count = 0;    ///< blocks at this level
@@ -150,7 +150,7 @@ struct DetailLevel {
 };
 static_assert(sizeof(DetailLevel) == 328);
 
-/// Up to sixteen triangles of the field over up to sixteen vertices of their own.
+/// Up to sixteen triangles of the surface over up to sixteen vertices of their own.
 ///
 /// All blocks together are a closed, oriented surface: a vertex that blocks share has the same
 /// floats in each.
@@ -179,9 +179,9 @@ struct CellBrick {
 };
 static_assert(sizeof(CellBrick) == 24);
 
-/// The solid's surface for queries, over floats: the mesh's own triangles or, if an error was
-/// requested, fewer near them.
-struct FieldHeader {
+/// The solid's surface for queries of spheres, over floats: the mesh's own triangles or, if an
+/// error was requested, fewer near them.
+struct SurfaceHeader {
   /// Unit frame, proven: this surface and the solid's lie within `error` of each other, and both
   /// solids agree on every point further from them.
   double error = 0;
@@ -201,7 +201,7 @@ struct FieldHeader {
   std::uint64_t cell_triangles = 0;  ///< offset of [entry_count]: 16 · block + lane
   LevelHeader level[kMaxLevels];     ///< level 0: SurfaceBlock, above: BallBlock and Origin
 };
-static_assert(sizeof(FieldHeader) == 336);
+static_assert(sizeof(SurfaceHeader) == 336);
 
 /// Up to sixteen triangles of the mesh over up to sixteen of its vertices.
 ///
@@ -318,8 +318,8 @@ struct alignas(64) AssetHeader {
   std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured
   std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
 
-  std::uint64_t field = 0;         ///< offset of FieldHeader; 0: baked without one
-  double asked_surface_error = 0;  ///< [u] of field and mesh; 0: the mesh's own triangles
+  std::uint64_t surface = 0;       ///< offset of SurfaceHeader; 0: baked without one
+  double asked_surface_error = 0;  ///< [u] of surface and mesh; 0: the mesh's own triangles
 
   /// Unit frame, proven: the mesh in the solid's place and the solid lie within it
   /// (kFlagPolygonised).
@@ -378,25 +378,25 @@ constexpr void place_tree(TreeHeader& tree, bool with_covers, std::uint64_t& end
   }
 }
 
-constexpr void place_field(FieldHeader& field, std::uint64_t& end) noexcept {
-  std::uint32_t count = field.level[0].count;
-  field.level_count = 0;
+constexpr void place_surface(SurfaceHeader& surface, std::uint64_t& end) noexcept {
+  std::uint32_t count = surface.level[0].count;
+  surface.level_count = 0;
   for (;; count = (count + kWidth - 1) / kWidth) {
-    LevelHeader& level = field.level[field.level_count];
+    LevelHeader& level = surface.level[surface.level_count];
     level.count = count;
     level.blocks =
-        field.level_count == 0 ? take<SurfaceBlock>(end, count) : take<BallBlock>(end, count);
-    level.origins = field.level_count == 0 ? 0 : take<Origin>(end, count);
+        surface.level_count == 0 ? take<SurfaceBlock>(end, count) : take<BallBlock>(end, count);
+    level.origins = surface.level_count == 0 ? 0 : take<Origin>(end, count);
     level.nodes = 0;
-    ++field.level_count;
+    ++surface.level_count;
     if (count == 1) break;
   }
-  field.brick_index =
-      take<std::uint32_t>(end, std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2]);
-  field.brick_data = take<CellBrick>(end, field.brick_count);
-  const std::uint64_t width = field.list_bytes;
-  field.cell_ends = take<std::byte>(end, width * field.cell_count);
-  field.cell_triangles = take<std::byte>(end, width * field.entry_count);
+  surface.brick_index = take<std::uint32_t>(
+      end, std::uint64_t{surface.bricks[0]} * surface.bricks[1] * surface.bricks[2]);
+  surface.brick_data = take<CellBrick>(end, surface.brick_count);
+  const std::uint64_t width = surface.list_bytes;
+  surface.cell_ends = take<std::byte>(end, width * surface.cell_count);
+  surface.cell_triangles = take<std::byte>(end, width * surface.entry_count);
 }
 
 constexpr void place_mesh(MeshHeader& mesh, std::uint64_t& end) noexcept {
@@ -426,11 +426,12 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
 }
 
 /// Sets every offset, count and the file size from `sphere_count` in [0, kMaxSpheres] and
-/// `detail_count`, whose sets must each have a sphere; `details` are those of the file. `field`, if
-/// any, must have list_bytes and its counts: level[0].count, those of bricks, cells and entries.
+/// `detail_count`, whose sets must each have a sphere; `details` are those of the file. `surface`,
+/// if any, must have list_bytes and its counts: level[0].count, those of bricks, cells and entries.
 /// `mesh`, if any, must have those of vertices, shells, neighbours and level[0].count.
 constexpr void place_sections(AssetHeader& header, DetailLevel* details,
-                              FieldHeader* field = nullptr, MeshHeader* mesh = nullptr) noexcept {
+                              SurfaceHeader* surface = nullptr,
+                              MeshHeader* mesh = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;
   std::uint64_t end = sizeof(AssetHeader);
   header.details =
@@ -447,8 +448,8 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details,
     details[i].matched_tree.sphere_count = static_cast<std::uint32_t>(m);
     detail::place_tree(details[i].matched_tree, false, end);
   }
-  header.field = field != nullptr ? detail::take<FieldHeader>(end, 1) : 0;
-  if (field != nullptr) detail::place_field(*field, end);
+  header.surface = surface != nullptr ? detail::take<SurfaceHeader>(end, 1) : 0;
+  if (surface != nullptr) detail::place_surface(*surface, end);
   header.mesh = mesh != nullptr ? detail::take<MeshHeader>(end, 1) : 0;
   if (mesh != nullptr) detail::place_mesh(*mesh, end);
   header.file_bytes = end;

@@ -15,7 +15,7 @@
 namespace IST_API ist {
 
 /// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees, the mesh
-/// and the field.
+/// and the surface.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
 /// of threads. Cancelling during packing keeps the spheres so far; before and after packing it
@@ -23,14 +23,15 @@ namespace IST_API ist {
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
-/// (MeshState::unresolved), and no field if the mesh reaches far into itself.
+/// (MeshState::unresolved), and no surface if the mesh reaches far into itself.
 ///
 /// Throws Error if no sphere fits, on settings out of range, and if the requested surface error is
 /// below float precision.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
-/// Makes a surface-only asset: the mesh, mass properties and bounds, without spheres or field.
+/// Makes a surface-only asset: the mesh, mass properties and bounds, without spheres and
+/// the surface that these need.
 /// Takes about as long as the import.
 ///
 /// It serves Measure::exact and mass_properties(); queries of spheres return QueryStatus::not_held.

@@ -88,8 +88,8 @@ struct FunctionField {
   double error = 0;               ///< [u] bound on the error of distances
 };
 
-/// The stored surface of an asset (TreeView::has_field), without its spheres. Exact within
-/// TreeView::field_error.
+/// The stored surface of an asset (TreeView::has_surface), without its spheres. Exact within
+/// TreeView::surface_error.
 struct MeshField {
   TreeView tree;
 };

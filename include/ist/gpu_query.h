@@ -85,7 +85,8 @@ struct GpuPenetrationSettings {
   std::uint32_t pair_budget = 0;
 };
 
-/// answers[i] = penetration(pairs[i]) as a finished sum, of two assets by lenses (FieldUse::never).
+/// answers[i] = penetration(pairs[i]) as a finished sum, of two assets by lenses
+/// (SurfaceUse::never).
 ///
 /// Two assets: the volume is within 1e-6 of the sum in double. Gradients are within 1e-6 of the sum
 /// of the lenses' magnitudes, or of volume^(2/3) if that is more. Under a budget, and for copies of
@@ -124,7 +125,7 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint3
                       GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
 
 /// answers[i] and its patches = contact_patches(pairs[i]) of two assets by lenses
-/// (FieldUse::never), without limits: the contact condensed into at most `patches.most`.
+/// (SurfaceUse::never), without limits: the contact condensed into at most `patches.most`.
 ///
 /// Patches are the same regions of the same tree as there, with the same ids, unless two divisions
 /// are equally good to a float's digits. Answers equal those of penetration_batch() to its

@@ -55,7 +55,7 @@ enum {
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
   /* A solid lacks what the measure needs: IST_EXACT needs the meshes of both (a field has none),
-   * the others need spheres, IST_FIELD_ALWAYS the surface of the coarser one. All numbers of the
+   * the others need spheres, IST_SURFACE_ALWAYS the surface of the coarser one. All numbers of the
    * answer are NaN. */
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
@@ -121,16 +121,16 @@ enum {
 
 typedef struct ist_tree_info {
   uint32_t size;
-  uint32_t has_field; /* 1: the asset stores the solid's surface, which makes queries of spheres
+  uint32_t has_surface; /* 1: the asset stores the solid's surface, which makes queries of spheres
                          exact */
-  uint64_t spheres;   /* count; 0: a surface alone, without spheres to query */
-  double volume;      /* [u³] of the solid */
-  double coverage;    /* [0, 1] share of the volume in inner spheres */
-  double protrusion;  /* [u] bound on how far matched spheres stick out of the solid */
-  double field_error; /* [u] the stored surface and the solid's lie within this of each other */
-  uint32_t field_triangles; /* of that surface */
-  uint32_t details;         /* levels of detail of the matched spheres: 0 is the finest */
-  uint32_t mesh_triangles;  /* of the mesh kept for exact queries; 0: there is none */
+  uint64_t spheres;     /* count; 0: a surface alone, without spheres to query */
+  double volume;        /* [u³] of the solid */
+  double coverage;      /* [0, 1] share of the volume in inner spheres */
+  double protrusion;    /* [u] bound on how far matched spheres stick out of the solid */
+  double surface_error; /* [u] the stored surface and the solid's lie within this of each other */
+  uint32_t surface_triangles; /* of that surface */
+  uint32_t details;           /* levels of detail of the matched spheres: 0 is the finest */
+  uint32_t mesh_triangles;    /* of the mesh kept for exact queries; 0: there is none */
   ist_mesh_state_t mesh_state;
   double mesh_error;    /* [u] the mesh's surface and the solid's lie within this of each other */
   double counted_twice; /* [u³] volume that the input mesh counts more than once */
@@ -362,15 +362,15 @@ ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b
 
 /* --- Settings: a null pointer means the defaults, all 0 except `size` ------------------------ */
 
-typedef int32_t ist_field_use_t;
-enum { IST_FIELD_AUTOMATIC = 0, IST_FIELD_NEVER = 1, IST_FIELD_ALWAYS = 2 };
+typedef int32_t ist_surface_use_t;
+enum { IST_SURFACE_AUTOMATIC = 0, IST_SURFACE_NEVER = 1, IST_SURFACE_ALWAYS = 2 };
 
 /* PenetrationSettings. IST_EXACT obeys max_visits only. If that stops it, the answer is that of the
  * matched spheres (NaN if there are none), with bounds of the true volume. */
 typedef struct ist_penetration_settings {
   uint32_t size;
   ist_measure_t measure;
-  ist_field_use_t field;
+  ist_surface_use_t surface;
   uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;  /* count of node pairs opened */
   /* The caller's number of this pair of solids; 0: none. Calls with one number and workspace are
@@ -472,7 +472,7 @@ ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
                              ist_penetration_t* answer);
 
 /* Removes the volume that protruding spheres add where flat faces meet. `whole` is the answer
- * of ist_penetration() by lenses (IST_FIELD_NEVER), and may be the same struct as `answer`. */
+ * of ist_penetration() by lenses (IST_SURFACE_NEVER), and may be the same struct as `answer`. */
 ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_t* a,
                                     const ist_placed_t* b, ist_penetration_t* answer);
 
@@ -489,7 +489,7 @@ typedef struct ist_deadline {
 /* [µs] 0, a negative value or NaN: no deadline, and no pair budget. */
 ist_status_t ist_deadline_make(double microseconds, ist_deadline_t* deadline);
 
-/* Sets the pair budget of the next query; IST_FIELD_AUTOMATIC becomes IST_FIELD_NEVER. */
+/* Sets the pair budget of the next query; IST_SURFACE_AUTOMATIC becomes IST_SURFACE_NEVER. */
 ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
                                 ist_penetration_settings_t* settings);
 

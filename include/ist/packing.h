@@ -48,10 +48,10 @@ enum class Device : std::uint32_t {
   cuda,  ///< throws Error if gpu_available() is false
 };
 
-/// What an asset stores of the surface: its mesh, which Measure::exact needs, and its field, which
-/// makes the other measures exact where spheres are too coarse.
+/// What an asset stores of its solid's boundary: the mesh, which Measure::exact needs, and the
+/// surface, which makes the other measures exact where spheres are too coarse.
 struct SurfaceSettings {
-  bool wanted = true;  ///< false: neither mesh nor field
+  bool wanted = true;  ///< false: neither mesh nor surface
   /// [u] Allowed distance from the mesh's surface: as few triangles as that allows. 0: all of the
   /// mesh's.
   double error = 0;

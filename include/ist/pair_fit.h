@@ -12,9 +12,9 @@ struct PairFit {
   double grain_a = 0, grain_b = 0;
   double ratio = 1;          ///< ≥ 1, coarser grain over the finer
   bool a_is_coarser = true;  ///< or both are equal
-  bool has_surface = true;   ///< the coarser asset stores its surface (TreeView::has_field)
+  bool has_surface = true;   ///< the coarser asset stores its surface (TreeView::has_surface)
   /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. The coarser
-  /// one's surface helps, if it is stored and FieldUse allows it.
+  /// one's surface helps, if it is stored and SurfaceUse allows it.
   bool needs_surface = false;
 
   bool fits() const noexcept { return has_surface || !needs_surface; }

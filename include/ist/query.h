@@ -29,7 +29,7 @@ namespace IST_API ist {
 /// and the smaller solid's.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
-  FieldUse field = FieldUse::automatic;  ///< matched measure only
+  SurfaceUse surface = SurfaceUse::automatic;  ///< matched measure only
 
   /// Count of sphere pairs to spend; two trees in the matched measure only (the inner one has no
   /// levels of detail).
@@ -202,7 +202,7 @@ std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 /// Volume, wrench and centroid of the overlap.
 ///
 /// By spheres the volume is a sum of lenses, or the sum of the exact parts of the finer tree's
-/// spheres inside the other's surface, as PenetrationSettings::field selects. The gradients of a
+/// spheres inside the other's surface, as PenetrationSettings::surface selects. The gradients of a
 /// finished query are those of the returned volume. Copies of one asset at nearly the same pose are
 /// evaluated as unlike levels of detail, since the sum over coincident equal spheres is too large.
 ///
@@ -225,7 +225,7 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 /// gradient to within 15 %: use it for contacts, not where energy must be conserved. volume_min is
 /// lowered to contain the new volume.
 ///
-/// `whole`: the answer of penetration() for this pair by lenses (FieldUse::never), in the matched
+/// `whole`: the answer of penetration() for this pair by lenses (SurfaceUse::never), in the matched
 /// measure, without a pair budget. Takes a few nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;

@@ -18,7 +18,7 @@ enum class QueryStatus : std::uint32_t {
   /// distances more than 1e60 : 1 apart; or a workspace that was moved from.
   invalid_input = 2,
   /// A solid lacks what the measure needs. Measure::exact needs both solids' meshes
-  /// (TreeView::has_mesh; a field has none), the others need spheres. FieldUse::always needs the
+  /// (TreeView::has_mesh; a field has none), the others need spheres. SurfaceUse::always needs the
   /// surface of the coarser one. All numbers of the answer are NaN.
   not_held = 3,
   /// Finished, but the predicted error is larger than PenetrationSettings::relative_error: an asset
@@ -36,11 +36,11 @@ enum class Measure : std::uint32_t {
   exact = 2,
 };
 
-/// Whether the stored surface of an asset (TreeView::has_field) is used.
+/// Whether the stored surface of an asset (TreeView::has_surface) is used.
 ///
 /// A sphere is intersected exactly with the other solid's surface. A lens of two spheres does not
 /// represent the surface between neighbouring spheres.
-enum class FieldUse : std::uint32_t {
+enum class SurfaceUse : std::uint32_t {
   /// The finer tree's spheres are intersected with the coarser one's surface where its spheres are
   /// too coarse for the contact. Trees of like size in deeper contact are summed by lenses, with a
   /// smooth blend in between. Without a surface in the coarser asset: lenses.

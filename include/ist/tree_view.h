@@ -88,10 +88,10 @@ class TreeView {
   double protrusion() const noexcept;  ///< [u] bound on how far matched spheres stick out of the
                                        ///< solid
   /// Whether the asset stores the solid's surface, with which spheres are intersected exactly.
-  bool has_field() const noexcept;
-  /// [u] The stored surface and the solid's lie within this of each other; 0 without a field.
-  double field_error() const noexcept;
-  std::uint32_t field_triangles() const noexcept;  ///< of that surface; 0 without a field
+  bool has_surface() const noexcept;
+  /// [u] The stored surface and the solid's lie within this of each other; 0 without one.
+  double surface_error() const noexcept;
+  std::uint32_t surface_triangles() const noexcept;  ///< of that surface; 0 without one
   /// Whether the asset stores the solid's mesh, which Measure::exact needs. An asset with a mesh
   /// and no spheres is a surface alone: queries of spheres return QueryStatus::not_held.
   bool has_mesh() const noexcept;

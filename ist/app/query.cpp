@@ -124,29 +124,30 @@ void check_settings(const QueryOptions& options) {
   if (settings.measure != Measure::matched) {
     if (settings.pair_budget != 0) no_effect("--pair-budget");
     if (settings.relative_error != 0) no_effect("--error");
-    if (exact ? settings.field != FieldUse::automatic : settings.field == FieldUse::always)
-      no_effect("--field");
+    if (exact ? settings.surface != SurfaceUse::automatic : settings.surface == SurfaceUse::always)
+      no_effect("--surface");
   }
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
         "--measure", "exact needs the meshes of two assets, and A is a field: " + options.a +
                          "; omit the option, or pass an .ist file of the same shape");
-  if (settings.field == FieldUse::never)
+  if (settings.surface == SurfaceUse::never)
     throw CLI::ValidationError(
-        "--field", "never cannot be combined with " + options.a +
-                       ", a field without spheres; omit the option, or pass an .ist file");
+        "--surface", "never cannot be combined with " + options.a +
+                         ", a field without spheres; omit the option, or pass an .ist file");
   for (const auto& [option, given] : {std::pair("--pair-budget", settings.pair_budget != 0),
                                       std::pair("--error", settings.relative_error != 0)})
     if (given) throw CLI::ValidationError(option, "has no effect where A is a field: " + options.a);
 }
 
-/// Throws Error if the surface that --field always asks for is not there.
+/// Throws Error if the surface that --surface always asks for is not there.
 void require_surface(const std::string& path, const TreeView& tree) {
-  if (!tree.has_field())
-    throw Error(path +
-                ": has no field, which --field always needs; bake it again with --surface all, or "
-                "use --field auto");
+  if (!tree.has_surface())
+    throw Error(
+        path +
+        ": has no surface, which --surface always needs; bake it again with --surface all, or "
+        "query with --surface auto");
 }
 
 /// Throws Error if an asset does not hold what the measure asks.
@@ -172,12 +173,12 @@ void require_held(const std::string& path, const TreeView& tree, Measure measure
 void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
                     const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
-  if (settings.measure != Measure::matched || settings.field != FieldUse::automatic) return;
+  if (settings.measure != Measure::matched || settings.surface != SurfaceUse::automatic) return;
   for (const PoseRow& row : rows) {
     const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
     if (fit.fits()) continue;
     spdlog::warn(
-        "{}: its spheres are {:.2g} times as coarse as those of {}, and it has no field: volumes "
+        "{}: its spheres are {:.2g} times as coarse as those of {}, and it has no surface: volumes "
         "and forces may be far off. Bake it again with --surface all",
         fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
         fit.a_is_coarser ? options.asset_b : options.a);
@@ -201,7 +202,7 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
     require_held(options.a, a.view(), measure);
     require_held(options.asset_b, b.view(), measure);
   }
-  if (options.settings.penetration.field == FieldUse::always) {
+  if (options.settings.penetration.surface == SurfaceUse::always) {
     require_surface(options.a, a.view());
     require_surface(options.asset_b, b.view());
   }
@@ -267,11 +268,11 @@ void add_query(CLI::App& app) {
       ->default_str("matched");
   command
       ->add_option_function<std::string>(
-          "--field",
+          "--surface",
           [options](const std::string& name) {
-            options->settings.penetration.field = name == "never"    ? FieldUse::never
-                                                  : name == "always" ? FieldUse::always
-                                                                     : FieldUse::automatic;
+            options->settings.penetration.surface = name == "never"    ? SurfaceUse::never
+                                                    : name == "always" ? SurfaceUse::always
+                                                                       : SurfaceUse::automatic;
           },
           "When to overlap spheres with the other asset's surface instead of its spheres; auto: if "
           "its spheres are too coarse; never; always. Matched measure only")

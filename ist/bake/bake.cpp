@@ -167,7 +167,7 @@ void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header)
   header.ball_radius = (radius + beyond) * (1 + 0x1p-49) * frame.scale();
 }
 
-AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress) {
   AssetArrays arrays;
@@ -189,7 +189,7 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
   // elsewhere the packing, which is the first to ask, computes the moments, and the surface follows
   // the covers.
   if (backend.leaves_threads_idle()) {
-    field.start();
+    surface.start();
     host.add([&] { solid.unit_moments(); });
   }
 
@@ -242,10 +242,10 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidFie
 
   Stage stage("tree", progress);
   stage.step(count, 0);
-  field.start();
+  surface.start();
   if (levels) levels->wait([&] { stage.step(count, 0); });
   host.finish();
-  keep(field.wait([&] { stage.step(count, 0.5); }), arrays);
+  keep(surface.wait([&] { stage.step(count, 0.5); }), arrays);
   stage.step(count, 1);
   return arrays;
 }
@@ -261,26 +261,26 @@ AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid) {
   return header;
 }
 
-void keep(const KeptSurface& surface, AssetArrays& arrays) {
-  arrays.field = surface.field;
-  arrays.mesh = surface.mesh;
-  arrays.header.mesh_state = static_cast<std::uint32_t>(surface.state);
-  arrays.header.counted_twice = surface.counted_twice;
-  arrays.header.asked_surface_error = surface.asked_error;
+void keep(const KeptSurface& kept, AssetArrays& arrays) {
+  arrays.surface = kept.surface;
+  arrays.mesh = kept.mesh;
+  arrays.header.mesh_state = static_cast<std::uint32_t>(kept.state);
+  arrays.header.counted_twice = kept.counted_twice;
+  arrays.header.asked_surface_error = kept.asked_error;
 }
 
-Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress) {
-  return Asset(asset_bytes(bake_arrays(mesh, solid, field, backend, settings, progress)),
+  return Asset(asset_bytes(bake_arrays(mesh, solid, surface, backend, settings, progress)),
                mesh.name);
 }
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress) {
   const auto backend = make_backend(solid, settings.device, settings.gpu);
-  SolidField field(solid, resolution, settings.surface, settings.threads);
-  return bake_solid(mesh, solid, field, *backend, settings, progress);
+  SharedSurface surface(solid, resolution, settings.surface, settings.threads);
+  return bake_solid(mesh, solid, surface, *backend, settings, progress);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,

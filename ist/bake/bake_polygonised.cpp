@@ -166,14 +166,14 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   PolygonisedBackend backend(solid, mesh_solid, made.error);
   Resolution as_made;  // the mesh is near the solid as it is
   if (mesh.report.meets_itself) as_made.how = Resolution::How::unresolved;
-  SolidField field(mesh_solid, as_made, settings.surface, settings.threads);
-  AssetArrays arrays = bake_arrays(mesh, mesh_solid, field, backend, settings, progress);
+  SharedSurface surface(mesh_solid, as_made, settings.surface, settings.threads);
+  AssetArrays arrays = bake_arrays(mesh, mesh_solid, surface, backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
-  // Field and mesh are the mesh's, and that is near the solid.
-  if (arrays.field != nullptr) {
-    FieldArrays of_solid = *arrays.field;
+  // Surface and mesh are the mesh's, and that is near the solid.
+  if (arrays.surface != nullptr) {
+    SurfaceArrays of_solid = *arrays.surface;
     of_solid.header.error += made.error / scale;
-    arrays.field = std::make_shared<const FieldArrays>(std::move(of_solid));
+    arrays.surface = std::make_shared<const SurfaceArrays>(std::move(of_solid));
   }
   if (arrays.mesh != nullptr) {
     MeshArrays of_solid = *arrays.mesh;

@@ -10,13 +10,13 @@
 
 namespace ist {
 
-/// bake() of a mesh whose solid, field and backend are at hand, on the threads of the current
+/// bake() of a mesh whose solid, surface and backend are at hand, on the threads of the current
 /// arena. The settings have been checked; where they run is the backend's affair.
-Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress);
 
-/// The same with field and backend as the settings ask for.
+/// The same with surface and backend as the settings ask for.
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress);
 
@@ -30,10 +30,10 @@ void describe_mass(const MeshMoments& moments, AssetHeader& header);
 void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header);
 
 /// Puts the surface into an asset.
-void keep(const KeptSurface& surface, AssetArrays& arrays);
+void keep(const KeptSurface& kept, AssetArrays& arrays);
 
 /// Everything of that asset but its bytes.
-AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SolidField& field,
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress);
 

@@ -110,8 +110,8 @@ class TargetBake {
         most_(settings.max_spheres == 0 ? kMostCounted : settings.max_spheres),
         watch_(progress, settings.time_limit),
         solid_(mesh_),
-        field_(solid_, resolved_.resolution, settings.surface, settings.threads,
-               settings.time_limit),
+        surface_(solid_, resolved_.resolution, settings.surface, settings.threads,
+                 settings.time_limit),
         backend_(make_backend(solid_, settings.device, settings.gpu)) {}
 
   TargetedAsset run() {
@@ -146,7 +146,7 @@ class TargetBake {
     of_size.max_spheres = spheres;
     of_size.time_limit = best_ ? 0 : watch_.time_left();
     try {
-      return bake_solid(mesh_, solid_, field_, *backend_, of_size,
+      return bake_solid(mesh_, solid_, surface_, *backend_, of_size,
                         best_ ? watch_.strict() : watch_.patient());
     } catch (const Error&) {
       watch_.throw_if_cancelled();
@@ -318,7 +318,7 @@ class TargetBake {
   const std::size_t most_;
   Watch watch_;
   const MeshSolid solid_;
-  SolidField field_;
+  SharedSurface surface_;
   const std::unique_ptr<SolidBackend> backend_;
   std::vector<TrialPose> poses_;                 ///< near ones, then those of all classes
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there

@@ -8,8 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "bake/field/field.h"
-#include "bake/field/surface_patches.h"
+#include "bake/surface/build_surface.h"
+#include "bake/surface/surface_patches.h"
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
@@ -265,26 +265,26 @@ std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid, const Resolut
   return std::make_shared<const MeshArrays>(std::move(mesh));
 }
 
-/// The triangles of a field over the doubles that its floats are.
-std::shared_ptr<const MeshArrays> mesh_of(const BuiltField& field) {
+/// The triangles of a surface over the doubles that its floats are.
+std::shared_ptr<const MeshArrays> mesh_of(const BuiltSurface& surface) {
   std::vector<double> vertices;
-  vertices.reserve(3 * field.mesh.vertices.size());
-  for (const FieldMesh::Vertex& v : field.mesh.vertices)
+  vertices.reserve(3 * surface.mesh.vertices.size());
+  for (const FloatMesh::Vertex& v : surface.mesh.vertices)
     vertices.insert(vertices.end(), v.begin(), v.end());
   MeshView view;
   view.vertices = vertices.data();
-  view.triangles = field.mesh.triangles.front().data();
-  view.vertex_count = static_cast<std::uint32_t>(field.mesh.vertices.size());
-  view.triangle_count = static_cast<std::uint32_t>(field.mesh.triangles.size());
+  view.triangles = surface.mesh.triangles.front().data();
+  view.vertex_count = static_cast<std::uint32_t>(surface.mesh.vertices.size());
+  view.triangle_count = static_cast<std::uint32_t>(surface.mesh.triangles.size());
   MeshArrays mesh = lay_out_mesh(view);
-  mesh.header.error = field.arrays.header.error;
+  mesh.header.error = surface.arrays.header.error;
   return std::make_shared<const MeshArrays>(std::move(mesh));
 }
 
-std::optional<BuiltField> field_in_time(const MeshSolid& solid, double error,
-                                        const WorkStop& stop) {
+std::optional<BuiltSurface> surface_in_time(const MeshSolid& solid, double error,
+                                            const WorkStop& stop) {
   try {
-    return build_field(solid, error, stop);
+    return build_surface(solid, error, stop);
   } catch (const WorkStop::Stopped&) {
     return std::nullopt;
   }
@@ -293,15 +293,15 @@ std::optional<BuiltField> field_in_time(const MeshSolid& solid, double error,
 }  // namespace
 
 KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
-                         const SurfaceSettings& settings, bool with_field, const WorkStop& stop) {
+                         const SurfaceSettings& settings, bool with_surface, const WorkStop& stop) {
   KeptSurface kept;
   if (!settings.wanted) return kept;
   kept.asked_error =
       settings.error > 0 ? settings.error : settings.share * solid.bounds().sizes().maxCoeff();
   const double error = kept.asked_error / solid.frame().scale();
-  std::optional<BuiltField> field;
-  const auto find_field = [&] {
-    if (with_field || error > 0) field = field_in_time(solid, error, stop);
+  std::optional<BuiltSurface> surface;
+  const auto find_surface = [&] {
+    if (with_surface || error > 0) surface = surface_in_time(solid, error, stop);
   };
   const auto find_mesh = [&] {
     using How = Resolution::How;
@@ -314,13 +314,14 @@ KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
       kept.state = MeshState::unresolved;
     if (kept.state != MeshState::unresolved && error == 0) kept.mesh = own_mesh(solid, resolution);
   };
-  tbb::parallel_invoke(find_field, find_mesh);
+  tbb::parallel_invoke(find_surface, find_mesh);
   if (kept.state != MeshState::unresolved && error > 0) {
-    const bool all = !field || field->own;
-    kept.mesh = all ? own_mesh(solid, resolution) : mesh_of(*field);
+    const bool all = !surface || surface->own;
+    kept.mesh = all ? own_mesh(solid, resolution) : mesh_of(*surface);
     if (!all) kept.state = MeshState::simplified;
   }
-  if (with_field && field) kept.field = std::make_shared<FieldArrays>(std::move(field->arrays));
+  if (with_surface && surface)
+    kept.surface = std::make_shared<SurfaceArrays>(std::move(surface->arrays));
   return kept;
 }
 

@@ -15,25 +15,25 @@ namespace ist {
 
 /// What an asset keeps of its solid's surface.
 struct KeptSurface {
-  std::shared_ptr<const FieldArrays> field;  ///< null: none
-  std::shared_ptr<const MeshArrays> mesh;    ///< null: none, and `state` says why
+  std::shared_ptr<const SurfaceArrays> surface;  ///< null: none
+  std::shared_ptr<const MeshArrays> mesh;        ///< null: none, and `state` says why
   MeshState state = MeshState::none;
   double counted_twice = 0;  ///< unit frame, as TreeView::counted_twice
   double asked_error = 0;    ///< [u] 0: the mesh's own triangles
 };
 
-/// `resolution`: how the solid's mesh was made. `with_field`: false: the mesh alone. No field where
-/// the mesh reaches far into itself, or `stop` ends it. Throws Error as build_field() does. Same
-/// bytes for any number of threads.
+/// `resolution`: how the solid's mesh was made. `with_surface`: false: the mesh alone. No surface
+/// where the mesh reaches far into itself, or `stop` ends it. Throws Error as build_surface() does.
+/// Same bytes for any number of threads.
 KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
-                         const SurfaceSettings& settings, bool with_field,
+                         const SurfaceSettings& settings, bool with_surface,
                          const WorkStop& stop = WorkStop());
 
-/// A solid's surface with its field, made once and shared by all its assets. `time_limit`: after it
-/// there is no field. wait() throws Error as keep_surface() does.
-struct SolidField : Aside<KeptSurface> {
-  SolidField(const MeshSolid& solid, const Resolution& resolution, const SurfaceSettings& settings,
-             unsigned threads, double time_limit = 0)
+/// A solid's surface and mesh, made once and shared by all its assets. `time_limit`: after it
+/// there is no surface. wait() throws Error as keep_surface() does.
+struct SharedSurface : Aside<KeptSurface> {
+  SharedSurface(const MeshSolid& solid, const Resolution& resolution,
+                const SurfaceSettings& settings, unsigned threads, double time_limit = 0)
       : Aside(
             threads,
             [&solid, &resolution, settings](const WorkStop& stop) {

@@ -98,8 +98,8 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   query.pair_id = pair_id_;
   ContactPatches found = contact_patches(a, b, query, workspace(), room);
   if (first_ != nullptr && second_ != nullptr) {
-    if (found.penetration.status == QueryStatus::not_held && query.field == FieldUse::always) {
-      query.field = FieldUse::automatic;
+    if (found.penetration.status == QueryStatus::not_held && query.surface == SurfaceUse::always) {
+      query.surface = SurfaceUse::automatic;
       found = contact_patches(a, b, query, workspace(), room);
     }
     if (found.penetration.volume_max <= 0) {

@@ -120,9 +120,9 @@ const char* why_missed(StopReason stop) {
   }
 }
 
-/// The file ends with field and mesh.
-std::uint64_t field_bytes(const AssetHeader& h) {
-  return h.field == 0 ? 0 : (h.mesh != 0 ? h.mesh : h.file_bytes) - h.field;
+/// The file ends with surface and mesh.
+std::uint64_t surface_bytes(const AssetHeader& h) {
+  return h.surface == 0 ? 0 : (h.mesh != 0 ? h.mesh : h.file_bytes) - h.surface;
 }
 std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
 
@@ -142,16 +142,16 @@ std::string describe_mesh(const TreeView& tree) {
                             : tree.mesh_state() == MeshState::resolved
                                 ? "of the union of the mesh's parts"
                                 : "simplified";
-  return fmt::format("{} triangles, {}, within {:.4g} u of the surface, {} bytes",
+  return fmt::format("{} triangles, {}, within {:.4g} u of the solid's surface, {} bytes",
                      grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
                      grouped(mesh_bytes(tree.header())));
 }
 
-nlohmann::ordered_json field_json(const TreeView& tree) {
-  return {{"triangles", tree.field_triangles()},
-          {"bytes", field_bytes(tree.header())},
-          {"error", tree.has_field() ? nlohmann::ordered_json(tree.field_error())
-                                     : nlohmann::ordered_json(nullptr)}};
+nlohmann::ordered_json surface_json(const TreeView& tree) {
+  return {{"triangles", tree.surface_triangles()},
+          {"bytes", surface_bytes(tree.header())},
+          {"error", tree.has_surface() ? nlohmann::ordered_json(tree.surface_error())
+                                       : nlohmann::ordered_json(nullptr)}};
 }
 
 nlohmann::ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -239,11 +239,11 @@ std::string describe_asset(const TreeView& tree) {
          fmt::format("{} spheres, protrusion {:.4g} u", grouped(detail.matched_tree.sphere_count),
                      detail.protrusion * scale));
   }
-  line("field", tree.has_field()
-                    ? fmt::format("{} triangles within {:.4g} u of the surface, {} bytes",
-                                  grouped(tree.field_triangles()), tree.field_error(),
-                                  grouped(field_bytes(h)))
-                    : "none");
+  line("surface", tree.has_surface()
+                      ? fmt::format("{} triangles within {:.4g} u of the solid's, {} bytes",
+                                    grouped(tree.surface_triangles()), tree.surface_error(),
+                                    grouped(surface_bytes(h)))
+                      : "none");
   line("mesh", describe_mesh(tree));
   if (!alone)
     line(
@@ -319,7 +319,7 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"inner_tree", tree_json(h.inner_tree, scale)},
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},
-      {"field", field_json(tree)},
+      {"surface", surface_json(tree)},
       {"kept_mesh", mesh_json(tree)},
   };
   json.update(mass_json(tree));

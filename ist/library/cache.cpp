@@ -192,8 +192,9 @@ std::string line_of(const CacheKey& key, const CacheEntry& entry) {
 }
 
 CacheEntry entry_from(std::string_view text, const CacheKey& key, Asset asset) {
-  Json line = Json::parse(text);
-  const Json hash = line.at("hash");
+  Json line = Json::parse(text, nullptr, false);
+  if (!line.contains("hash")) throw Error("the entry's first line is damaged");
+  const Json hash = line["hash"];
   line.erase("hash");
   if (hash != hash_of(line, asset)) throw Error("the entry does not match its checksum");
   if (line.at("key") != key.text()) throw Error("the entry belongs to another mesh");

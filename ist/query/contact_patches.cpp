@@ -26,7 +26,7 @@ namespace {
 class PairPatches {
  public:
   PairPatches(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
-              const TreeHeader& tree_b, const RelativePose& pose, FieldUse use,
+              const TreeHeader& tree_b, const RelativePose& pose, SurfaceUse use,
               Workspace::Impl& scratch)
       : a_(a),
         b_(b),
@@ -108,7 +108,7 @@ class PairPatches {
   Workspace::Impl& scratch_;
   const SphereTree tree_a_, tree_b_;
   PairOverlap both_;
-  const FieldUse use_;
+  const SurfaceUse use_;
   const PairMethod method_;
   Penetration whole_;
   std::uint32_t filled_ = 0;
@@ -124,10 +124,10 @@ class ChosenPart final : public LargestPart {
              Workspace& workspace, std::span<ContactPatch> patches)
       : a_(a), b_(b), pose_(pose), inner_(inner), workspace_(workspace), patches_(patches) {}
 
-  Penetration level(const DetailPair& pair, FieldUse use,
+  Penetration level(const DetailPair& pair, SurfaceUse use,
                     const DescentLimits& limits) noexcept override {
     levels.emplace(a_, tree_of(a_, pair.a), b_, tree_of(b_, pair.b), pose_,
-                   inner_ ? FieldUse::never : use, *workspace_.impl());
+                   inner_ ? SurfaceUse::never : use, *workspace_.impl());
     return levels->sum(limits);
   }
 
@@ -172,7 +172,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
   ChosenPart chosen(a, b, *pose, inner, workspace, patches);
   const bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
   result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &chosen)
-                              : chosen.level(DetailPair(), settings.field, limits_of(settings));
+                              : chosen.level(DetailPair(), settings.surface, limits_of(settings));
   if (std::isnan(result.penetration.volume)) return result;
   if (!chosen.parts && !chosen.levels) return result;
   result.count = chosen.parts ? chosen.parts->count : chosen.levels->write(patches);

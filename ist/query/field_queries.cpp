@@ -20,7 +20,7 @@ const MeshField* mesh_of(const PlacedField& placed) noexcept {
 /// Of a mesh field in its asset's unit frame, of all others in their own.
 std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) noexcept {
   if (const MeshField* const mesh = mesh_of(a)) {
-    if (!mesh->tree.has_field()) return std::nullopt;
+    if (!mesh->tree.has_surface()) return std::nullopt;
     return relative_pose(PlacedTree{mesh->tree, a.pose, a.scale}, b);
   }
   return relative_pose(a.pose, a.scale, b);

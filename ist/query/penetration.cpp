@@ -25,7 +25,7 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
   const bool inner = settings.measure == Measure::inner;
   const TreeHeader& tree_a = inner ? header_a.inner_tree : header_a.matched_tree;
   const TreeHeader& tree_b = inner ? header_b.inner_tree : header_b.matched_tree;
-  const FieldUse use = inner ? FieldUse::never : settings.field;
+  const SurfaceUse use = inner ? SurfaceUse::never : settings.surface;
   const PairMethod method = pair_method(a, tree_a, b, tree_b, *pose, use);
   if (lacks_surface(method, use)) return not_held<Penetration>();
   if (!inner &&

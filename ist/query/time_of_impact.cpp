@@ -10,7 +10,7 @@
 namespace ist {
 namespace {
 
-// Where no tolerance is asked for: of the smaller solid's bounding radius, and of the fields'
+// Where no tolerance is asked for: of the smaller solid's bounding radius, and of the surfaces'
 // errors, which may be what is left of an impact's gap at either end.
 constexpr double kTolerance = 1e-3;
 constexpr double kErrors = 10;
@@ -60,7 +60,7 @@ TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motion
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
   if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
-    if (!mesh->tree.has_field()) return invalid_input<TimeOfImpact>();
+    if (!mesh->tree.has_surface()) return invalid_input<TimeOfImpact>();
     return find_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
   }
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);

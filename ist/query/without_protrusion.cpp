@@ -84,7 +84,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
   if (!pose) return;
   // What meets a surface is exact.
   if (pair_method(a, a.tree.header().matched_tree, b, b.tree.header().matched_tree, *pose,
-                  settings.field)
+                  settings.surface)
           .surface)
     return;
   const double skin = skin_of(a, b);

@@ -188,7 +188,7 @@ std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
   }
   const auto add_surface = [&](const PlacedTree& owner, const AssetHeader& prober,
                                const RelativePose& pose) {
-    if (!owner.tree.has_field()) return;
+    if (!owner.tree.has_surface()) return;
     const SurfaceTree surface = surface_tree(owner.tree);
     capacity.add_surface(surface, {prober, prober.inner_tree}, pose);
     for (std::uint32_t i = 0; i <= prober.detail_count; ++i)
@@ -201,7 +201,7 @@ std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
 
 std::size_t capacity_of(const PlacedField& a, const PlacedTree& b) {
   const MeshField* const mesh = std::get_if<MeshField>(&a.field);
-  if (mesh != nullptr && !mesh->tree.has_field())
+  if (mesh != nullptr && !mesh->tree.has_surface())
     throw Error("workspace_capacity: the asset of a mesh field keeps no surface");
   const PlacedTree still{b.tree, {}, b.scale};
   const RelativePose pose =

@@ -20,7 +20,7 @@ _Path = str | os.PathLike[str]
 _Column = Any  # NDArray of one row a pose; a number for one pose
 _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
-_FieldUse = Literal["automatic", "never", "always"]
+_SurfaceUse = Literal["automatic", "never", "always"]
 _Grid = Literal["banded", "uniform", "explicit", "implicit", "hybrid"]
 _Scale = float | ArrayLike  # a factor, or (3,) of each axis
 _Device = Literal["auto", "cpu", "cuda"]
@@ -166,8 +166,8 @@ class Asset:
     volume: Final[float]  # [u³]
     coverage: Final[float]  # [0, 1]
     protrusion: Final[float]  # [u]
-    has_field: Final[bool]
-    field_error: Final[float]  # [u]
+    has_surface: Final[bool]
+    surface_error: Final[float]  # [u]
     mesh_triangles: Final[int]  # 0: it holds no mesh
     mesh_error: Final[float]  # [u]
     mesh_state: Final[Literal["none", "own", "resolved", "simplified", "unresolved"]]
@@ -372,7 +372,7 @@ class TimeOfImpact:
 def penetration(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
-    scale_gradients: bool = False, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    scale_gradients: bool = False, measure: _Measure = "matched", surface: _SurfaceUse = "automatic",
     pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
     threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
 ) -> Penetration: ...  # of solids on a GPU gpu.Penetration
@@ -395,7 +395,7 @@ def contains(
 def contact_patches(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
-    max_patches: int = 8, measure: _Measure = "matched", field: _FieldUse = "automatic",
+    max_patches: int = 8, measure: _Measure = "matched", surface: _SurfaceUse = "automatic",
     pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
     threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
 ) -> ContactPatches: ...  # of solids on a GPU gpu.ContactPatches

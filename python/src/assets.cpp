@@ -292,7 +292,7 @@ void add_assets(py::module_& module) {
              return "<ist.Asset: " + std::to_string(view.sphere_count()) + " spheres, volume " +
                     text_of(py::float_(view.volume())) + " u³, mesh of " +
                     std::to_string(view.mesh_triangles()) + " triangles" +
-                    (view.has_field() ? "" : ", no surface for queries of spheres") + ">";
+                    (view.has_surface() ? "" : ", no surface for queries of spheres") + ">";
            })
       .def("__str__", [](const Asset& self) { return describe_asset(self.view()); })
       .def("surface", &surface_of,
@@ -329,10 +329,10 @@ void add_assets(py::module_& module) {
           "protrusion", [](const Asset& self) { return self.view().protrusion(); },
           "[u] bound on how far matched spheres stick out of the solid.")
       .def_prop_ro(
-          "has_field", [](const Asset& self) { return self.view().has_field(); },
+          "has_surface", [](const Asset& self) { return self.view().has_surface(); },
           "Whether the asset stores the solid's surface.")
       .def_prop_ro(
-          "field_error", [](const Asset& self) { return self.view().field_error(); },
+          "surface_error", [](const Asset& self) { return self.view().surface_error(); },
           "[u] largest distance between that surface and the solid's.")
       .def_prop_ro(
           "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },

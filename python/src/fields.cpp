@@ -194,16 +194,16 @@ void add_fields(py::module_& module) {
            "error: [u] largest error of the interpolated distance.");
   add_kind<MeshField>(module, "MeshField",
                       "The surface in an asset, without its spheres. Exact within "
-                      "Asset.field_error.")
+                      "Asset.surface_error.")
       .def(py::new_([](const py::object& asset) {
              const TreeView tree = tree_of(asset, "asset");
-             if (!tree.has_field())
+             if (!tree.has_surface())
                throw Error("asset: holds no surface; bake it with surface='all'");
              py::dict arguments;
              arguments["asset"] = asset;
              return OwnedKind<MeshField>(MeshField{tree}, std::move(arguments));
            }),
-           py::arg("asset"), "asset: an Asset that has a field.");
+           py::arg("asset"), "asset: an Asset that has a surface.");
 }
 
 }  // namespace ist::python

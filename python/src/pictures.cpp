@@ -129,7 +129,7 @@ Returns Lenses: an ellipsoid of the radius and the thickness about the centre re
       py::arg("scales_a") = py::none(),
       R"(Removes the volume that protruding spheres add where flat faces meet.
 
-whole: the answer of penetration() at these poses by lenses, field='never', in the matched measure
+whole: the answer of penetration() at these poses by lenses, surface='never', in the matched measure
     without a pair budget.
 
 The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and a

@@ -244,8 +244,9 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
     }
   }
   throw Error(
-      "field='always': the asset of coarser spheres holds no surface; bake it with surface='all', "
-      "or use field='automatic'");
+      "surface='always': the asset of coarser spheres holds no surface; bake it with "
+      "surface='all', "
+      "or query with surface='automatic'");
 }
 
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted) {

@@ -93,7 +93,7 @@ class Rows {
 /// What of a solid is asked.
 struct Asked {
   Measure measure = Measure::matched;
-  FieldUse field = FieldUse::automatic;
+  SurfaceUse surface = SurfaceUse::automatic;
 };
 
 /// Nobody looks at the status of one pose. Where that is all there is, throws Error, with the way

@@ -80,7 +80,7 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     answers->write(
         i, row, contact_patches(row.a.placed(), row.b.placed(), settings, workspace, found), found);
   });
-  refuse_unanswered(rows, answers->penetration->status, {settings.measure, settings.field});
+  refuse_unanswered(rows, answers->penetration->status, {settings.measure, settings.surface});
   return answers;
 }
 
@@ -257,7 +257,7 @@ void add_separation(py::module_& module) {
   add_pair_query(
       module, "contact_patches",
       +[](const GivenPair& pair, std::size_t max_patches, const std::string& measure,
-          const std::string& field, std::uint32_t pair_budget, std::uint32_t max_visits,
+          const std::string& surface, std::uint32_t pair_budget, std::uint32_t max_visits,
           double relative_error, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
           const py::object& out, const py::object& stream) -> py::object {
         const GivenOutput given{wanted, out, stream};
@@ -265,7 +265,7 @@ void add_separation(py::module_& module) {
           refuse_given("not on a GPU", {{"pair_budget", pair_budget != 0},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          named(field, "field", kGpuFieldUses);
+          named(surface, "surface", kGpuSurfaceUses);
           const Measure which = named(measure, "measure", kGpuMeasures);
           if (max_patches < 1 || max_patches > kMostGpuPatches)
             throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
@@ -284,11 +284,11 @@ void add_separation(py::module_& module) {
         refuse_output(given);
         return py::cast(patches(
             pair.rows(), max_patches,
-            contact_settings(measure, field, pair_budget, max_visits, relative_error, pair_id),
+            contact_settings(measure, surface, pair_budget, max_visits, relative_error, pair_id),
             threads));
       },
       py::arg("max_patches") = kUsualPatches, py::arg("measure") = "matched",
-      py::arg("field") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("surface") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
       py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
       py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
       kPatchesDoc);

@@ -78,12 +78,12 @@ static ist_placed_t placed_b(int i) {
 /* --- Queries, by name. Each answers row i and, if asked to, prints the answer -------------------
  */
 
-static void ask_penetration(int i, int print, ist_measure_t measure, ist_field_use_t use,
+static void ask_penetration(int i, int print, ist_measure_t measure, ist_surface_use_t use,
                             uint32_t pair_budget, uint32_t max_visits) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings,
                                                .measure = measure,
-                                               .field = use,
+                                               .surface = use,
                                                .pair_budget = pair_budget,
                                                .max_visits = max_visits};
   ist_penetration_t answer = {.size = sizeof answer};
@@ -92,19 +92,19 @@ static void ask_penetration(int i, int print, ist_measure_t measure, ist_field_u
 }
 
 static void matched(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_FIELD_AUTOMATIC, 0, 0);
+  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_AUTOMATIC, 0, 0);
 }
 static void lenses_alone(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_FIELD_NEVER, 0, 0);
+  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_NEVER, 0, 0);
 }
 static void surface_alone(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_FIELD_ALWAYS, 0, 0);
+  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_ALWAYS, 0, 0);
 }
 static void inner(int i, int print) {
-  ask_penetration(i, print, IST_INNER, IST_FIELD_AUTOMATIC, 0, 0);
+  ask_penetration(i, print, IST_INNER, IST_SURFACE_AUTOMATIC, 0, 0);
 }
 static void budget(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_FIELD_AUTOMATIC, 200, 300);
+  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_AUTOMATIC, 200, 300);
 }
 
 static void ask_field(int i, int print, const ist_field_t* field) {
@@ -175,7 +175,8 @@ static void outline(int i, int print) {
 
 static void without_protrusion(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  const ist_penetration_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
+  const ist_penetration_settings_t settings = {.size = sizeof settings,
+                                               .surface = IST_SURFACE_NEVER};
   ist_penetration_t answer = {.size = sizeof answer};
   ist_penetration(&a, &b, &settings, &workspace, &answer);
   ist_without_protrusion(&answer, &a, &b, &answer);
@@ -184,7 +185,7 @@ static void without_protrusion(int i, int print) {
 
 static void patches_without_protrusion(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  const ist_contact_settings_t settings = {.size = sizeof settings, .field = IST_FIELD_NEVER};
+  const ist_contact_settings_t settings = {.size = sizeof settings, .surface = IST_SURFACE_NEVER};
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
   ist_contact_patches(&a, &b, &settings, &workspace, &found, NULL);

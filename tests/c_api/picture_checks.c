@@ -107,8 +107,8 @@ int surfaces_are_told(scene_t* s) {
   const ist_tree_t* tree = &s->tree_a;
   CHECK(ist_tree_get_info(tree, &info) == IST_OK);
   CHECK(ist_tree_get_surface(tree, &surface) == IST_OK);
-  CHECK(surface.triangle_count == info.field_triangles);
-  if (info.has_field) {
+  CHECK(surface.triangle_count == info.surface_triangles);
+  if (info.has_surface) {
     surface.vertices = one_vertex;
     surface.vertex_capacity = 1;
     CHECK(ist_tree_get_surface(tree, &surface) == IST_OK);

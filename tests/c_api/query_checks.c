@@ -86,7 +86,7 @@ int penetrations_answer(scene_t* s) {
   settings.measure = 3;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
   settings.measure = IST_MATCHED;
-  settings.field = -1;
+  settings.surface = -1;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
   wrong = s->a;
   wrong.pose.t[1] = NAN;
@@ -96,7 +96,7 @@ int penetrations_answer(scene_t* s) {
   wrong.scale = -1;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
 
-  settings.field = IST_FIELD_NEVER;
+  settings.surface = IST_SURFACE_NEVER;
   settings.max_visits = 0;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &whole) == IST_OK);
   CHECK(ist_without_protrusion(&whole, &s->a, &s->b, &other) == IST_OK);
@@ -117,10 +117,10 @@ int deadlines_limit(scene_t* s) {
   int i;
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &whole) == IST_OK);
   CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK); /* all zero: none */
-  CHECK(settings.pair_budget == 0 && settings.field == IST_FIELD_AUTOMATIC);
+  CHECK(settings.pair_budget == 0 && settings.surface == IST_SURFACE_AUTOMATIC);
   CHECK(ist_deadline_make(100, &deadline) == IST_OK);
   CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK);
-  CHECK(settings.pair_budget > 0 && settings.field == IST_FIELD_NEVER);
+  CHECK(settings.pair_budget > 0 && settings.surface == IST_SURFACE_NEVER);
   CHECK(ist_deadline_too_slow(&deadline) == 0);
   for (i = 0; i < 300; ++i)
     CHECK(ist_deadline_record(&deadline, &whole, 1e6) == IST_OK &&
@@ -240,7 +240,7 @@ int patches_answer(scene_t* s) {
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, NULL, &whole) == IST_NULL_POINTER);
 
   /* Without protrusion: by lenses alone, where the faces hardly touch. */
-  settings.field = IST_FIELD_NEVER;
+  settings.surface = IST_SURFACE_NEVER;
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
   for (i = 0, volume = 0; i < patches.count; ++i) volume += room[i].volume;
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, &settings, &patches) == IST_OK);
@@ -395,7 +395,7 @@ int fields_answer(scene_t* s) {
       field.as.function.context = &offset;
     } else {
       field.as.mesh.tree = &s->tree_a;
-      if (!info.has_field) {
+      if (!info.has_surface) {
         CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
         break;
       }

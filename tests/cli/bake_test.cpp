@@ -47,21 +47,21 @@ TEST_F(BakeCommand, JsonHoldsTheResult) {
   EXPECT_GE(json.at("seconds").at("bake"), 0);
 }
 
-TEST_F(BakeCommand, TheFieldIsToldOfOrLeftOut) {
+TEST_F(BakeCommand, TheSurfaceIsToldOfOrLeftOut) {
   const std::vector<std::string> bake = {"bake",      "cube.obj", "-o",    "new.ist",
                                          "--spheres", "5",        "--json"};
-  const auto field = [&](std::vector<std::string> more) {
+  const auto told = [&](std::vector<std::string> more) {
     more.insert(more.begin(), bake.begin(), bake.end());
     return nlohmann::json::parse(ist(more).out);
   };
-  EXPECT_EQ(field({}).at("field").at("triangles"), 12);
-  EXPECT_EQ(field({"--surface", "0.5"}).at("asked").at("surface_error"), 0.5);
-  EXPECT_EQ(field({"--surface", "25%"}).at("asked").at("surface_error"), 0.25);
-  const nlohmann::json none = field({"--surface", "none"});
-  EXPECT_EQ(none.at("field").at("bytes"), 0);
-  EXPECT_TRUE(none.at("field").at("error").is_null());
+  EXPECT_EQ(told({}).at("surface").at("triangles"), 12);
+  EXPECT_EQ(told({"--surface", "0.5"}).at("asked").at("surface_error"), 0.5);
+  EXPECT_EQ(told({"--surface", "25%"}).at("asked").at("surface_error"), 0.25);
+  const nlohmann::json none = told({"--surface", "none"});
+  EXPECT_EQ(none.at("surface").at("bytes"), 0);
+  EXPECT_TRUE(none.at("surface").at("error").is_null());
   EXPECT_EQ(none.at("kept_mesh").at("state"), "none");
-  EXPECT_LT(none.at("bytes"), field({}).at("bytes"));
+  EXPECT_LT(none.at("bytes"), told({}).at("bytes"));
   for (const char* wrong : {"0", "-1", "0%", "100%", "some", "nan", ""})
     EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--surface", wrong}).exit_code, 2) << wrong;
 }

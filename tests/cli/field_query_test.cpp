@@ -7,7 +7,7 @@
 
 #include "cli/program.h"
 
-// ist query with a solid that has no asset, and --field.
+// ist query with a solid that has no asset, and --surface.
 
 namespace {
 
@@ -93,24 +93,24 @@ TEST_F(FieldQuery, APoseThatIsNoPoseSaysWhy) {
   EXPECT_NE(outcome.out.find("invalid_input: tz is nan"), std::string::npos) << outcome.out;
 }
 
-TEST_F(FieldQuery, OfTwoAssetsTheFieldIsUsedAsAsked) {
+TEST_F(FieldQuery, OfTwoAssetsTheSurfaceIsUsedAsAsked) {
   ASSERT_EQ(ist({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000"}).exit_code, 0);
   const auto a = ist::Asset::load(folder_ / "cube.ist");
   const auto b = ist::Asset::load(folder_ / "fine.ist");
   ist::Workspace workspace;
-  const auto expected = [&](ist::FieldUse use) {
-    return ist::penetration({a.view(), {}}, {b.view(), {.t = {0.9, 0.1, 0}}}, {.field = use},
+  const auto expected = [&](ist::SurfaceUse use) {
+    return ist::penetration({a.view(), {}}, {b.view(), {.t = {0.9, 0.1, 0}}}, {.surface = use},
                             workspace)
         .volume;
   };
   const auto answer = [&](const std::vector<std::string>& more) {
     return asked("cube.ist", "fine.ist", "1,0,0,0,0.9,0.1,0", more)["volume"].get<double>();
   };
-  EXPECT_EQ(answer({"--field", "never"}), expected(ist::FieldUse::never));
-  EXPECT_EQ(answer({"--field", "always"}), expected(ist::FieldUse::always));
-  EXPECT_EQ(answer({"--field", "auto"}), expected(ist::FieldUse::automatic));
-  EXPECT_EQ(answer({}), expected(ist::FieldUse::automatic));
-  EXPECT_NE(answer({"--field", "never"}), answer({"--field", "always"}));
+  EXPECT_EQ(answer({"--surface", "never"}), expected(ist::SurfaceUse::never));
+  EXPECT_EQ(answer({"--surface", "always"}), expected(ist::SurfaceUse::always));
+  EXPECT_EQ(answer({"--surface", "auto"}), expected(ist::SurfaceUse::automatic));
+  EXPECT_EQ(answer({}), expected(ist::SurfaceUse::automatic));
+  EXPECT_NE(answer({"--surface", "never"}), answer({"--surface", "always"}));
 }
 
 TEST_F(FieldQuery, AFileNamedLikeAFieldIsReadByItsPath) {
@@ -153,16 +153,16 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
     more.insert(more.begin(), {a, "cube.ist", "--pose", kAtOrigin});
     expect_exit(2, more, message);
   };
-  refused("ball:1", {"--field", "never"},
+  refused("ball:1", {"--surface", "never"},
           "never cannot be combined with ball:1, a field without spheres");
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
-  refused("cube.ist", {"--field", "always", "--measure", "inner"}, "--field: has no effect");
-  refused("cube.ist", {"--field", "some"}, "{auto,never,always}");
+  refused("cube.ist", {"--surface", "always", "--measure", "inner"}, "--surface: has no effect");
+  refused("cube.ist", {"--surface", "some"}, "{auto,never,always}");
   ASSERT_EQ(
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
       0);
-  expect_exit(1, {"cube.ist", "bare.ist", "--pose", kAtOrigin, "--field", "always"},
-              "bare.ist: has no field");
+  expect_exit(1, {"cube.ist", "bare.ist", "--pose", kAtOrigin, "--surface", "always"},
+              "bare.ist: has no surface");
 }
 
 /// Once, and only where the coarser one could have had a surface.
@@ -185,9 +185,9 @@ TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
   EXPECT_EQ(warnings(asked, {}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.3"}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--repeat", "3"}), 1u);
-  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--field", "never"}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--surface", "never"}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--measure", "inner"}), 0u);
-  EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 0u);  // the coarser one has a field
+  EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 0u);  // the coarser one has a surface
   EXPECT_NE(ist({"query", "bare.ist", "cube.ist", "--pose", kAtOrigin, "--scale-b", "0.1"})
                 .err.find("bare.ist: its spheres are 10 times as coarse"),
             std::string::npos);

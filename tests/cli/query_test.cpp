@@ -306,8 +306,8 @@ TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
     all.insert(all.end(), more.begin(), more.end());
     expect_exit(2, all, message);
   };
-  refused({"--field", "always"}, "--field: has no effect with --measure exact");
-  refused({"--field", "never"}, "--field: has no effect with --measure exact");
+  refused({"--surface", "always"}, "--surface: has no effect with --measure exact");
+  refused({"--surface", "never"}, "--surface: has no effect with --measure exact");
   refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
   expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
               "exact needs the meshes of two assets, and A is a field: plane:0,0,1,0");

@@ -53,11 +53,11 @@ TEST(AlignedFlats, AFieldsFaceDoesNotPushSideways) {
 // beyond it is the spheres'. By the surface it is a third of what it is by lenses.
 TEST(AlignedFlats, CubesOnCubesPushSidewaysAsTheExactGradientDoes) {
   Workspace workspace;
-  const auto beyond = [&](FieldUse use, double depth) {
+  const auto beyond = [&](SurfaceUse use, double depth) {
     std::mt19937 random(3);
     std::uniform_real_distribution<double> uniform(-0.5, 0.5);
     PenetrationSettings settings;
-    settings.field = use;
+    settings.surface = use;
     std::vector<double> shares;
     for (int i = 0; i < 100; ++i) {
       const double x = uniform(random), y = uniform(random);
@@ -72,8 +72,8 @@ TEST(AlignedFlats, CubesOnCubesPushSidewaysAsTheExactGradientDoes) {
     return shares;
   };
   for (const double depth : {0.01, 0.02}) {
-    const std::vector<double> surface = beyond(FieldUse::always, depth);
-    const std::vector<double> lenses = beyond(FieldUse::never, depth);
+    const std::vector<double> surface = beyond(SurfaceUse::always, depth);
+    const std::vector<double> lenses = beyond(SurfaceUse::never, depth);
     std::printf(
         "depth %g: by the surface median %.4f, p95 %.4f, worst %.4f; by lenses %.4f, %.4f, %.4f\n",
         depth, surface[50], surface[95], surface[99], lenses[50], lenses[95], lenses[99]);

@@ -219,11 +219,11 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   // Neither asset holds a surface that might always be used.
   const PlacedTree placed{a.view(), {}, 1};
   const ContactPatches always =
-      contact_patches(placed, placed, {.field = FieldUse::always}, workspace, {&patch, 1});
+      contact_patches(placed, placed, {.surface = SurfaceUse::always}, workspace, {&patch, 1});
   EXPECT_EQ(always.penetration.status, QueryStatus::not_held);
   EXPECT_EQ(always.count, 0u);
   const Penetration whole =
-      penetration(placed, placed, {.field = FieldUse::always, .pair_budget = 9}, workspace);
+      penetration(placed, placed, {.surface = SurfaceUse::always, .pair_budget = 9}, workspace);
   EXPECT_EQ(whole.status, QueryStatus::not_held);
   EXPECT_TRUE(std::isnan(whole.volume));
 }

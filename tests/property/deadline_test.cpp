@@ -41,9 +41,9 @@ struct LoopRun {
 
 class Loop {
  public:
-  Loop(std::size_t spheres, bool field)
-      : knot_(testing::baked(make_sample("torus_knot"), "knot", spheres, field)),
-        ring_(testing::baked(testing::ring_mesh(), "ring", spheres, field)) {}
+  Loop(std::size_t spheres, bool surface)
+      : knot_(testing::baked(make_sample("torus_knot"), "knot", spheres, surface)),
+        ring_(testing::baked(testing::ring_mesh(), "ring", spheres, surface)) {}
 
   LoopRun run(double stiffness, double deadline_us) {
     Deadline deadline(deadline_us);
@@ -77,12 +77,12 @@ TEST(DeadlineLoop, ARingOnAKnotKeepsItsEnergyAndItsTime) {
   if (testing::kSanitized) GTEST_SKIP() << "takes minutes";
   const struct {
     std::size_t spheres;
-    bool field;
+    bool surface;
     double stiffness;
     std::vector<double> deadlines;
   } loops[] = {{4000, true, 1e4, {160, 20}}, {8000, false, 1e5, {20}}};
-  for (const auto& [spheres, field, stiffness, deadlines] : loops) {
-    Loop loop(spheres, field);
+  for (const auto& [spheres, surface, stiffness, deadlines] : loops) {
+    Loop loop(spheres, surface);
     for (const double deadline : deadlines) {
       SCOPED_TRACE(::testing::Message() << spheres << " spheres, " << deadline << " us");
       const LoopRun run = loop.run(stiffness, deadline);
@@ -124,7 +124,7 @@ TEST(Deadline, NoneLimitsNothing) {
     PenetrationSettings settings;
     deadline.limit(settings);
     EXPECT_EQ(settings.pair_budget, 0u);
-    EXPECT_EQ(settings.field, FieldUse::automatic);
+    EXPECT_EQ(settings.surface, SurfaceUse::automatic);
     EXPECT_FALSE(deadline.too_slow());
   }
 }

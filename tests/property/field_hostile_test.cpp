@@ -101,8 +101,8 @@ TEST(FieldHostile, NumbersOutOfRange) {
                             FunctionField{},
                             MeshField{},
                             MeshField{make_random_asset({10, 0.5, {}, 0}, 3).view()}};
-  const Asset fieldless = make_random_asset({10, 0.5, {}, 0}, 3);
-  bad.back() = MeshField{fieldless.view()};
+  const Asset bare = make_random_asset({10, 0.5, {}, 0}, 3);
+  bad.back() = MeshField{bare.view()};
   const auto with = [&](auto base, auto change) {
     change(base);
     bad.push_back(base);

@@ -54,25 +54,25 @@ TEST(FieldQuery, LimitsKeepTrueBounds) {
   }
 }
 
-TEST(FieldPairs, LimitsKeepTrueBounds) {
+TEST(SurfacePairs, LimitsKeepTrueBounds) {
   std::mt19937_64 random(26);
   Workspace large, tiny(64);
   for (const SurfacePair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
       for (int i = 0; i < 60; ++i) {
         const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
         const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
                            pair.scale_b};
         PenetrationSettings plain;
-        plain.field = use;
+        plain.surface = use;
         const Penetration full = penetration(a, b, plain, large);
         for (auto [limit, settings] : limits()) {
-          settings.field = use;
+          settings.surface = use;
           expect_bounds(pair.name, limit, penetration(a, b, settings, large), full);
         }
         // As many visits as the lenses take, or about: none is left for the exact sum.
         PenetrationSettings lenses = plain;
-        lenses.field = FieldUse::never;
+        lenses.surface = SurfaceUse::never;
         const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
         for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
           PenetrationSettings settings = plain;
@@ -128,20 +128,20 @@ TEST(FieldQuery, PatchesAddUpToTheWhole) {
   }
 }
 
-TEST(FieldPairs, PatchesAddUpToTheWhole) {
+TEST(SurfacePairs, PatchesAddUpToTheWhole) {
   Workspace workspace;
   std::mt19937_64 random(28);
   ContactPatch patches[12];
   for (const SurfacePair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
       for (int i = 0; i < 12; ++i) {
         const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
         const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.08 * i) * pair.distance),
                            pair.scale_b};
         PenetrationSettings settings;
-        settings.field = use;
+        settings.surface = use;
         ContactSettings contact;
-        contact.field = use;
+        contact.surface = use;
         // A stopped query is divided too.
         settings.max_visits = contact.max_visits = i % 3 == 0 ? 10u * static_cast<unsigned>(i) : 0;
         const Penetration whole = penetration(a, b, settings, workspace);

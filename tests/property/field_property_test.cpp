@@ -133,11 +133,11 @@ TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   }
 }
 
-TEST(FieldPairs, GradientsAreThoseOfTheVolume) {
+TEST(SurfacePairs, GradientsAreThoseOfTheVolume) {
   Workspace workspace;
   std::mt19937_64 random(22);
   for (const SurfacePair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
       int met = 0;
       for (int i = 0; i < 8; ++i) {
         const PlacedTree a{pair.a.view(), random_pose(random, 0.3), 1.2};
@@ -145,27 +145,27 @@ TEST(FieldPairs, GradientsAreThoseOfTheVolume) {
         for (int k = 0; k < 3; ++k) pose.t[k] += a.pose.t[k];
         const Ask ask = [&](const Pose& p) {
           PenetrationSettings settings;
-          settings.field = use;
+          settings.surface = use;
           return penetration(a, {pair.b.view(), p, 1.2 * pair.scale_b}, settings, workspace);
         };
         met += ask(pose).volume > 0 ? 1 : 0;
         // Lenses are summed in float, to 1e-6.
         expect_gradients(pair.name, ask, pose, 0.02 * std::min(1.0, pair.scale_b),
-                         use == FieldUse::always ? 1e-12 : 2e-6, random);
+                         use == SurfaceUse::always ? 1e-12 : 2e-6, random);
       }
       EXPECT_GT(met, 1) << pair.name;
     }
   }
 }
 
-TEST(FieldPairs, AnswersAreSound) {
+TEST(SurfacePairs, AnswersAreSound) {
   Workspace workspace;
   std::mt19937_64 random(23);
   for (const SurfacePair& pair : pairs()) {
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always, FieldUse::never}) {
+    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always, SurfaceUse::never}) {
       for (int i = 0; i < 20; ++i) {
         PenetrationSettings settings;
-        settings.field = use;
+        settings.surface = use;
         const PlacedTree a{pair.a.view(), random_pose(random, 0.3), 1.2};
         const PlacedTree b{pair.b.view(), random_pose(random, 1.2 * pair.distance),
                            1.2 * pair.scale_b};
@@ -196,9 +196,9 @@ TEST(FieldPairs, AnswersAreSound) {
 
 // Work along a closed path that goes from a light touch to deep contact and back: none, and over
 // its first half what the volume changed.
-TEST(FieldPairs, EnergyIsConservedOverClosedLoops) {
+TEST(SurfacePairs, EnergyIsConservedOverClosedLoops) {
   Workspace workspace;
-  for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
+  for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
     for (const bool swapped : {false, true}) {
       const PlacedTree fixed{cube().view(), {}, 1};
       const Vector3d axis = Vector3d(0.3, -0.5, 0.8).normalized();
@@ -209,7 +209,7 @@ TEST(FieldPairs, EnergyIsConservedOverClosedLoops) {
       };
       const auto ask = [&](double phase) {
         PenetrationSettings settings;
-        settings.field = use;
+        settings.surface = use;
         const PlacedTree moving{torus().view(), pose(phase), 0.9};
         if (!swapped) return penetration(fixed, moving, settings, workspace);
         Penetration p = penetration(moving, fixed, settings, workspace);
@@ -243,10 +243,10 @@ TEST(FieldPairs, EnergyIsConservedOverClosedLoops) {
 }
 
 // A cube carried through a wall, turned or not: its overlap is known exactly.
-TEST(FieldPairs, CarriedThroughAWall) {
+TEST(SurfacePairs, CarriedThroughAWall) {
   Workspace workspace;
   // Slab and cube are alike, so that lenses would answer where they are deep in each other.
-  const PenetrationSettings exact = {.field = FieldUse::always};
+  const PenetrationSettings exact = {.surface = SurfaceUse::always};
   const Quaterniond turns[] = {Quaterniond::Identity(),
                                Quaterniond(0.9, 0.2, -0.3, 0.1).normalized()};
   for (const bool thin : {true, false}) {
@@ -285,7 +285,7 @@ TEST(FieldPairs, CarriedThroughAWall) {
 
 // B ever smaller at the same place: its overlap in its own measure changes by little from size to
 // size, whichever method answers.
-TEST(FieldPairs, NoJumpWhereMethodsChangeHands) {
+TEST(SurfacePairs, NoJumpWhereMethodsChangeHands) {
   Workspace workspace;
   const Quaterniond q = Quaterniond(0.8, 0.3, -0.2, 0.4).normalized();
   for (const bool swapped : {false, true}) {

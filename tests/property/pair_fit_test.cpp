@@ -11,10 +11,10 @@
 namespace ist {
 namespace {
 
-Asset cube(bool with_field) {
+Asset cube(bool with_surface) {
   PackingSettings settings;
   settings.max_spheres = 200;
-  settings.surface.wanted = with_field;
+  settings.surface.wanted = with_surface;
   return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
 }
 
@@ -36,16 +36,16 @@ TEST(PairFit, TellsWhatIsAskedOfAPair) {
           EXPECT_EQ(fit.a_is_coarser, !turned);
           EXPECT_EQ(fit.has_surface, large == &whole);
         }
-        const auto volume = [&](FieldUse use) {
+        const auto volume = [&](SurfaceUse use) {
           PenetrationSettings settings;
-          settings.field = use;
+          settings.surface = use;
           return penetration(first, second, settings, workspace).volume;
         };
-        ASSERT_GT(volume(FieldUse::never), 0);
+        ASSERT_GT(volume(SurfaceUse::never), 0);
         if (fit.needs_surface && fit.has_surface) {
-          EXPECT_EQ(volume(FieldUse::automatic), volume(FieldUse::always));
+          EXPECT_EQ(volume(SurfaceUse::automatic), volume(SurfaceUse::always));
         } else if (!fit.fits()) {
-          EXPECT_EQ(volume(FieldUse::automatic), volume(FieldUse::never));
+          EXPECT_EQ(volume(SurfaceUse::automatic), volume(SurfaceUse::never));
         }
       }
 }

@@ -162,7 +162,7 @@ class Certified : public ::testing::Test {
     if (found.status == ImpactStatus::overlapping) {
       EXPECT_EQ(found.time, 0);
       PenetrationSettings exact;
-      exact.field = FieldUse::always;
+      exact.surface = SurfaceUse::always;
       EXPECT_GT(penetration(a, b, exact, workspace()).volume, 0);
       return;
     }

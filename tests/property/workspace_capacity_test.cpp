@@ -33,7 +33,7 @@ std::size_t bytes_of(std::size_t capacity) {
 
 bool keeps_surface(const PlacedSolid& solid) {
   const auto* const tree = std::get_if<PlacedTree>(&solid.placed);
-  return tree != nullptr && tree->tree.has_field();
+  return tree != nullptr && tree->tree.has_surface();
 }
 
 /// Every answer that a capacity may stop, and whether it did.
@@ -43,12 +43,12 @@ class Answers {
     std::vector<ContactPatch> patches(16);
     const bool surfaces = keeps_surface(a) && keeps_surface(b);
     for (const Measure measure : {Measure::matched, Measure::inner})
-      for (const FieldUse field :
-           {FieldUse::never, surfaces ? FieldUse::always : FieldUse::automatic})
+      for (const SurfaceUse use :
+           {SurfaceUse::never, surfaces ? SurfaceUse::always : SurfaceUse::automatic})
         for (const std::uint32_t budget : {0u, 500u}) {
           PenetrationSettings settings;
           settings.measure = measure;
-          settings.field = field;
+          settings.surface = use;
           settings.pair_budget = budget;
           add(penetration(a, b, settings, workspace));
           const ContactPatches contact = contact_patches(a, b, settings, workspace, patches);

@@ -62,7 +62,7 @@ def ask(assets, arguments, **settings):
 
 def expected_of(solids, arguments, **settings):
     found = [ist.penetration(solids[a], solids[b], [pose_b], poses_a=pose_a, scales=scale_b,
-                             scales_a=scale_a, field="never", **settings)
+                             scales_a=scale_a, surface="never", **settings)
              for a, b, pose_a, pose_b, scale_a, scale_b in zip(*arguments.values())]
     return dict(volume=np.concatenate([f.volume for f in found]),
                 centroid=np.concatenate([f.centroid for f in found]),

@@ -67,7 +67,7 @@ def on_cpu(solids, arguments, first=None, **settings):
         found = ist.penetration(
             (first or solids)[a], solids[b], arguments["poses"][rows],
             poses_a=arguments["poses_a"][rows], scales=arguments["scales"][rows],
-            scales_a=arguments["scales_a"][rows], field="never", **settings)
+            scales_a=arguments["scales_a"][rows], surface="never", **settings)
         for name, column in zip([*COLUMNS, "status"], [
                 found.volume, found.centroid, found.force, found.torque, found.status]):
             answers[name][rows] = column
@@ -185,7 +185,7 @@ def test_patches_are_those_of_the_cpu(solids, assets, pairs):
         theirs = ist.contact_patches(
             solids[a], solids[b], arguments["poses"][rows], poses_a=arguments["poses_a"][rows],
             scales=arguments["scales"][rows], scales_a=arguments["scales_a"][rows], max_patches=4,
-            field="never")
+            surface="never")
         # Unless two divisions are worth the same: then a cell is in another patch.
         alike = (ours["id"][rows] == theirs.id).all(1)
         alike &= (np.abs(ours["volume"][rows] - theirs.volume) < 1e-4 * theirs.volume.max(initial=1)).all(1)

@@ -111,7 +111,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(scales=[[1.0]]), ValueError, r"scales: shape \(1, 1\); wanted a number or \(n,\)"),
     (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
-    (dict(field="maybe"), ValueError, "field: 'maybe'; one of 'automatic', 'never', 'always'"),
+    (dict(surface="maybe"), ValueError, "surface: 'maybe'; one of 'automatic', 'never', 'always'"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
     (dict(a=ist.BallField(2), b=ist.BallField(1)), TypeError, "a, b: two Fields"),
 ])
@@ -155,12 +155,12 @@ def compose(a, b):
     return np.concatenate((q, rotation(a) @ b[4:] + a[4:]))
 
 
-@pytest.mark.parametrize("field", ["never", "automatic", "always"])
-def test_gradients_are_those_of_the_volume(gear, knot, random_poses, field):
+@pytest.mark.parametrize("surface", ["never", "automatic", "always"])
+def test_gradients_are_those_of_the_volume(gear, knot, random_poses, surface):
     poses, poses_a = random_poses(24, 1.5), random_poses(24, 0.5)
     scales, scales_a = np.full(24, 0.8), np.full(24, 1.2)
     found = ist.penetration(gear, knot, poses, poses_a=poses_a, scales=scales, scales_a=scales_a,
-                            field=field, scale_gradients=True)
+                            surface=surface, scale_gradients=True)
     met = found.volume > 1e-2
     assert met.sum() > 12
 
@@ -169,7 +169,7 @@ def test_gradients_are_those_of_the_volume(gear, knot, random_poses, field):
         for moved in (b, a):  # the function is of q/|q|
             moved[:, :4] /= np.linalg.norm(moved[:, :4], axis=1, keepdims=True)
         return ist.penetration(gear, knot, b, poses_a=a, scales=scale, scales_a=scale_a,
-                               field=field).volume
+                               surface=surface).volume
 
     h = 1e-4
     for k in range(7):
@@ -232,9 +232,9 @@ def test_fields_meet_assets(cube):
     bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
     with pytest.raises(ist.Error, match="asset: holds no surface"):
         ist.MeshField(bare)
-    with pytest.raises(ist.Error, match="field='always': the asset of coarser spheres holds no surface"):
-        ist.penetration(bare, bare, pose, field="always")
-    assert (ist.penetration(bare, bare, [pose], field="always").status == ist.QueryStatus.not_held).all()
+    with pytest.raises(ist.Error, match="surface='always': the asset of coarser spheres holds no surface"):
+        ist.penetration(bare, bare, pose, surface="always")
+    assert (ist.penetration(bare, bare, [pose], surface="always").status == ist.QueryStatus.not_held).all()
     assert repr(ist.BoxField([1, 2, 3])) == "ist.BoxField(half_extents=[1, 2, 3])"
 
 
@@ -372,13 +372,13 @@ def test_pictures_and_corrections(cube, knot):
         ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none").surface()
     side = cube.bounds().upper[0] - cube.bounds().lower[0]
     pose = [1, 0, 0, 0, 1.001 * side, 0, 0]
-    whole = ist.penetration(cube, cube, pose, field="never")
+    whole = ist.penetration(cube, cube, pose, surface="never")
     found = ist.lenses(cube, cube, pose)
     assert len(found.centre) == whole.sphere_pairs > 0
     assert np.linalg.norm(found.axis, axis=1) == pytest.approx(1)
     fewer = ist.without_protrusion(whole, cube, cube, pose)
     assert fewer.volume < whole.volume
-    deep = ist.penetration(cube, cube, IDENTITY, field="never")
+    deep = ist.penetration(cube, cube, IDENTITY, surface="never")
     assert ist.without_protrusion(deep, cube, cube, IDENTITY).volume == deep.volume
     with pytest.raises(ValueError, match="whole: shape"):
         ist.without_protrusion(whole, cube, cube, [pose])

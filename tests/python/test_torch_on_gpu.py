@@ -12,7 +12,7 @@ pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_n
 if ist.gpu.available():
     torch = pytest.importorskip("torch", reason="no PyTorch")
     import ist.torch
-    overlap = functools.partial(ist.torch.overlap, field="never")
+    overlap = functools.partial(ist.torch.overlap, surface="never")
 
 CYCLES = 1_000_000_000  # a good part of a second
 

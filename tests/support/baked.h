@@ -14,10 +14,10 @@ inline PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
   return settings;
 }
 
-/// `field`: whether the asset holds its surface.
-inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool field = true) {
+/// `surface`: whether the asset holds its surface.
+inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool surface = true) {
   PackingSettings settings = of_size(spheres);
-  settings.surface.wanted = field;
+  settings.surface.wanted = surface;
   return bake(close_mesh(std::move(mesh), name), settings);
 }
 

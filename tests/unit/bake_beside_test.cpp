@@ -92,9 +92,9 @@ Asset baked_beside(const ClosedMesh& mesh, const PackingSettings& settings, Seen
   return thread_arena(settings.threads).execute([&] {
     const MeshSolid solid(mesh);
     const Resolution as_it_is;
-    SolidField field(solid, as_it_is, settings.surface, settings.threads);
+    SharedSurface surface(solid, as_it_is, settings.surface, settings.threads);
     TwoAtATime backend(solid, seen);
-    return bake_solid(mesh, solid, field, backend, settings, progress);
+    return bake_solid(mesh, solid, surface, backend, settings, progress);
   });
 }
 

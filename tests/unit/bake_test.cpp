@@ -33,7 +33,7 @@ void expect_all_sound(const std::vector<Invariant>& invariants) {
   for (const Invariant& one : invariants) {
     EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
     EXPECT_LE(one.worst, 0) << one.name;
-    EXPECT_TRUE(one.checked > 0 || one.name == "spheres disjoint" || one.name == "field inside")
+    EXPECT_TRUE(one.checked > 0 || one.name == "spheres disjoint" || one.name == "surface inside")
         << one.name;
   }
 }
@@ -193,34 +193,36 @@ TEST(Check, TurnsRedForEveryInvariantOfADetail) {
   }
 }
 
-FieldHeader& field(AssetHeader& h) { return *writable<FieldHeader>(h, h.field); }
-SurfaceBlock* surface(AssetHeader& h) {
-  return writable<SurfaceBlock>(h, field(h).level[0].blocks);
+SurfaceHeader& surface(AssetHeader& h) { return *writable<SurfaceHeader>(h, h.surface); }
+SurfaceBlock* first_block(AssetHeader& h) {
+  return writable<SurfaceBlock>(h, surface(h).level[0].blocks);
 }
-CellBrick* bricks(AssetHeader& h) { return writable<CellBrick>(h, field(h).brick_data); }
+CellBrick* bricks(AssetHeader& h) { return writable<CellBrick>(h, surface(h).brick_data); }
 
-// So is the field.
-TEST(Check, TurnsRedForEveryInvariantOfTheField) {
+// So is the surface.
+TEST(Check, TurnsRedForEveryInvariantOfTheSurface) {
   const ClosedMesh torus = close_mesh(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
   const Asset asset = bake(torus, testing::of_size(60));
-  ASSERT_TRUE(asset.view().has_field());
+  ASSERT_TRUE(asset.view().has_surface());
   expect_all_sound(check(asset, torus));
   const std::vector<Tampering> cases = {
-      {"field closed", [](AssetHeader& h) { surface(h)->x[1] += 1e-7f; }},
-      {"field closed",
-       [](AssetHeader& h) { std::swap(surface(h)->corner[0][2], surface(h)->corner[1][2]); }},
-      {"field near mesh", [](AssetHeader& h) { surface(h)->z[1] += 1e-4f; }},
-      {"mesh near field", [](AssetHeader& h) { surface(h)->z[1] += 1e-4f; }},
-      {"field near mesh", [](AssetHeader& h) { field(h).error *= 0.1; }},
-      {"field balls",
-       [](AssetHeader& h) { writable<BallBlock>(h, field(h).level[1].blocks)->r[2] *= 0.999f; }},
-      {"field cells",
+      {"surface closed", [](AssetHeader& h) { first_block(h)->x[1] += 1e-7f; }},
+      {"surface closed",
        [](AssetHeader& h) {
-         auto* triangles = writable<std::uint16_t>(h, field(h).cell_triangles);
+         std::swap(first_block(h)->corner[0][2], first_block(h)->corner[1][2]);
+       }},
+      {"surface near mesh", [](AssetHeader& h) { first_block(h)->z[1] += 1e-4f; }},
+      {"mesh near surface", [](AssetHeader& h) { first_block(h)->z[1] += 1e-4f; }},
+      {"surface near mesh", [](AssetHeader& h) { surface(h).error *= 0.1; }},
+      {"surface balls",
+       [](AssetHeader& h) { writable<BallBlock>(h, surface(h).level[1].blocks)->r[2] *= 0.999f; }},
+      {"surface cells",
+       [](AssetHeader& h) {
+         auto* triangles = writable<std::uint16_t>(h, surface(h).cell_triangles);
          triangles[5] = triangles[5] == 0 ? 1 : 0;
        }},
-      {"field signs", [](AssetHeader& h) { bricks(h)->inside ^= 1u << 7; }},
-      {"field inside", [](AssetHeader& h) { bricks(h)->inside ^= ~bricks(h)->surface; }},
+      {"surface signs", [](AssetHeader& h) { bricks(h)->inside ^= 1u << 7; }},
+      {"surface inside", [](AssetHeader& h) { bricks(h)->inside ^= ~bricks(h)->surface; }},
   };
   for (const Tampering& one : cases) {
     bool red = false;

@@ -19,7 +19,7 @@ TEST(BulletShapes, WithoutASurfaceCollideByLenses) {
   packing.max_spheres = 500;
   packing.surface.wanted = false;
   const Asset asset = bake(close_mesh(cube_mesh(), "cube"), packing);
-  ASSERT_FALSE(asset.view().has_field());
+  ASSERT_FALSE(asset.view().has_surface());
   bullet::Shape shape(asset.view());
   btCollisionObject first, second;
   first.setCollisionShape(&shape);

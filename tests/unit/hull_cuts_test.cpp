@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "bake/field/hull.h"
-#include "bake/field/hull_cuts.h"
+#include "bake/surface/hull.h"
+#include "bake/surface/hull_cuts.h"
 #include "mesh/exact_closest_point.h"
 #include "support/test_meshes.h"
 

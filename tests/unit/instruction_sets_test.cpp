@@ -132,7 +132,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
       bits.add(penetration(a, b, settings, workspace));
       return;
     }
-  if (asked == "always") settings.field = FieldUse::always;
+  if (asked == "always") settings.surface = SurfaceUse::always;
   if (asked == "inner") settings.measure = Measure::inner;
   if (asked == "max_visits") settings.max_visits = 50;
   if (asked == "pair_budget") settings.pair_budget = 300;

@@ -59,7 +59,7 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
     const Asset asset = bake(*mesh, few_spheres());
     EXPECT_EQ(asset.view().mesh_state(), MeshState::own);
     EXPECT_EQ(asset.view().mesh_triangles(), mesh->mesh.triangles.size());
-    EXPECT_EQ(asset.view().field_triangles(), mesh->mesh.triangles.size());
+    EXPECT_EQ(asset.view().surface_triangles(), mesh->mesh.triangles.size());
     EXPECT_EQ(mesh_of(asset).error, 0);
     EXPECT_EQ(asset.view().counted_twice(), 0);
     expect_sound(bake_surface(*mesh), *mesh);
@@ -85,7 +85,7 @@ TEST(KeptMesh, IsSimplifiedWithinAnErrorOnRequest) {
   for (const SurfaceSettings& surface : {within(0.05), within(0, 0.005), within(2e-3)}) {
     const Asset asset = bake(ball, few_spheres(surface));
     EXPECT_EQ(asset.view().mesh_state(), MeshState::simplified);
-    EXPECT_EQ(asset.view().mesh_triangles(), asset.view().field_triangles());
+    EXPECT_EQ(asset.view().mesh_triangles(), asset.view().surface_triangles());
     EXPECT_LE(
         asset.view().mesh_error(),
         surface.error > 0 ? surface.error : surface.share * ball.report.bounds.sizes().maxCoeff());
@@ -106,7 +106,7 @@ TEST(KeptMesh, IsLeftOutWhereNoneIsWanted) {
   const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
   const Asset asset = bake(cube, few_spheres(none));
   EXPECT_FALSE(asset.view().has_mesh());
-  EXPECT_FALSE(asset.view().has_field());
+  EXPECT_FALSE(asset.view().has_surface());
   EXPECT_EQ(asset.view().mesh_state(), MeshState::none);
   EXPECT_EQ(asset.view().mesh_triangles(), 0u);
   EXPECT_THROW(bake_surface(cube, none), Error);
@@ -185,7 +185,7 @@ TEST_F(SurfaceAlone, HoldsMeshMassAndBounds) {
   expect_sound(alone_, mesh_);
   EXPECT_EQ(alone_.view().sphere_count(), 0u);
   EXPECT_FALSE(alone_.view().empty());
-  EXPECT_FALSE(alone_.view().has_field());
+  EXPECT_FALSE(alone_.view().has_surface());
   EXPECT_EQ(mass_properties(alone_.view()).inertia, mass_properties(whole_.view()).inertia);
   EXPECT_EQ(alone_.view().volume(), whole_.view().volume());
   EXPECT_EQ(bounds(alone_.view()).radius, bounds(whole_.view()).radius);

@@ -81,14 +81,14 @@ class RealTime : public ::testing::Test {
     closest_point(field, at);
     time_of_impact(solid, other, motions, until, workspaces_[0]);
     time_of_impact(field, other, motions, until, workspaces_[0]);
-    for (const FieldUse use : {FieldUse::automatic, FieldUse::always}) {
-      PenetrationSettings with_field = settings;
-      with_field.field = use;
+    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
+      PenetrationSettings by_surface = settings;
+      by_surface.surface = use;
       // NaN where the coarser one holds no surface.
-      for (const double volume : {penetration(solid, b, with_field, workspaces_[0]).volume,
-                                  penetration(b, solid, with_field, workspaces_[0]).volume})
+      for (const double volume : {penetration(solid, b, by_surface, workspaces_[0]).volume,
+                                  penetration(b, solid, by_surface, workspaces_[0]).volume})
         if (!std::isnan(volume)) volume_[i] += volume;
-      contact_patches(solid, b, with_field, workspaces_[0], patches_);
+      contact_patches(solid, b, by_surface, workspaces_[0], patches_);
     }
   }
 

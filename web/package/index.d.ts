@@ -76,11 +76,11 @@ export interface AssetInfo {
   /** [u] bound on how far matched spheres stick out of the solid. */
   protrusion: number;
   /** The asset stores the solid's surface, which makes queries of spheres exact. */
-  hasField: boolean;
+  hasSurface: boolean;
   /** [u] the stored surface and the solid's lie within this of each other. */
-  fieldError: number;
+  surfaceError: number;
   /** Count of triangles of the stored surface. */
-  fieldTriangles: number;
+  surfaceTriangles: number;
   /** State of the mesh for exact queries; `unresolved`: none, since it counts volume twice. */
   meshState: 'none' | 'own' | 'resolved' | 'simplified' | 'unresolved';
   /** Count of triangles of that mesh, 0: there is none. */
@@ -154,7 +154,7 @@ export class Asset {
   level(level: number, set?: SphereSet): Float64Array;
 
   /**
-   * The stored surface, within AssetInfo.fieldError of the solid's, or the mesh of a surface alone;
+   * The stored surface, within AssetInfo.surfaceError of the solid's, or the mesh of a surface alone;
    * null if there is none.
    */
   surface(): Surface | null;
@@ -224,7 +224,7 @@ export interface ContactOptions extends Limits {
    * Whether the stored surface of an asset is used: where spheres are too coarse for the contact
    * (`automatic`, the default), `never`, or `always`.
    */
-  field?: 'automatic' | 'never' | 'always';
+  surface?: 'automatic' | 'never' | 'always';
   /**
    * Accepted relative error of the volume, such as 0.005 for 0.5 %. The query uses the cheapest level
    * of detail, or `exact`, whose predicted error is smaller, blended smoothly. `matched` only.
@@ -509,7 +509,7 @@ export function contains(
  * a gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. Use it for
  * contacts, not where energy must be conserved: the force is the volume's gradient to within 15 %.
  *
- * `whole`: the answer of penetration() at these poses by lenses, {field: 'never'}, in the matched
+ * `whole`: the answer of penetration() at these poses by lenses, {surface: 'never'}, in the matched
  * measure without a pair budget. `into` may be `whole`.
  */
 export function withoutProtrusion(

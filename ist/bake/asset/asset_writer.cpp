@@ -26,7 +26,8 @@ class SectionWriter {
     std::vector<std::uint16_t> narrow(values.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       narrow[i] = static_cast<std::uint16_t>(values[i]);
-      if (narrow[i] != values[i]) throw Error("asset: a number of the field's lists is too large");
+      if (narrow[i] != values[i])
+        throw Error("asset: a number of the surface's lists is too large");
     }
     write(offset, narrow, count);
   }
@@ -44,20 +45,20 @@ class SectionWriter {
     }
   }
 
-  void write(const FieldHeader& header, const FieldArrays& field) {
-    write(header.level[0].blocks, field.blocks, header.level[0].count);
-    if (field.levels.size() + 1 != header.level_count)
-      throw Error("asset: the field has a wrong number of levels");
+  void write(const SurfaceHeader& header, const SurfaceArrays& surface) {
+    write(header.level[0].blocks, surface.blocks, header.level[0].count);
+    if (surface.levels.size() + 1 != header.level_count)
+      throw Error("asset: the surface has a wrong number of levels");
     for (std::uint32_t k = 1; k < header.level_count; ++k) {
       const LevelHeader& level = header.level[k];
-      write(level.blocks, field.levels[k - 1].blocks, level.count);
-      write(level.origins, field.levels[k - 1].origins, level.count);
+      write(level.blocks, surface.levels[k - 1].blocks, level.count);
+      write(level.origins, surface.levels[k - 1].origins, level.count);
     }
-    write(header.brick_index, field.brick_index,
+    write(header.brick_index, surface.brick_index,
           std::uint64_t{header.bricks[0]} * header.bricks[1] * header.bricks[2]);
-    write(header.brick_data, field.bricks, header.brick_count);
-    write(header.cell_ends, field.cell_ends, header.cell_count, header.list_bytes);
-    write(header.cell_triangles, field.cell_triangles, header.entry_count, header.list_bytes);
+    write(header.brick_data, surface.bricks, header.brick_count);
+    write(header.cell_ends, surface.cell_ends, header.cell_count, header.list_bytes);
+    write(header.cell_triangles, surface.cell_triangles, header.entry_count, header.list_bytes);
   }
 
   void write(const MeshHeader& header, const MeshArrays& mesh) {
@@ -92,9 +93,9 @@ std::uint32_t count_of_blocks(std::size_t blocks) {
   return static_cast<std::uint32_t>(blocks);
 }
 
-/// The header of a field with the counts that place_sections asks for.
-FieldHeader placeable(const FieldArrays& arrays) {
-  FieldHeader header = arrays.header;
+/// The header of a surface with the counts that place_sections asks for.
+SurfaceHeader placeable(const SurfaceArrays& arrays) {
+  SurfaceHeader header = arrays.header;
   header.level[0].count = count_of_blocks(arrays.blocks.size());
   header.brick_count = static_cast<std::uint32_t>(arrays.bricks.size());
   header.cell_count = static_cast<std::uint32_t>(arrays.cell_ends.size());
@@ -115,7 +116,7 @@ MeshHeader placeable(const MeshArrays& arrays) {
 /// A surface alone has no spheres, and nothing that is made of them.
 bool holds_enough(const AssetArrays& arrays) {
   const std::uint64_t spheres = arrays.inner_spheres.size();
-  if (spheres == 0) return arrays.mesh != nullptr && arrays.field == nullptr;
+  if (spheres == 0) return arrays.mesh != nullptr && arrays.surface == nullptr;
   return spheres <= kMaxSpheres;
 }
 
@@ -132,11 +133,11 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     throw Error("asset: the last level of detail has no spheres");
   std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
-  FieldHeader field;
-  if (arrays.field) field = placeable(*arrays.field);
+  SurfaceHeader surface;
+  if (arrays.surface) surface = placeable(*arrays.surface);
   MeshHeader mesh;
   if (arrays.mesh) mesh = placeable(*arrays.mesh);
-  place_sections(header, details.data(), arrays.field ? &field : nullptr,
+  place_sections(header, details.data(), arrays.surface ? &surface : nullptr,
                  arrays.mesh ? &mesh : nullptr);
   fill_scalars(header.inner_tree, arrays.inner_tree);
   fill_scalars(header.matched_tree, arrays.matched_tree);
@@ -161,9 +162,9 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     writer.write(details[i].matched_spheres, arrays.details[i].matched_spheres, tree.sphere_count);
     writer.write(tree, arrays.details[i].matched_tree);
   }
-  if (arrays.field) {
-    writer.write(header.field, std::vector<FieldHeader>{field}, 1);
-    writer.write(field, *arrays.field);
+  if (arrays.surface) {
+    writer.write(header.surface, std::vector<SurfaceHeader>{surface}, 1);
+    writer.write(surface, *arrays.surface);
   }
   if (arrays.mesh) {
     writer.write(header.mesh, std::vector<MeshHeader>{mesh}, 1);

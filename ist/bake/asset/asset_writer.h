@@ -36,8 +36,8 @@ struct DetailArrays {
 };
 
 /// The solid's surface for queries as it will lie in the file.
-struct FieldArrays {
-  FieldHeader header;  ///< offsets and counts of arrays are filled in by writing
+struct SurfaceArrays {
+  SurfaceHeader header;  ///< offsets and counts of arrays are filled in by writing
   std::vector<SurfaceBlock> blocks;
   std::vector<TreeLevelArrays> levels;  ///< balls around blocks, from level 1 up; no nodes
   std::vector<std::uint32_t> brick_index;
@@ -65,9 +65,9 @@ struct AssetArrays {
   std::vector<Sphere> matched_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
-  std::vector<DetailArrays> details;         ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
-  std::shared_ptr<const FieldArrays> field;  ///< null: none
-  std::shared_ptr<const MeshArrays> mesh;    ///< null: none
+  std::vector<DetailArrays> details;             ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
+  std::shared_ptr<const SurfaceArrays> surface;  ///< null: none
+  std::shared_ptr<const MeshArrays> mesh;        ///< null: none
 };
 
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.

@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "bake/check/check_field.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_surface.h"
 #include "bake/check/check_tally.h"
+#include "bake/check/checked_mesh.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/polygonise.h"
@@ -143,7 +143,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
 }
 
 /// Box and ball hold the surface, and what may be around it where that is a solid's mesh.
-std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckSurface& surface) {
+std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& surface) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = vector(asset.centre);
   const Vector3d lower = (vector(asset.box_lower) - origin) / unit;
@@ -197,7 +197,7 @@ Bounding bounding_of(const ClosedMesh& mesh) {
 /// certified against; `surface`: what matched spheres are calibrated by; of a mesh's asset they are
 /// the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
-                                 const CheckedSolid& solid, const CheckSurface& surface,
+                                 const CheckedSolid& solid, const CheckedMesh& surface,
                                  const UnitFrame& frame, const MeshMoments& moments) {
   std::vector<Invariant> all;
   all.push_back(check_frame(asset, frame));
@@ -215,7 +215,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_field(asset, surface, bounding_of(mesh)));
+  append(all, check_surface(asset, surface, bounding_of(mesh)));
   return all;
 }
 
@@ -224,7 +224,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as
   const MeshSolid solid(mesh);
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
-  const CheckSurface surface(mesh, solid.frame());
+  const CheckedMesh surface(mesh, solid.frame());
   return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments());
 }
 
@@ -241,7 +241,7 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   MeshMoments moments = moments_near(mesh.arrays(), mesh.unit_moments(), made.error / scale);
   moments.volume_error += off / scale / scale / scale;
   return check_all(asset, closed, DistanceSolid(solid, mesh.frame()),
-                   CheckSurface(closed, mesh.frame()), mesh.frame(), moments);
+                   CheckedMesh(closed, mesh.frame()), mesh.frame(), moments);
 }
 
 }  // namespace

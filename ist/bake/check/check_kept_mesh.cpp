@@ -1,4 +1,4 @@
-#include "bake/check/check_field.h"
+#include "bake/check/check_surface.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@
 namespace ist {
 namespace {
 
-using CheckCorners = CheckSurface::Corners;
+using CheckCorners = CheckedMesh::Corners;
 using Point = Eigen::Vector3d;
 using Edge = std::array<std::uint32_t, 2>;
 
@@ -249,7 +249,7 @@ Invariant shells(const KeptMesh& mesh) {
 }  // namespace
 
 std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
-                                       const UnitFrame& frame, const CheckSurface& surface,
+                                       const UnitFrame& frame, const CheckedMesh& surface,
                                        Bounding bounding) {
   if (asset.mesh == 0) return {};
   const KeptMesh mesh(asset, *at<MeshHeader>(asset, asset.mesh));
@@ -258,7 +258,7 @@ std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMes
     out.push_back(same_triangles(mesh.triangles(), surface.triangles()));
     out.push_back(rounding(baked, frame, mesh.header.rounding));
   } else {
-    out = check_near("kept mesh", CheckSurface(mesh.triangles()), boundary_of(surface, bounding),
+    out = check_near("kept mesh", CheckedMesh(mesh.triangles()), boundary_of(surface, bounding),
                      mesh.header.error, bounding);
   }
   append(out, {closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh), shells(mesh)});

@@ -91,7 +91,7 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
 }
 
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
-                                     const CheckSurface& surface, const std::string& name) {
+                                     const CheckedMesh& surface, const std::string& name) {
   const std::size_t n = matched_tree(asset, detail).sphere_count;
   const Sphere* const matched = matched_spheres(asset, detail);
   const double stated =

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "bake/check/check_surface.h"
+#include "bake/check/checked_mesh.h"
 
 namespace ist {
 
@@ -24,7 +24,7 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
 
 /// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
-                                     const CheckSurface& surface, const std::string& name);
+                                     const CheckedMesh& surface, const std::string& name);
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
 Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface);

@@ -1,236 +1,247 @@
 #include "bake/check/check_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numbers>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bake/check/check_tally.h"
 
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kLeaf = 6;
+using CheckCorners = CheckedMesh::Corners;
+using Point = Eigen::Vector3d;
 
-double squared_distance_to_segment(const Eigen::Vector3d& p, const Eigen::Vector3d& a,
-                                   const Eigen::Vector3d& b) {
-  const Eigen::Vector3d ab = b - a;
-  const double length = ab.squaredNorm();
-  const double t = length > 0 ? std::clamp((p - a).dot(ab) / length, 0.0, 1.0) : 0.0;
-  return (p - (a + t * ab)).squaredNorm();
+/// Every edge is run as often one way as the other.
+Invariant closed(const std::vector<CheckCorners>& triangles) {
+  using Key = std::array<double, 6>;
+  std::map<Key, std::ptrdiff_t> balance;
+  for (const CheckCorners& t : triangles)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point &a = t[k], &b = t[(k + 1) % 3];
+      const bool up = std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+      const Point &low = up ? a : b, &high = up ? b : a;
+      balance[{low[0], low[1], low[2], high[0], high[1], high[2]}] += up ? 1 : -1;
+    }
+  Tally tally;
+  std::size_t edge = 0;
+  for (const auto& [key, sum] : balance) tally.add(static_cast<double>(std::abs(sum)), edge++);
+  return tally.named("surface closed", "uses of an edge in one direction − uses in the other");
 }
 
-/// An orthonormal frame whose third axis is the ray.
-const std::array<Eigen::Vector3d, 3>& ray_frame() {
-  static const std::array<Eigen::Vector3d, 3> frame = [] {
-    const Eigen::Vector3d ray = Eigen::Vector3d(0.41421356, -0.31830989, 0.85271871).normalized();
-    const Eigen::Vector3d first = ray.cross(Eigen::Vector3d(0.3, 0.9, -0.2)).normalized();
-    return std::array<Eigen::Vector3d, 3>{first, ray.cross(first), ray};
-  }();
-  return frame;
-}
+using Polygon = std::vector<Point>;  ///< convex
 
-/// Sign of a determinant whose rounding error stays below 1e-14 of the products in it; 0 if open.
-int certain_sign(double determinant, double magnitude) {
-  if (std::abs(determinant) <= 1e-14 * magnitude) return 0;
-  return determinant > 0 ? 1 : -1;
-}
-
-/// True if the ray from p may meet the box.
-bool ray_meets(const Eigen::Vector3d& p, const Eigen::AlignedBox3d& box) {
-  double enter = 0;
-  double leave = 1e30;
-  for (int k = 0; k < 3; ++k) {
-    const double inverse = 1 / ray_frame()[2][k];
-    const double a = (box.min()[k] - 1e-9 - p[k]) * inverse;
-    const double b = (box.max()[k] + 1e-9 - p[k]) * inverse;
-    enter = std::max(enter, std::min(a, b));
-    leave = std::min(leave, std::max(a, b));
+/// What of a polygon lies behind a plane, and what ahead of it; what lies in it counts as behind.
+std::array<Polygon, 2> parts_by(const Polygon& polygon, const Point& on, const Point& normal) {
+  constexpr double kIn = 1e-13;  // unit frame: so near is in the plane
+  std::array<Polygon, 2> parts;
+  const auto height = [&](const Point& p) {
+    const double h = normal.dot(p - on);
+    return std::abs(h) <= kIn ? 0.0 : h;
+  };
+  for (std::size_t k = 0; k < polygon.size(); ++k) {
+    const Point &p = polygon[k], &q = polygon[(k + 1) % polygon.size()];
+    const double from = height(p), to = height(q);
+    if (from <= 0) parts[0].push_back(p);
+    if (from >= 0) parts[1].push_back(p);
+    if ((from < 0 && to > 0) || (from > 0 && to < 0)) {
+      const Point between = p + from / (from - to) * (q - p);
+      parts[0].push_back(between);
+      parts[1].push_back(between);
+    }
   }
-  return enter <= leave;
+  const auto any = [&](bool ahead) {
+    return std::any_of(polygon.begin(), polygon.end(),
+                       [&](const Point& p) { return ahead ? height(p) > 0 : height(p) < 0; });
+  };
+  if (!any(true))
+    parts[1].clear();
+  else if (!any(false))
+    parts[0].clear();
+  return parts;
 }
 
-enum class Hit { no, front, back, open };
+/// Cut through the middle of its longest way across.
+std::array<Polygon, 2> halves_of(const Polygon& polygon) {
+  Point from = polygon[0], to = polygon[0];
+  for (const Point& p : polygon)
+    for (const Point& q : polygon)
+      if ((q - p).squaredNorm() > (to - from).squaredNorm()) from = p, to = q;
+  return parts_by(polygon, (from + to) / 2, (to - from).normalized());
+}
 
-/// Whether the ray from p leaves (front) or enters (back) through a triangle.
-Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triangle) {
-  std::array<Eigen::Vector3d, 3> t;  // in the ray's frame, p at the origin
-  double size = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Eigen::Vector3d d = triangle[k] - p;
-    t[k] = {d.dot(ray_frame()[0]), d.dot(ray_frame()[1]), d.dot(ray_frame()[2])};
-    size = std::max(size, d.lpNorm<1>());
+/// Proves triangles within `error` of a surface: a part lies as near as its centre and its radius
+/// say, or as its farthest corner from one triangle. Else it is cut along that triangle's sides,
+/// so that where one triangle lies over several in its plane each has its part; else it is halved.
+class NearProof {
+ public:
+  NearProof(const CheckedMesh& to, double error)
+      : to_(to), error_(error * (1 + 1e-6) + 1e-11), smallest_(std::max(1e-3 * error, 1e-9)) {}
+
+  void prove(const CheckCorners& part, std::size_t index, Tally& tally) const {
+    int left = kMostParts;
+    tally.add(beyond({part.begin(), part.end()}, left) - error_, index);
   }
-  bool left = true;   // the ray lies left of every edge, or may
-  bool right = true;  // right of every edge, or may
-  bool certain = true;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Eigen::Vector3d& a = t[k];
-    const Eigen::Vector3d& b = t[(k + 1) % 3];
-    const int sign = certain_sign(a.x() * b.y() - a.y() * b.x(), size * size);
-    left &= sign >= 0;
-    right &= sign <= 0;
-    certain &= sign != 0;
+
+ private:
+  static constexpr int kMostParts = 20'000;
+
+  /// A distance of the part's points that is ≤ error_ if all are.
+  double beyond(const Polygon& part, int& left) const {
+    Point centre = Point::Zero();
+    for (const Point& p : part) centre += p / static_cast<double>(part.size());
+    double radius = 0;
+    for (const Point& p : part) radius = std::max(radius, (p - centre).norm());
+    const auto [distance, triangle] = to_.nearest(centre);
+    if (distance > error_ || distance + radius <= error_ || radius <= smallest_) return distance;
+    double farthest = 0;
+    for (const Point& p : part)
+      farthest = std::max(farthest, squared_distance_to_triangle(p, to_.triangles()[triangle]));
+    if (std::sqrt(farthest) <= error_) return std::sqrt(farthest);
+    if (--left < 0) return distance + radius;
+    double worst = 0;
+    for (const Polygon& piece : pieces(part, to_.triangles()[triangle])) {
+      if (piece.empty()) continue;
+      worst = std::max(worst, beyond(piece, left));
+      if (worst > error_) break;
+    }
+    return worst;
   }
-  if (!left && !right) return Hit::no;
-  if (t[0].z() < -1e-14 * size && t[1].z() < -1e-14 * size && t[2].z() < -1e-14 * size)
-    return Hit::no;
-  if (!certain) return Hit::open;
-  // Volume of (p, a, b, c): of the edges' sign if the triangle is ahead of p.
-  const int side = certain_sign(t[0].dot(t[1].cross(t[2])), size * size * size);
-  if (side == 0) return Hit::open;
-  if (left) return side > 0 ? Hit::front : Hit::no;
-  return side < 0 ? Hit::back : Hit::no;
+
+  /// The part over the triangle, and those beyond its sides; halves where there is only one.
+  static std::vector<Polygon> pieces(const Polygon& part, const CheckCorners& t) {
+    const Point normal = (t[1] - t[0]).cross(t[2] - t[0]);
+    std::vector<Polygon> pieces;
+    Polygon over = part;
+    for (std::size_t k = 0; k < 3 && !over.empty(); ++k) {
+      const Point out = (t[(k + 1) % 3] - t[k]).cross(normal);
+      if (!(out.squaredNorm() > 0)) break;
+      auto [behind, ahead] = parts_by(over, t[k], out.normalized());
+      if (!ahead.empty()) pieces.push_back(std::move(ahead));
+      over = std::move(behind);
+    }
+    if (!over.empty() && !pieces.empty()) {
+      pieces.push_back(std::move(over));
+      return pieces;
+    }
+    auto [first, second] = halves_of(part);
+    return {std::move(first), std::move(second)};
+  }
+
+  const CheckedMesh& to_;
+  double error_, smallest_;
+};
+
+Invariant near(const std::string& name, const std::string& of,
+               const std::vector<CheckCorners>& triangles, const CheckedMesh& to, double error) {
+  const NearProof proof(to, error);
+  return tally_all(triangles.size(),
+                   [&](std::size_t i, Tally& tally) { proof.prove(triangles[i], i, tally); })
+      .named(name, "distance of a point of the " + of + " − the error, unit frame");
+}
+
+/// Whether a point of a triangle is between inside and outside, not between shells of the solid.
+bool bounds_at(const CheckedMesh& surface, const CheckCorners& triangle, const Point& p) {
+  const Point step =
+      (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]).normalized() * 1e-9;
+  return surface.winding(p + step) <= 0 && surface.winding(p - step) >= 1;
+}
+
+/// Those triangles that bound the solid as a whole.
+std::vector<CheckCorners> boundary(const CheckedMesh& surface) {
+  const std::vector<CheckCorners>& all = surface.triangles();
+  std::vector<char> bounds(all.size());
+  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+    bounds[i] = bounds_at(surface, all[i], (all[i][0] + all[i][1] + all[i][2]) / 3);
+  });
+  std::vector<CheckCorners> kept;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (bounds[i] != 0) kept.push_back(all[i]);
+  return kept;
+}
+
+/// Of triangles of which parts bound the solid those parts are near, by points spread over them:
+/// a million at most.
+Invariant parts_near(const std::string& name, const CheckedMesh& mesh, const CheckedMesh& kept,
+                     double error) {
+  constexpr std::size_t kPoints = 1'000'000;
+  const std::size_t count = mesh.triangles().size();
+  int rows = 1;
+  while (rows < 16 && 4 * static_cast<std::size_t>(rows * rows) * count <= kPoints) rows *= 2;
+  return tally_all(count,
+                   [&](std::size_t i, Tally& tally) {
+                     const CheckCorners& t = mesh.triangles()[i];
+                     double worst = -error;
+                     for (int j = 0; j < rows; ++j)
+                       for (int k = 0; j + k < rows; ++k) {
+                         const double u = (j + 1.0 / 3) / rows, v = (k + 1.0 / 3) / rows;
+                         const Point p = t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]);
+                         const double off = kept.distance(p, 2 * error + 1e-9) - error - 1e-11;
+                         if (off > worst && (off <= 0 || bounds_at(mesh, t, p))) worst = off;
+                       }
+                     tally.add(worst, i);
+                   })
+      .named(name, "distance of a point of the mesh that bounds the solid − the error, unit frame");
+}
+
+/// Every ball holds the triangles below it.
+Invariant balls(const AssetHeader& asset, const SurfaceHeader& surface,
+                const SurfaceTriangles& triangles) {
+  Tally sum;
+  std::size_t number = 0;
+  for (std::uint32_t k = 1; k < surface.level_count; ++k) {
+    const std::size_t count = surface.level[k - 1].count;
+    sum.add(tally_all(count, [&](std::size_t i, Tally& tally) {
+      const BallBlock& block = at<BallBlock>(asset, surface.level[k].blocks)[i / kWidth];
+      const Origin& origin = at<Origin>(asset, surface.level[k].origins)[i / kWidth];
+      const std::size_t lane = i % kWidth;
+      const Point centre(origin.x + block.x[lane], origin.y + block.y[lane],
+                         origin.z + block.z[lane]);
+      double reach = 0;
+      const std::size_t end = std::min(triangles.blocks(), (i + 1) << (4 * (k - 1)));
+      for (std::size_t b = i << (4 * (k - 1)); b < end; ++b)
+        for (std::uint32_t l = 0; l < triangles.lanes(b); ++l)
+          for (const Point& p : triangles.corners(b, l))
+            reach = std::max(reach, (p - centre).norm());
+      tally.add(reach - double{block.r[lane]}, number + i);
+    }));
+    number += count;
+  }
+  return sum.named(
+      "surface balls",
+      "largest distance of the triangles below from a ball's centre − its radius, unit frame");
 }
 
 }  // namespace
 
-/// The edges, and the foot of the perpendicular where that lies inside. Every candidate is a point
-/// of the triangle, so that a sliver's poor normal cannot make the distance too small.
-double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckSurface::Corners& t) {
-  double best = std::min({squared_distance_to_segment(p, t[0], t[1]),
-                          squared_distance_to_segment(p, t[1], t[2]),
-                          squared_distance_to_segment(p, t[2], t[0])});
-  const Eigen::Vector3d u = t[1] - t[0];
-  const Eigen::Vector3d v = t[2] - t[0];
-  const Eigen::Vector3d w = p - t[0];
-  const Eigen::Vector3d n = u.cross(v);
-  const double area = n.squaredNorm();
-  if (area > 0) {
-    const double beta = w.cross(v).dot(n) / area;
-    const double gamma = u.cross(w).dot(n) / area;
-    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1)
-      best = std::min(best, (w - (beta * u + gamma * v)).squaredNorm());
-  }
-  return best;
+std::vector<Invariant> check_near(const std::string& what, const CheckedMesh& kept,
+                                  const CheckedMesh& solid, double error, Bounding bounding) {
+  const std::string back = "mesh near " + what;
+  return {near(what + " near mesh", what, kept.triangles(), solid, error),
+          bounding == Bounding::parts ? parts_near(back, solid, kept, error)
+                                      : near(back, "mesh", solid.triangles(), kept, error)};
 }
 
-CheckSurface::CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame) {
-  triangles_.reserve(mesh.mesh.triangles.size());
-  for (const auto& triangle : mesh.mesh.triangles) {
-    Corners corners;
-    for (std::size_t k = 0; k < 3; ++k) {
-      corners[k] = frame.to_unit(mesh.mesh.vertices[triangle[k]]);
-      bounds_.extend(corners[k]);
-    }
-    triangles_.push_back(corners);
-  }
-  build(0, static_cast<std::uint32_t>(triangles_.size()));
+CheckedMesh boundary_of(const CheckedMesh& surface, Bounding bounding) {
+  return bounding == Bounding::shells ? CheckedMesh(boundary(surface)) : surface;
 }
 
-void CheckSurface::build(std::uint32_t begin, std::uint32_t end) {
-  const std::size_t self = nodes_.size();
-  nodes_.emplace_back();
-  nodes_[self].begin = begin;
-  nodes_[self].end = end;
-  for (std::uint32_t i = begin; i < end; ++i)
-    for (const Eigen::Vector3d& corner : triangles_[i]) nodes_[self].box.extend(corner);
-  if (end - begin <= kLeaf) return;
-  int axis = 0;
-  nodes_[self].box.sizes().maxCoeff(&axis);
-  const std::uint32_t middle = begin + (end - begin) / 2;
-  const auto centre = [axis](const Corners& t) { return t[0][axis] + t[1][axis] + t[2][axis]; };
-  std::nth_element(triangles_.begin() + begin, triangles_.begin() + middle,
-                   triangles_.begin() + end,
-                   [&](const Corners& a, const Corners& b) { return centre(a) < centre(b); });
-  build(begin, middle);
-  nodes_[self].right = static_cast<std::uint32_t>(nodes_.size());
-  build(middle, end);
-}
-
-CheckSurface::CheckSurface(std::vector<Corners> triangles) : triangles_(std::move(triangles)) {
-  for (const Corners& corners : triangles_)
-    for (const Eigen::Vector3d& corner : corners) bounds_.extend(corner);
-  build(0, static_cast<std::uint32_t>(triangles_.size()));
-}
-
-double CheckSurface::distance(const Eigen::Vector3d& p, double limit) const {
-  double best = limit * limit;
-  std::uint32_t triangle = 0;
-  search(p, best, triangle);
-  return std::sqrt(best);
-}
-
-std::pair<double, std::uint32_t> CheckSurface::nearest(const Eigen::Vector3d& p) const {
-  double best = 1e30;
-  std::uint32_t triangle = 0;
-  search(p, best, triangle);
-  return {std::sqrt(best), triangle};
-}
-
-void CheckSurface::search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const {
-  struct Entry {
-    std::uint32_t node;
-    double squared;
-  };
-  std::array<Entry, 64> stack;  // the tree is balanced: depth ≤ 32
-  std::size_t size = 0;
-  stack[size++] = {0, nodes_[0].box.squaredExteriorDistance(p)};
-  while (size > 0) {
-    const Entry entry = stack[--size];
-    if (entry.squared >= best) continue;
-    const Node& node = nodes_[entry.node];
-    if (node.right == 0) {
-      for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        const double squared = squared_distance_to_triangle(p, triangles_[i]);
-        if (squared < best) {
-          best = squared;
-          triangle = i;
-        }
-      }
-      continue;
-    }
-    Entry near = {entry.node + 1, nodes_[entry.node + 1].box.squaredExteriorDistance(p)};
-    Entry far = {node.right, nodes_[node.right].box.squaredExteriorDistance(p)};
-    if (far.squared < near.squared) std::swap(near, far);
-    stack[size++] = far;
-    stack[size++] = near;
-  }
-}
-
-int CheckSurface::winding(const Eigen::Vector3d& p) const {
-  int winding = 0;
-  std::array<std::uint32_t, 64> stack;
-  std::size_t size = 0;
-  stack[size++] = 0;
-  while (size > 0) {
-    const std::uint32_t index = stack[--size];
-    const Node& node = nodes_[index];
-    if (!ray_meets(p, node.box)) continue;
-    if (node.right != 0) {
-      stack[size++] = index + 1;
-      stack[size++] = node.right;
-      continue;
-    }
-    for (std::uint32_t i = node.begin; i < node.end; ++i) {
-      switch (cross(p, triangles_[i])) {
-        case Hit::front:
-          ++winding;
-          break;
-        case Hit::back:
-          --winding;
-          break;
-        case Hit::open:
-          return winding_by_solid_angle(p);
-        case Hit::no:
-          break;
-      }
-    }
-  }
-  return winding;
-}
-
-// Van Oosterom and Strackee, "The solid angle of a plane triangle" (1983).
-int CheckSurface::winding_by_solid_angle(const Eigen::Vector3d& p) const {
-  double sum = 0;
-  for (const Corners& t : triangles_) {
-    const Eigen::Vector3d a = t[0] - p;
-    const Eigen::Vector3d b = t[1] - p;
-    const Eigen::Vector3d c = t[2] - p;
-    const double la = a.norm();
-    const double lb = b.norm();
-    const double lc = c.norm();
-    sum += 2 * std::atan2(a.dot(b.cross(c)),
-                          la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
-  }
-  return static_cast<int>(std::lround(sum / (4 * std::numbers::pi)));
+std::vector<Invariant> check_surface(const AssetHeader& asset, const CheckedMesh& mesh,
+                                     Bounding bounding) {
+  if (asset.surface == 0) return {};
+  const SurfaceHeader& surface = *at<SurfaceHeader>(asset, asset.surface);
+  const SurfaceTriangles triangles(asset, surface);
+  const CheckedMesh of_surface(triangles.all());
+  const CheckedMesh solid = boundary_of(mesh, bounding);
+  std::vector<Invariant> out = check_near("surface", of_surface, solid, surface.error, bounding);
+  out.push_back(closed(of_surface.triangles()));
+  if (surface.level_count > 1) out.push_back(balls(asset, surface, triangles));
+  append(out, check_surface_cells(asset, surface, of_surface, solid));
+  return out;
 }
 
 }  // namespace ist

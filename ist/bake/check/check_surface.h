@@ -1,77 +1,72 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <utility>
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
+
+#include <string>
 #include <vector>
 
-#include <ist/mesh.h>
-#include <ist/solid.h>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
+#include "bake/check/checked_mesh.h"
 
 namespace ist {
 
-/// A solid as `check` asks it, unit frame. Immutable.
-class CheckedSolid {
- public:
-  virtual ~CheckedSolid() = default;
-
-  /// Distance to the surface, or less where that is not known exactly; once nothing is nearer than
-  /// `limit`, any value ≥ limit.
-  virtual double distance(const Eigen::Vector3d& p, double limit) const = 0;
-
-  /// Winding number of a point off the surface: ≥ 1 inside.
-  virtual int winding(const Eigen::Vector3d& p) const = 0;
-
-  virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< holds the whole solid
+/// What of a mesh bounds its solid.
+enum class Bounding {
+  all,     ///< all triangles
+  shells,  ///< some of them, shell by shell: others lie within it
+  parts    ///< parts of them: they meet each other
 };
 
-/// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
-/// in the solid that packing asked is not repeated here. Immutable.
-class CheckSurface final : public CheckedSolid {
+/// The surface by itself, or what of its triangles bounds the solid shell by shell.
+CheckedMesh boundary_of(const CheckedMesh& surface, Bounding bounding);
+
+/// `kept` and the solid's boundary lie within `error` of each other, unit frame. `what`: its name.
+std::vector<Invariant> check_near(const std::string& what, const CheckedMesh& kept,
+                                  const CheckedMesh& boundary, double error, Bounding bounding);
+
+/// The surface of an asset that has one, against the mesh and by itself: closed, near the solid's,
+/// its balls and its cells.
+std::vector<Invariant> check_surface(const AssetHeader& asset, const CheckedMesh& mesh,
+                                     Bounding bounding);
+
+/// The triangles of a surface by block and lane.
+class SurfaceTriangles {
  public:
-  using Corners = std::array<Eigen::Vector3d, 3>;
+  SurfaceTriangles(const AssetHeader& asset, const SurfaceHeader& surface)
+      : blocks_(at<SurfaceBlock>(asset, surface.level[0].blocks)), count_(surface.level[0].count) {}
 
-  CheckSurface(const ClosedMesh& mesh, const UnitFrame& frame);
-  /// Of triangles in the unit frame; at least one.
-  explicit CheckSurface(std::vector<Corners> triangles);
-
-  /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
-  double distance(const Eigen::Vector3d& p, double limit) const override;
-
-  /// The nearest triangle, as an index of triangles(), and its distance, unit frame.
-  std::pair<double, std::uint32_t> nearest(const Eigen::Vector3d& p) const;
-
-  /// In an order of its own.
-  const std::vector<Corners>& triangles() const { return triangles_; }
-
-  /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
-  /// along; where rounding leaves a sign open, by the sum of all solid angles.
-  int winding(const Eigen::Vector3d& p) const override;
-
-  const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
+  std::size_t blocks() const { return count_; }
+  std::uint32_t lanes(std::size_t block) const { return blocks_[block].triangles; }
+  CheckedMesh::Corners corners(std::size_t block, std::uint32_t lane) const {
+    CheckedMesh::Corners out;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t v = blocks_[block].corner[k][lane];
+      out[k] = {blocks_[block].x[v], blocks_[block].y[v], blocks_[block].z[v]};
+    }
+    return out;
+  }
+  std::vector<CheckedMesh::Corners> all() const {
+    std::vector<CheckedMesh::Corners> out;
+    for (std::size_t b = 0; b < count_; ++b)
+      for (std::uint32_t l = 0; l < lanes(b); ++l) out.push_back(corners(b, l));
+    return out;
+  }
 
  private:
-  struct Node {
-    Eigen::AlignedBox3d box;
-    std::uint32_t begin = 0, end = 0;  ///< triangles
-    std::uint32_t right = 0;           ///< second child; the first is the next node; 0 at a leaf
-  };
-
-  /// `best`: squared distance beyond which nothing is of interest; becomes the least. The triangle
-  /// stays where nothing is nearer.
-  void search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const;
-  void build(std::uint32_t begin, std::uint32_t end);
-  int winding_by_solid_angle(const Eigen::Vector3d& p) const;
-
-  std::vector<Corners> triangles_;
-  std::vector<Node> nodes_;
-  Eigen::AlignedBox3d bounds_;
+  const SurfaceBlock* blocks_;
+  std::size_t count_;
 };
 
-/// Unit frame, squared.
-double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckSurface::Corners& t);
+/// Cells hold what meets them, and their bits are true. `solid`: the boundary of the solid.
+std::vector<Invariant> check_surface_cells(const AssetHeader& asset, const SurfaceHeader& surface,
+                                           const CheckedMesh& of_surface, const CheckedMesh& solid);
+
+/// The mesh of an asset that has one, against the mesh that was baked and by itself: its triangles
+/// or its error, closed, its blocks, neighbours, shells and boxes.
+///
+/// `closed`: what was baked; `surface`: the same in the unit frame, `frame`.
+std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& closed,
+                                       const UnitFrame& frame, const CheckedMesh& surface,
+                                       Bounding bounding);
 
 }  // namespace ist

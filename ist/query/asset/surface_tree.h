@@ -25,7 +25,7 @@ class NarrowArray {
   const std::uint32_t* four_;
 };
 
-/// The field of an asset with its offsets resolved: the surface as a tree of balls over blocks of
+/// The surface of an asset with its offsets resolved: a tree of balls over blocks of
 /// triangles, and the grid that tells inside from outside. All in the unit frame.
 ///
 /// Lane l of block b at level k + 1 is a ball around the triangles below block 16 b + l of level k.
@@ -41,17 +41,17 @@ struct SurfaceTree {
     std::uint32_t count = 0;  ///< blocks at this level, level 0 included
   };
 
-  SurfaceTree(const AssetHeader& asset, const FieldHeader& field) noexcept
-      : header(&field),
-        top(static_cast<int>(field.level_count) - 1),
-        blocks(at<SurfaceBlock>(asset, field.level[0].blocks)),
-        brick_index(at<std::uint32_t>(asset, field.brick_index)),
-        bricks(at<CellBrick>(asset, field.brick_data)),
-        cell_ends(asset, field.cell_ends, field.list_bytes),
-        cell_triangles(asset, field.cell_triangles, field.list_bytes) {
-    level[0].count = field.level[0].count;
+  SurfaceTree(const AssetHeader& asset, const SurfaceHeader& surface) noexcept
+      : header(&surface),
+        top(static_cast<int>(surface.level_count) - 1),
+        blocks(at<SurfaceBlock>(asset, surface.level[0].blocks)),
+        brick_index(at<std::uint32_t>(asset, surface.brick_index)),
+        bricks(at<CellBrick>(asset, surface.brick_data)),
+        cell_ends(asset, surface.cell_ends, surface.list_bytes),
+        cell_triangles(asset, surface.cell_triangles, surface.list_bytes) {
+    level[0].count = surface.level[0].count;
     for (int i = 1; i <= top; ++i) {
-      const LevelHeader& from = field.level[i];
+      const LevelHeader& from = surface.level[i];
       level[i] = {at<BallBlock>(asset, from.blocks), at<Origin>(asset, from.origins), from.count};
     }
   }
@@ -65,7 +65,7 @@ struct SurfaceTree {
     out[2] = b.z[vertex];
   }
 
-  const FieldHeader* header;
+  const SurfaceHeader* header;
   int top;  ///< the level of one block
   const SurfaceBlock* blocks;
   Level level[kMaxLevels];
@@ -75,10 +75,10 @@ struct SurfaceTree {
   NarrowArray cell_triangles;        ///< [entry_count] 16 · block + lane
 };
 
-/// The field of a view that has one (TreeView::has_field).
+/// The surface of a view that has one (TreeView::has_surface).
 inline SurfaceTree surface_tree(const TreeView& view) noexcept {
   const AssetHeader& asset = view.header();
-  return SurfaceTree(asset, *at<FieldHeader>(asset, asset.field));
+  return SurfaceTree(asset, *at<SurfaceHeader>(asset, asset.surface));
 }
 
 }  // namespace ist

@@ -6,9 +6,9 @@
 
 #include <ist/asset_layout.h>
 #include "query/asset/content_hash.h"
-#include "query/asset/sound_field.h"
 #include "query/asset/sound_mass.h"
 #include "query/asset/sound_mesh.h"
+#include "query/asset/sound_surface.h"
 #include "query/asset/sound_values.h"
 
 namespace ist {
@@ -75,29 +75,29 @@ bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMax
   return std::memcmp(a, b, sizeof(a)) == 0;
 }
 
-/// As sound_sections, of the field, which is laid out too; `expected` has been without one.
-bool sound_field_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
-                          FieldHeader& field) noexcept {
-  if (header.field != expected.file_bytes ||
-      header.file_bytes < expected.file_bytes + sizeof(FieldHeader))
+/// As sound_sections, of the surface, which is laid out too; `expected` has been without one.
+bool sound_surface_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
+                            SurfaceHeader& surface) noexcept {
+  if (header.surface != expected.file_bytes ||
+      header.file_bytes < expected.file_bytes + sizeof(SurfaceHeader))
     return false;
-  const FieldHeader& found = *at<FieldHeader>(header, header.field);
-  if (!sound_field_counts(found)) return false;
-  std::copy_n(found.bricks, 3, field.bricks);
-  field.brick_count = found.brick_count;
-  field.cell_count = found.cell_count;
-  field.entry_count = found.entry_count;
-  field.list_bytes = found.list_bytes;
-  field.level[0].count = found.level[0].count;
-  place_sections(expected, details, &field);
-  return field.level_count == found.level_count && same_levels(field.level, found.level) &&
-         field.brick_index == found.brick_index && field.brick_data == found.brick_data &&
-         field.cell_ends == found.cell_ends && field.cell_triangles == found.cell_triangles;
+  const SurfaceHeader& found = *at<SurfaceHeader>(header, header.surface);
+  if (!sound_surface_counts(found)) return false;
+  std::copy_n(found.bricks, 3, surface.bricks);
+  surface.brick_count = found.brick_count;
+  surface.cell_count = found.cell_count;
+  surface.entry_count = found.entry_count;
+  surface.list_bytes = found.list_bytes;
+  surface.level[0].count = found.level[0].count;
+  place_sections(expected, details, &surface);
+  return surface.level_count == found.level_count && same_levels(surface.level, found.level) &&
+         surface.brick_index == found.brick_index && surface.brick_data == found.brick_data &&
+         surface.cell_ends == found.cell_ends && surface.cell_triangles == found.cell_triangles;
 }
 
-/// As sound_field_sections, of the mesh; `field`: laid out before it, null if there is none.
+/// As sound_surface_sections, of the mesh; `surface`: laid out before it, null if there is none.
 bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
-                         FieldHeader* field) noexcept {
+                         SurfaceHeader* surface) noexcept {
   if (header.mesh != expected.file_bytes ||
       header.file_bytes < expected.file_bytes + sizeof(MeshHeader))
     return false;
@@ -108,7 +108,7 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, Detai
   mesh.shell_count = found.shell_count;
   mesh.neighbour_count = found.neighbour_count;
   mesh.level[0].count = found.level[0].count;
-  place_sections(expected, details, field, &mesh);
+  place_sections(expected, details, surface, &mesh);
   return mesh.level_count == found.level_count && same_levels(mesh.level, found.level) &&
          mesh.vertices == found.vertices && mesh.shells == found.shells &&
          mesh.neighbours == found.neighbours;
@@ -117,12 +117,12 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, Detai
 /// An asset holds spheres, or a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
   if (header.sphere_count == 0)
-    return header.mesh != 0 && header.field == 0 && header.detail_count == 0;
+    return header.mesh != 0 && header.surface == 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&
          detail_spheres(header.sphere_count, header.detail_count) >= 1;
 }
 
-/// Offsets and counts are a function of the counts of spheres and details and those of the field
+/// Offsets and counts are a function of the counts of spheres and details and those of the surface
 /// and the mesh: nothing else is accepted.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (!sound_counts(header)) return false;
@@ -136,10 +136,11 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
            a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
            same_levels(a.level, b.level);
   };
-  FieldHeader field;
-  if (header.field != 0 && !sound_field_sections(header, expected, details, field)) return false;
+  SurfaceHeader surface;
+  if (header.surface != 0 && !sound_surface_sections(header, expected, details, surface))
+    return false;
   if (header.mesh != 0 &&
-      !sound_mesh_sections(header, expected, details, header.field != 0 ? &field : nullptr))
+      !sound_mesh_sections(header, expected, details, header.surface != 0 ? &surface : nullptr))
     return false;
   if (expected.file_bytes != bytes || expected.details != header.details) return false;
   const DetailLevel* const found = at<DetailLevel>(header, header.details);
@@ -174,7 +175,7 @@ bool sound_values(const AssetHeader& header) noexcept {
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
   if (!is_finite_sum(header.measured_error) || header.worst_partner >= kTrialPartners) return false;
-  if (header.field != 0 && !sound_field(header, *at<FieldHeader>(header, header.field)))
+  if (header.surface != 0 && !sound_surface(header, *at<SurfaceHeader>(header, header.surface)))
     return false;
   if (!is_finite_sum(header.counted_twice) || !sound_state(header)) return false;
   if (header.mesh != 0 && !sound_mesh(header, *at<MeshHeader>(header, header.mesh))) return false;
@@ -229,16 +230,16 @@ double TreeView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
 }
 
-bool TreeView::has_field() const noexcept { return header_ != nullptr && header_->field != 0; }
+bool TreeView::has_surface() const noexcept { return header_ != nullptr && header_->surface != 0; }
 
-double TreeView::field_error() const noexcept {
-  return has_field()
-             ? std::ldexp(at<FieldHeader>(*header_, header_->field)->error, header_->exponent)
+double TreeView::surface_error() const noexcept {
+  return has_surface()
+             ? std::ldexp(at<SurfaceHeader>(*header_, header_->surface)->error, header_->exponent)
              : 0;
 }
 
-std::uint32_t TreeView::field_triangles() const noexcept {
-  return has_field() ? at<FieldHeader>(*header_, header_->field)->triangle_count : 0;
+std::uint32_t TreeView::surface_triangles() const noexcept {
+  return has_surface() ? at<SurfaceHeader>(*header_, header_->surface)->triangle_count : 0;
 }
 
 bool TreeView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }

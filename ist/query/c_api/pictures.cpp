@@ -147,8 +147,8 @@ ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface
     return IST_NULL_POINTER;
   ist::TreeView view;
   status = view_of(tree, view);
-  if (status == IST_OK && (view.has_field() || view.has_mesh()))
-    (view.has_field() ? get_surface : get_mesh)(view, *surface);
+  if (status == IST_OK && (view.has_surface() || view.has_mesh()))
+    (view.has_surface() ? get_surface : get_mesh)(view, *surface);
   return status;
 }
 

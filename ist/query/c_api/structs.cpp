@@ -5,10 +5,10 @@ ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& 
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
   if (given->measure < IST_MATCHED || given->measure > IST_EXACT ||
-      given->field < IST_FIELD_AUTOMATIC || given->field > IST_FIELD_ALWAYS)
+      given->surface < IST_SURFACE_AUTOMATIC || given->surface > IST_SURFACE_ALWAYS)
     return IST_INVALID_INPUT;
   settings.measure = static_cast<Measure>(given->measure);
-  settings.field = static_cast<FieldUse>(given->field);
+  settings.surface = static_cast<SurfaceUse>(given->surface);
   settings.pair_budget = given->pair_budget;
   settings.max_visits = given->max_visits;
   settings.relative_error = given->relative_error;

@@ -98,17 +98,17 @@ class DetailQueries {
   }
 
  private:
-  PairMethod method_of(const DetailPair& pair, FieldUse use) const noexcept {
+  PairMethod method_of(const DetailPair& pair, SurfaceUse use) const noexcept {
     return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
                        pose_, use);
   }
 
   /// The exact measure stands in where surfaces would help out lenses.
-  FieldUse use_of(const DetailPair& pair) const noexcept {
-    return has_exact_ && settings_.field == FieldUse::automatic &&
-                   method_of(pair, FieldUse::automatic).lenses
-               ? FieldUse::never
-               : settings_.field;
+  SurfaceUse use_of(const DetailPair& pair) const noexcept {
+    return has_exact_ && settings_.surface == SurfaceUse::automatic &&
+                   method_of(pair, SurfaceUse::automatic).lenses
+               ? SurfaceUse::never
+               : settings_.surface;
   }
 
   PairMethod method_of(const DetailPair& pair) const noexcept {

@@ -12,7 +12,7 @@ namespace ist {
 class LargestPart {
  public:
   /// A pair of levels, in place of PairOverlap::by().
-  virtual Penetration level(const DetailPair& pair, FieldUse use,
+  virtual Penetration level(const DetailPair& pair, SurfaceUse use,
                             const DescentLimits& limits) noexcept = 0;
   /// The exact measure, in place of penetration().
   virtual Penetration exact(const PenetrationSettings& settings) noexcept = 0;

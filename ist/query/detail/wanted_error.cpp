@@ -91,7 +91,7 @@ WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const Relativ
     const TreeHeader& tree_b = matched_tree(asset_b, chain[i].b);
     const double from_a = needed_a * solid_volume(asset_a, tree_a);
     const double from_b = needed_b * solid_volume(asset_b, tree_b) * scale3;
-    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.field);
+    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.surface);
     double& from = from_[i];
     from = method.lenses     ? std::sqrt((from_a * from_a + from_b * from_b) / 2)
            : method.b_probes ? from_b

@@ -36,16 +36,16 @@ double grain(const TreeHeader& tree, const AssetHeader& asset) {
   return tree.mean_radius / covered_part(asset);
 }
 
-/// About how many triangles of a field a ball on its surface meets: those that a disc covers, and
+/// About how many triangles of a surface a ball on it meets: those that a disc covers, and
 /// those at its rim.
 double triangles_met(const AssetHeader& asset, double radius) {
-  const FieldHeader& field = *at<FieldHeader>(asset, asset.field);
+  const SurfaceHeader& surface = *at<SurfaceHeader>(asset, asset.surface);
   double side[3];
   for (int k = 0; k < 3; ++k)
-    side[k] = field.cell * static_cast<double>(kBrickWidth * field.bricks[k]);
+    side[k] = surface.cell * static_cast<double>(kBrickWidth * surface.bricks[k]);
   // About the surface of a solid in such a box.
   const double area = side[0] * side[1] + side[1] * side[2] + side[2] * side[0];
-  const double covered = std::numbers::pi * (radius * radius) * field.triangle_count / area;
+  const double covered = std::numbers::pi * (radius * radius) * surface.triangle_count / area;
   const double root = 1 + 1.6 * std::sqrt(covered);
   return root * root;
 }
@@ -53,16 +53,17 @@ double triangles_met(const AssetHeader& asset, double radius) {
 }  // namespace
 
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
-                       const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept {
+                       const TreeHeader& tree_b, const RelativePose& pose,
+                       SurfaceUse use) noexcept {
   PairMethod method;
   const double grain_a = grain(tree_a, a.tree.header());
   const double grain_b = grain(tree_b, b.tree.header()) * pose.a_from_b.scale;
   method.b_probes = grain_b <= grain_a;
   const double coarse = std::max(grain_a, grain_b);
   const double ratio = coarse / std::min(grain_a, grain_b);
-  const bool has_field = (method.b_probes ? a : b).tree.header().field != 0;
-  if (use == FieldUse::never || !has_field) return method;
-  if (use == FieldUse::always || ratio >= kUnlike) {
+  const bool has_surface = (method.b_probes ? a : b).tree.header().surface != 0;
+  if (use == SurfaceUse::never || !has_surface) return method;
+  if (use == SurfaceUse::always || ratio >= kUnlike) {
     method.surface = true;
     method.lenses = false;
     return method;
@@ -94,7 +95,7 @@ PairFit pair_fit(const PlacedTree& a, const PlacedTree& b) noexcept {
   fit.grain_b = placed_grain(b);
   fit.a_is_coarser = fit.grain_b <= fit.grain_a;
   fit.ratio = std::max(fit.grain_a, fit.grain_b) / std::min(fit.grain_a, fit.grain_b);
-  fit.has_surface = (fit.a_is_coarser ? a : b).tree.has_field();
+  fit.has_surface = (fit.a_is_coarser ? a : b).tree.has_surface();
   fit.needs_surface = fit.ratio >= kUnlike;
   return fit;
 }

@@ -29,11 +29,11 @@ inline double covered_part(const AssetHeader& asset) noexcept {
 }
 
 PairMethod pair_method(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
-                       const TreeHeader& tree_b, const RelativePose& pose, FieldUse use) noexcept;
+                       const TreeHeader& tree_b, const RelativePose& pose, SurfaceUse use) noexcept;
 
 /// Whether a surface must be used that the coarser asset does not hold.
-inline bool lacks_surface(const PairMethod& method, FieldUse use) noexcept {
-  return use == FieldUse::always && method.lenses;
+inline bool lacks_surface(const PairMethod& method, SurfaceUse use) noexcept {
+  return use == SurfaceUse::always && method.lenses;
 }
 
 /// The surface's weight by what lenses say, A's unit frame, and its slope by that. The finished

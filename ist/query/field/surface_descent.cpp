@@ -34,11 +34,11 @@ TreeHeader ball_header(const SurfaceTree& surface) {
   TreeHeader header;
   header.sphere_count = surface.level[0].count;
   header.level_count = static_cast<std::uint32_t>(surface.top);
-  const FieldHeader& field = *surface.header;
+  const SurfaceHeader& grid = *surface.header;
   double square = 0;
   for (int k = 0; k < 3; ++k) {
-    const double half = 0.5 * field.cell * static_cast<double>(kBrickWidth * field.bricks[k]);
-    header.root[k] = field.low[k] + half;
+    const double half = 0.5 * grid.cell * static_cast<double>(kBrickWidth * grid.bricks[k]);
+    header.root[k] = grid.low[k] + half;
     square += half * half;
   }
   header.root[3] = std::sqrt(square);
@@ -377,7 +377,7 @@ void SurfaceDescent::leave_both(std::size_t from) noexcept {
 }
 
 Penetration SurfaceDescent::penetration() const noexcept {
-  // Both surfaces lie within the field's error of each other; centres are rounded too.
+  // Both surfaces lie within the stored error of each other; centres are rounded too.
   const double off =
       surface_.header->error +
       distance_error(Precision::float64, span(balls_.root(), probes_.root(), pose_.a_from_b));

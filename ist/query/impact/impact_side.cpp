@@ -72,7 +72,7 @@ class PartSearch {
 
 ImpactSide::ImpactSide(const TreeView& view) noexcept
     : spheres_(sphere_tree(view, Measure::inner)) {
-  if (!view.has_field()) return;
+  if (!view.has_surface()) return;
   surface_.emplace(surface_tree(view));
   error_ = surface_->header->error;
 }

@@ -41,7 +41,7 @@ MovingBody body(const Pose& pose, double scale, const Motion& motion, const Asse
     body.centre[k] = std::ldexp(motion.about[k] - asset->centre[k], -asset->exponent);
   const TreeHeader& tree = asset->inner_tree;
   const Vector3d middle(tree.root[0], tree.root[1], tree.root[2]);
-  const double error = asset->field != 0 ? at<FieldHeader>(*asset, asset->field)->error : 0;
+  const double error = asset->surface != 0 ? at<SurfaceHeader>(*asset, asset->surface)->error : 0;
   body.reach =
       body.unit * ((middle - body.centre).norm() + std::max(tree.root[3], tree.root_cover) + error);
   return body;

@@ -86,7 +86,7 @@ test('what an asset holds', () => {
   const info = asset.info();
   assert.equal(info.name, 'bolt.ist');
   assert.equal(info.spheres, info.details[0]);
-  assert.ok(info.hasField && info.details.length > 1);
+  assert.ok(info.hasSurface && info.details.length > 1);
   const {lower, upper} = asset.bounds();
   const mass = asset.massProperties();
   assert.equal(mass.volume, info.volume);
@@ -146,7 +146,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
 test('the stored surface is closed and holds the volume', () => {
   const asset = ist.Asset.from(bytesA);
   const {positions, triangles} = asset.surface(), info = asset.info();
-  assert.equal(triangles.length, 3 * info.fieldTriangles);
+  assert.equal(triangles.length, 3 * info.surfaceTriangles);
   const edges = new Set();
   let six = 0;
   for (let t = 0; t < triangles.length; t += 3) {
@@ -186,7 +186,7 @@ test('patches and lenses add up', () => {
   assert.equal(ist.overlap(a, b, pose), 'yes');
 
   const lenses = ist.lenses(a, b, pose);
-  const summed = ist.penetration(a, b, pose, {field: 'never'});
+  const summed = ist.penetration(a, b, pose, {surface: 'never'});
   assert.equal(lenses.total, summed.spherePairs);
   const spheres = a.spheres();
   for (let i = 0; i < lenses.count; ++i) {
@@ -290,7 +290,7 @@ test('fields', () => {
 test('flat faces: what protrudes is taken out', () => {
   const a = ist.Asset.from(readFileSync(baked('cube', 1000))), b = a;
   const gap = a.info().protrusion / 2, {lower, upper} = a.bounds();
-  const pose = {translation: [0, 0, upper[2] - lower[2] + gap]}, options = {field: 'never'};
+  const pose = {translation: [0, 0, upper[2] - lower[2] + gap]}, options = {surface: 'never'};
   const whole = ist.penetration(a, b, pose, options);
   assert.ok(whole.volume > 0, 'spheres stick out across the gap');
   const clean = ist.withoutProtrusion(whole, a, b, pose);
@@ -409,7 +409,7 @@ test('what is wrong is said', () => {
   assert.match(sentence(ask({translation: ['1', 0, 0]})), /not a number/);
   assert.match(sentence(ask({scale: 0})), /scale is 0; it must be > 0/);
   assert.match(sentence(ask({}, {measure: 'outer'})), /measure is outer/);
-  assert.match(sentence(ask({}, {field: 'sometimes'})), /automatic, never, always/);
+  assert.match(sentence(ask({}, {surface: 'sometimes'})), /automatic, never, always/);
   assert.match(sentence(ask({}, {pairBudget: -1})), /whole number/);
   assert.match(sentence(() => ist.penetration({}, b, {})), /solid A must be an Asset or a Field/);
   assert.match(

@@ -52,12 +52,12 @@ function moreQueries(ist, a, b, halfSpace) {
   return {
     'without protrusion': {
       ask: (pose) =>
-          ist.withoutProtrusion(ist.penetration(a, b, pose, {field: 'never'}), a, b, pose),
+          ist.withoutProtrusion(ist.penetration(a, b, pose, {surface: 'never'}), a, b, pose),
       bits: penetrationBits,
     },
     'patches without protrusion': {
       ask: (pose) => {
-        const options = {field: 'never', maxPatches: 16};
+        const options = {surface: 'never', maxPatches: 16};
         const found = ist.contactPatches(a, b, pose, options);
         return ist.patchesWithoutProtrusion(found, a, b, pose, options);
       },
@@ -134,8 +134,8 @@ export function queries(ist, a, b) {
         forOutline = {maxPatches: 16, into: undefined};
   return {
     'matched': penetrationOf(a),
-    'lenses alone': penetrationOf(a, {field: 'never'}),
-    'surface alone': penetrationOf(a, {field: 'always'}),
+    'lenses alone': penetrationOf(a, {surface: 'never'}),
+    'surface alone': penetrationOf(a, {surface: 'always'}),
     'inner': penetrationOf(a, {measure: 'inner'}),
     'budget': penetrationOf(a, {pairBudget: 200, maxVisits: 300}),
     'half-space': penetrationOf(halfSpace),

@@ -33,7 +33,7 @@ export class Overlap {
   /** Takes two solids; of those that hold no surface only an outline is drawn. */
   hold(a, b) {
     for (const {columns} of this.skins) columns?.dispose();
-    const drawn = a.info.hasField && b.info.hasField;
+    const drawn = a.info.hasSurface && b.info.hasSurface;
     [[a, b], [b, a]].forEach(([own, other], k) => {
       const skin = this.skins[k], {mesh, uniforms} = skin;
       skin.columns = undefined;

@@ -71,7 +71,7 @@ export class Solid {
 
   show(mode, level) {
     this.asked = {mode, level};
-    if (mode === 'surface' && !this.info.hasField) mode = 'spheres';
+    if (mode === 'surface' && !this.info.hasSurface) mode = 'spheres';
     const last = Math.max(0, this.levels(mode).length - 1);
     this.shown = {mode, level: Math.min(level, last)};
     this.draw();

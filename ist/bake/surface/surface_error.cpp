@@ -1,4 +1,4 @@
-#include "bake/field/field_error.h"
+#include "bake/surface/surface_error.h"
 
 #include <tbb/parallel_for.h>
 
@@ -10,7 +10,7 @@
 #include <limits>
 #include <span>
 
-#include "bake/field/hull.h"
+#include "bake/surface/hull.h"
 #include "mesh/exact_closest_point.h"
 #include "mesh/exact_triangle.h"
 
@@ -35,7 +35,7 @@ constexpr double kPartSlack = 1.02;   // likewise, of one part
 
 using HullPoint = std::array<double, 3>;
 
-/// A part of a field's triangle.
+/// A part of a surface's triangle.
 struct HullPart {
   HullPoint corner[3];
 
@@ -50,10 +50,10 @@ struct HullPart {
   }
 };
 
-/// The field's surface within a bound of the mesh's.
-class FieldNearMesh {
+/// The surface within a bound of the mesh's.
+class SurfaceNearMesh {
  public:
-  explicit FieldNearMesh(const MeshView& mesh) : mesh_(mesh), cuts_(mesh) {}
+  explicit SurfaceNearMesh(const MeshView& mesh) : mesh_(mesh), cuts_(mesh) {}
 
   /// A bound on the distance of all points of the part, at most `target` where that can be shown.
   /// `reach`: no point of the mesh nearest to the centre is further than this.
@@ -110,11 +110,11 @@ class FieldNearMesh {
   const HullCuts cuts_;
 };
 
-HullPart part_of(const FieldMesh& field, std::size_t triangle) {
+HullPart part_of(const FloatMesh& surface, std::size_t triangle) {
   HullPart part;
   for (std::size_t i = 0; i < 3; ++i)
     for (std::size_t k = 0; k < 3; ++k)
-      part.corner[i][k] = field.vertices[field.triangles[triangle][i]][k];
+      part.corner[i][k] = surface.vertices[surface.triangles[triangle][i]][k];
   return part;
 }
 
@@ -165,15 +165,15 @@ std::array<SweptError::Prism, 2> SweptError::Prism::halves() const {
   return out;
 }
 
-SweptError::SweptError(const MeshView& mesh, const Clustered& field,
-                       const FieldHierarchy& hierarchy)
+SweptError::SweptError(const MeshView& mesh, const Clustered& surface,
+                       const SurfaceHierarchy& hierarchy)
     : mesh_(mesh),
-      field_(field),
+      surface_(surface),
       hierarchy_(hierarchy),
       cuts_(hierarchy.view(), frames_of(hierarchy.view())),
-      stars_(triangles_at_vertices(field.mesh.vertices.size(), field.mesh.triangles)),
+      stars_(triangles_at_vertices(surface.mesh.vertices.size(), surface.mesh.triangles)),
       near_(mesh.vertex_count, kNoTriangle),
-      last_near_(field.vertex_of.size(), kNoTriangle) {}
+      last_near_(surface.vertex_of.size(), kNoTriangle) {}
 
 double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) {
   const double* x = mesh_.vertices + 3 * std::size_t{vertex};
@@ -187,10 +187,10 @@ double SweptError::at_vertex(std::uint32_t vertex, double known, double enough) 
     return d2 <= known2;
   };
   // What was near to the vertex before is, more often than not.
-  const std::atomic_ref<std::uint32_t> last(last_near_[field_.cluster_of[vertex]]);
+  const std::atomic_ref<std::uint32_t> last(last_near_[surface_.cluster_of[vertex]]);
   const std::uint32_t first = last.load(std::memory_order_relaxed);
   if (first != kNoTriangle && is_near(first)) return known;
-  for (const std::uint32_t t : stars_[field_.image(vertex)])
+  for (const std::uint32_t t : stars_[surface_.image(vertex)])
     if (t != first && is_near(t)) {
       last.store(t, std::memory_order_relaxed);
       return known;
@@ -204,9 +204,9 @@ bool SweptError::is_within(std::uint32_t triangle, double distance) const {
   const double limit2 = distance * distance;
   const std::uint32_t* const vertices = mesh_.triangles + 3 * std::size_t{triangle};
   std::uint32_t to[3];
-  for (int i = 0; i < 3; ++i) to[i] = field_.image(vertices[i]);
+  for (int i = 0; i < 3; ++i) to[i] = surface_.image(vertices[i]);
   const auto holds_all = [&](std::uint32_t t) {
-    const FieldMesh::Triangle& corners = field_.mesh.triangles[t];
+    const FloatMesh::Triangle& corners = surface_.mesh.triangles[t];
     for (int i = 0; i < 3; ++i) {
       const double* x = mesh_.vertices + 3 * std::size_t{vertices[i]};
       if (distance2(t, {x[0], x[1], x[2]}) > limit2) return false;
@@ -233,11 +233,11 @@ bool SweptError::is_within(std::uint32_t triangle, double distance) const {
   return false;
 }
 
-double SweptError::farthest2(std::uint32_t field_triangle, const Prism& prism,
+double SweptError::farthest2(std::uint32_t surface_triangle, const Prism& prism,
                              double limit2) const {
   double most2 = 0;
   for (const Point& p : prism.corner) {
-    most2 = std::max(most2, distance2(field_triangle, p));
+    most2 = std::max(most2, distance2(surface_triangle, p));
     if (most2 > limit2) break;
   }
   return most2;
@@ -271,7 +271,7 @@ double SweptError::bound(const Prism& prism, std::span<const std::uint32_t> cand
         cuts_.is_within(Hull(prism.corner), candidates, target, {c, std::sqrt(least2)}))
       return target;
   }
-  // The field may have another triangle that is nearer.
+  // The surface may have another triangle that is nearer.
   const ClosestPoint closest = exact_closest_point(
       hierarchy_.view(), {c[0], c[1], c[2]}, nearest != kNoTriangle ? std::sqrt(least2) : kFar);
   const double distance = closest.distance;
@@ -298,12 +298,12 @@ double SweptError::bound(std::uint32_t triangle, double target, bool one_may_do)
   std::vector<std::uint32_t> candidates;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint32_t v = mesh_.triangles[3 * std::size_t{triangle} + i];
-    const std::uint32_t to = field_.image(v);
+    const std::uint32_t to = surface_.image(v);
     std::copy_n(mesh_.vertices + 3 * std::size_t{v}, 3, prism.corner[i].begin());
     prism.corner[i + 3] = place_of(to);
     bool seen = false;
     for (std::size_t j = 0; j < i; ++j)
-      seen |= field_.image(mesh_.triangles[3 * std::size_t{triangle} + j]) == to;
+      seen |= surface_.image(mesh_.triangles[3 * std::size_t{triangle} + j]) == to;
     if (!seen) candidates.insert(candidates.end(), stars_[to].begin(), stars_[to].end());
   }
   return bound(prism, candidates, target, one_may_do);
@@ -325,56 +325,57 @@ double KnownDistances::of(const HullPoint& p) {
   return distance;
 }
 
-FieldError::FieldError(const MeshView& mesh, KnownDistances& from_mesh, const Clustered& field,
-                       const FieldHierarchy& hierarchy, const WorkStop& stop)
+SurfaceError::SurfaceError(const MeshView& mesh, KnownDistances& from_mesh,
+                           const Clustered& surface, const SurfaceHierarchy& hierarchy,
+                           const WorkStop& stop)
     : mesh_(mesh),
-      field_(field),
+      surface_(surface),
       stop_(stop),
-      swept_(mesh, field, hierarchy),
-      middle_(field.mesh.triangles.size()) {
+      swept_(mesh, surface, hierarchy),
+      middle_(surface.mesh.triangles.size()) {
   tbb::parallel_for(std::size_t{0}, middle_.size(), [&](std::size_t t) {
     stop_.look();
-    middle_[t] = from_mesh.of(part_of(field.mesh, t).centre());
+    middle_[t] = from_mesh.of(part_of(surface.mesh, t).centre());
   });
 }
 
-std::vector<double> FieldError::by_cluster(const std::vector<double>& of_triangle) const {
-  std::vector<double> around(field_.mesh.vertices.size());
+std::vector<double> SurfaceError::by_cluster(const std::vector<double>& of_triangle) const {
+  std::vector<double> around(surface_.mesh.vertices.size());
   for (std::size_t t = 0; t < of_triangle.size(); ++t)
-    for (const std::uint32_t v : field_.mesh.triangles[t])
+    for (const std::uint32_t v : surface_.mesh.triangles[t])
       around[v] = std::max(around[v], of_triangle[t]);
-  std::vector<double> out(field_.vertex_of.size());
-  for (std::size_t c = 0; c < out.size(); ++c) out[c] = around[field_.vertex_of[c]];
+  std::vector<double> out(surface_.vertex_of.size());
+  for (std::size_t c = 0; c < out.size(); ++c) out[c] = around[surface_.vertex_of[c]];
   return out;
 }
 
-std::vector<double> FieldError::seen(double enough) {
+std::vector<double> SurfaceError::seen(double enough) {
   std::vector<double> seen = by_cluster(middle_);
   tbb::parallel_for(std::uint32_t{0}, mesh_.vertex_count, [&](std::uint32_t v) {
     stop_.look();
-    const std::atomic_ref<double> most(seen[field_.cluster_of[v]]);
+    const std::atomic_ref<double> most(seen[surface_.cluster_of[v]]);
     raise(most, swept_.at_vertex(v, most.load(std::memory_order_relaxed), enough));
   });
   return seen;
 }
 
-FieldError::Proven FieldError::proven(double seen, double enough) const {
-  const FieldNearMesh near_mesh(mesh_);
+SurfaceError::Proven SurfaceError::proven(double seen, double enough) const {
+  const SurfaceNearMesh near_mesh(mesh_);
   const double target = kTrialSlack * seen + kDistanceRounding;
   // What lies within the target at first sight is passed over where something else does not.
   std::vector<std::uint8_t> passed_over(mesh_.triangle_count);
-  std::vector<double> of_field(middle_.size());
-  tbb::parallel_for(std::size_t{0}, of_field.size(), [&](std::size_t t) {
+  std::vector<double> of_surface(middle_.size());
+  tbb::parallel_for(std::size_t{0}, of_surface.size(), [&](std::size_t t) {
     stop_.look();
-    of_field[t] = near_mesh.bound(part_of(field_.mesh, t), target, middle_[t]);
+    of_surface[t] = near_mesh.bound(part_of(surface_.mesh, t), target, middle_[t]);
   });
   Proven out;
-  out.at_cluster = by_cluster(of_field);
+  out.at_cluster = by_cluster(of_surface);
   const auto bound_swept = [&](std::uint32_t t, bool one_may_do) {
     const double bound = swept_.bound(t, target, one_may_do);
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t v = mesh_.triangles[3 * std::size_t{t} + k];
-      raise(std::atomic_ref<double>(out.at_cluster[field_.cluster_of[v]]), bound);
+      raise(std::atomic_ref<double>(out.at_cluster[surface_.cluster_of[v]]), bound);
     }
   };
   const auto most = [&] { return *std::max_element(out.at_cluster.begin(), out.at_cluster.end()); };

@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
-#include "bake/field/field_hierarchy.h"
-#include "bake/field/hull_cuts.h"
-#include "bake/field/vertex_clusters.h"
+#include "bake/surface/hull_cuts.h"
+#include "bake/surface/surface_hierarchy.h"
+#include "bake/surface/vertex_clusters.h"
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
@@ -18,12 +18,12 @@
 
 namespace ist {
 
-/// How far from a field's surface the triangles of a mesh come while their vertices move straight
-/// to their places in the field. Distances in the unit frame, before rounding.
+/// How far from a surface the triangles of a mesh come while their vertices move straight
+/// to their places in the surface. Distances in the unit frame, before rounding.
 class SweptError {
  public:
   /// All must outlive this.
-  SweptError(const MeshView& mesh, const Clustered& field, const FieldHierarchy& hierarchy);
+  SweptError(const MeshView& mesh, const Clustered& surface, const SurfaceHierarchy& hierarchy);
 
   /// Of a used vertex of the mesh where it starts from: exact where above `enough`, else no less;
   /// at most `known` where it is not more. Safe from several threads for different vertices.
@@ -49,29 +49,29 @@ class SweptError {
     std::array<Prism, 2> halves() const;
   };
 
-  double distance2(std::uint32_t field_triangle, const Point& p) const {
-    return closest_in_frame(cuts_.frame(field_triangle), p.data()).distance2;
+  double distance2(std::uint32_t surface_triangle, const Point& p) const {
+    return closest_in_frame(cuts_.frame(surface_triangle), p.data()).distance2;
   }
   /// Farthest corner from a triangle, squared; any value > limit2 once one is further. The distance
   /// to a triangle is convex, so that no point of the hull is further.
-  double farthest2(std::uint32_t field_triangle, const Prism& prism, double limit2) const;
+  double farthest2(std::uint32_t surface_triangle, const Prism& prism, double limit2) const;
   double bound(const Prism& prism, std::span<const std::uint32_t> candidates, double target,
                bool one_may_do) const;
-  Point place_of(std::uint32_t field_vertex) const {
-    const FieldMesh::Vertex& x = field_.mesh.vertices[field_vertex];
+  Point place_of(std::uint32_t surface_vertex) const {
+    const FloatMesh::Vertex& x = surface_.mesh.vertices[surface_vertex];
     return {x[0], x[1], x[2]};
   }
 
   const MeshView& mesh_;
-  const Clustered& field_;
-  const FieldHierarchy& hierarchy_;
-  HullCuts cuts_;                         ///< of the field
-  const ItemGroups<> stars_;              ///< the triangles around each field vertex
+  const Clustered& surface_;
+  const SurfaceHierarchy& hierarchy_;
+  HullCuts cuts_;                         ///< of the surface
+  const ItemGroups<> stars_;              ///< the triangles around each surface vertex
   std::vector<std::uint32_t> near_;       ///< [mesh vertex] a triangle that it is near to, if known
   std::vector<std::uint32_t> last_near_;  ///< [cluster] the last such; a hint alone
 };
 
-/// Distances of points from a mesh, each found once: most triangles of a field stay as they are
+/// Distances of points from a mesh, each found once: most triangles of a surface stay as they are
 /// while a few of its clusters are divided. Safe from several threads.
 class KnownDistances {
  public:
@@ -88,25 +88,25 @@ class KnownDistances {
   tbb::concurrent_unordered_map<std::array<double, 3>, double, Hash> known_;
 };
 
-/// How a field's surface differs from the mesh that it is the image of. Unit frame. Deterministic.
-class FieldError {
+/// How a surface differs from the mesh that it is the image of. Unit frame. Deterministic.
+class SurfaceError {
  public:
-  /// All must outlive this. `mesh` has a hierarchy, `hierarchy` is that of the field's triangles,
+  /// All must outlive this. `mesh` has a hierarchy, `hierarchy` is that of the surface's triangles,
   /// `from_mesh` are distances from the mesh. What is asked of it may be ended by `stop`.
-  FieldError(const MeshView& mesh, KnownDistances& from_mesh, const Clustered& field,
-             const FieldHierarchy& hierarchy, const WorkStop& stop);
+  SurfaceError(const MeshView& mesh, KnownDistances& from_mesh, const Clustered& surface,
+               const SurfaceHierarchy& hierarchy, const WorkStop& stop);
 
-  /// What is seen at samples, by cluster: how far a vertex of it is from the field, or the middle
-  /// of a field's triangle about its place from the mesh. Exact where above `enough`.
+  /// What is seen at samples, by cluster: how far a vertex of it is from the surface, or the middle
+  /// of a surface's triangle about its place from the mesh. Exact where above `enough`.
   std::vector<double> seen(double enough);
 
   /// A bound e such that
-  /// - either surface lies within e of the other, and
-  /// - the winding number is the same about both at every point further than e from the field's.
+  /// - either of the two lies within e of the other, and
+  /// - the winding number is the same about both at every point further than e from the surface's.
   ///
-  /// The second is proven by moving every vertex of the mesh straight to its place in the field:
+  /// The second is proven by moving every vertex of the mesh straight to its place in the surface:
   /// the triangles on their way sweep all points at which the winding numbers differ, and lie
-  /// within e of the field all along. Rounding is included. `seen`: the largest error seen.
+  /// within e of the surface all along. Rounding is included. `seen`: the largest error seen.
   struct Proven {
     double most = 0;  ///< e
     /// [cluster] What is shown about its vertices; exact where above `enough`.
@@ -115,14 +115,14 @@ class FieldError {
   Proven proven(double seen, double enough) const;
 
  private:
-  /// The largest number of a field's triangle about each cluster's place.
+  /// The largest number of a surface's triangle about each cluster's place.
   std::vector<double> by_cluster(const std::vector<double>& of_triangle) const;
 
   const MeshView& mesh_;
-  const Clustered& field_;
+  const Clustered& surface_;
   const WorkStop& stop_;
   SweptError swept_;
-  std::vector<double> middle_;  ///< [field triangle] its middle's distance from the mesh
+  std::vector<double> middle_;  ///< [surface triangle] its middle's distance from the mesh
 };
 
 }  // namespace ist

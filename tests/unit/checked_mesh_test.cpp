@@ -1,4 +1,4 @@
-#include "bake/check/check_surface.h"
+#include "bake/check/checked_mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace ist {
 namespace {
 
 // Two independent ways to the same answer: what packing asks and what check asks.
-TEST(CheckSurface, AgreesWithTheSolid) {
+TEST(CheckedMesh, AgreesWithTheSolid) {
   const TriangleMesh meshes[] = {
       testing::cube_mesh(), testing::torus_mesh(1.0, 0.4, 40, 20), testing::icosphere_mesh(3),
       testing::overlapping_cubes_mesh(),
@@ -21,7 +21,7 @@ TEST(CheckSurface, AgreesWithTheSolid) {
   for (const TriangleMesh& mesh : meshes) {
     const ClosedMesh closed = testing::closed(mesh, "mesh");
     const MeshSolid solid(closed);
-    const CheckSurface surface(closed, solid.frame());
+    const CheckedMesh surface(closed, solid.frame());
     // Random points, and points of a lattice, which share planes with edges and corners.
     for (int i = 0; i < 4000; ++i) {
       const auto coordinate = [&] {

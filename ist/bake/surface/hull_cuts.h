@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "bake/field/hull.h"
+#include "bake/surface/hull.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
 

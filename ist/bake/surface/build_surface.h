@@ -3,16 +3,16 @@
 #include <optional>
 
 #include "bake/asset/asset_writer.h"
-#include "bake/field/field_mesh.h"
+#include "bake/surface/float_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "stage/work_stop.h"
 
 namespace ist {
 
 /// A surface for queries: as it is asked, and as it will lie in the file.
-struct BuiltField {
-  FieldArrays arrays;
-  FieldMesh mesh;
+struct BuiltSurface {
+  SurfaceArrays arrays;
+  FloatMesh mesh;
   bool own = false;  ///< the solid's own triangles, none of them left out or merged
 };
 
@@ -24,7 +24,7 @@ struct BuiltField {
 /// or half of `max_error`. Throws Error
 /// where floats cannot be as exact as `max_error`, WorkStop::Stopped if `stop` ends it. Same bytes
 /// for any number of threads and on any machine.
-std::optional<BuiltField> build_field(const MeshSolid& solid, double max_error,
-                                      const WorkStop& stop = WorkStop());
+std::optional<BuiltSurface> build_surface(const MeshSolid& solid, double max_error,
+                                          const WorkStop& stop = WorkStop());
 
 }  // namespace ist

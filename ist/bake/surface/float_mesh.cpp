@@ -1,4 +1,4 @@
-#include "bake/field/field_mesh.h"
+#include "bake/surface/float_mesh.h"
 
 #include <tbb/parallel_sort.h>
 
@@ -11,7 +11,7 @@
 namespace ist {
 namespace {
 
-using Triangle = FieldMesh::Triangle;
+using Triangle = FloatMesh::Triangle;
 
 /// Turned so that the lowest corner comes first.
 Triangle lowest_first(const Triangle& t) {
@@ -47,8 +47,8 @@ std::vector<Triangle> reduced(std::vector<Triangle> triangles) {
   return triangles;
 }
 
-FieldMesh in_floats(const MeshView& mesh) {
-  FieldMesh out;
+FloatMesh in_floats(const MeshView& mesh) {
+  FloatMesh out;
   out.vertices.resize(mesh.vertex_count);
   out.triangles.resize(mesh.triangle_count);
   for (std::size_t v = 0; v < out.vertices.size(); ++v)
@@ -59,8 +59,8 @@ FieldMesh in_floats(const MeshView& mesh) {
   return out;
 }
 
-std::vector<std::uint32_t> reduce(FieldMesh& mesh) {
-  for (FieldMesh::Vertex& v : mesh.vertices)
+std::vector<std::uint32_t> reduce(FloatMesh& mesh) {
+  for (FloatMesh::Vertex& v : mesh.vertices)
     for (float& x : v) x += 0.0f;  // one zero only
   std::vector<std::uint32_t> order(mesh.vertices.size());
   std::iota(order.begin(), order.end(), 0u);

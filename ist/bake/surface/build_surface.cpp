@@ -1,4 +1,4 @@
-#include "bake/field/field.h"
+#include "bake/surface/build_surface.h"
 
 #include <ist/error.h>
 #include <tbb/parallel_for.h>
@@ -14,25 +14,25 @@
 #include <vector>
 
 #include "bake/cluster/ball_blocks.h"
-#include "bake/field/field_error.h"
-#include "bake/field/field_hierarchy.h"
-#include "bake/field/field_mesh.h"
-#include "bake/field/sign_grid.h"
-#include "bake/field/solid_surface.h"
-#include "bake/field/surface_area.h"
-#include "bake/field/surface_patches.h"
-#include "bake/field/vertex_clusters.h"
+#include "bake/surface/float_mesh.h"
+#include "bake/surface/sign_grid.h"
+#include "bake/surface/solid_surface.h"
+#include "bake/surface/surface_area.h"
+#include "bake/surface/surface_error.h"
+#include "bake/surface/surface_hierarchy.h"
+#include "bake/surface/surface_patches.h"
+#include "bake/surface/vertex_clusters.h"
 
 namespace ist {
 namespace {
 
 /// A patch as a block.
-SurfaceBlock block_of(const FieldMesh& mesh, const BlockPatch& patch) {
+SurfaceBlock block_of(const FloatMesh& mesh, const BlockPatch& patch) {
   SurfaceBlock block = {};
   block.triangles = static_cast<std::uint32_t>(patch.triangles.size());
   block.vertices = static_cast<std::uint32_t>(patch.vertices.size());
   for (std::size_t v = 0; v < kWidth; ++v) {
-    const FieldMesh::Vertex& x = mesh.vertices[patch.vertices[v < patch.vertices.size() ? v : 0]];
+    const FloatMesh::Vertex& x = mesh.vertices[patch.vertices[v < patch.vertices.size() ? v : 0]];
     block.x[v] = x[0];
     block.y[v] = x[1];
     block.z[v] = x[2];
@@ -43,7 +43,7 @@ SurfaceBlock block_of(const FieldMesh& mesh, const BlockPatch& patch) {
   return block;
 }
 
-std::vector<SurfaceBlock> blocks_of(const FieldMesh& mesh) {
+std::vector<SurfaceBlock> blocks_of(const FloatMesh& mesh) {
   const std::vector<BlockPatch> patches = cut_into_patches(mesh);
   std::vector<SurfaceBlock> blocks(patches.size());
   tbb::parallel_for(std::size_t{0}, blocks.size(),
@@ -81,7 +81,7 @@ Sphere ball_around(std::span<const SurfaceBlock> blocks) {
 /// Cuts the surface into blocks of neighbouring triangles and puts balls around the blocks, level
 /// by level: `blocks` and `levels` of the arrays. Every ball holds the triangles below it for
 /// certain. The mesh must have a triangle.
-void cut_into_blocks(const FieldMesh& mesh, FieldArrays& arrays) {
+void cut_into_blocks(const FloatMesh& mesh, SurfaceArrays& arrays) {
   arrays.blocks = in_order(blocks_of(mesh));
   const std::span<const SurfaceBlock> all = arrays.blocks;
   for (std::size_t span = 1; span < all.size(); span *= kWidth) {
@@ -105,18 +105,18 @@ constexpr std::size_t kFewBytes = 1'000'000;
 
 /// A surface and how far it is from the solid's, unit frame.
 struct Approximation {
-  FieldMesh mesh;
+  FloatMesh mesh;
   double error = 0;
 };
 
 /// What the grid of a surface may take.
-std::size_t grid_bytes(const FieldArrays& arrays) {
+std::size_t grid_bytes(const SurfaceArrays& arrays) {
   // A small surface's grid is fine, a large one's coarse; beyond kFewTriangles it is as coarse as
   // there.
   const std::size_t triangles = arrays.header.triangle_count;
   const std::size_t whole =
       std::min(16'384 + 50 * triangles, std::max(kFewBytes, kFewBytes / kFewTriangles * triangles));
-  std::size_t surface = sizeof(FieldHeader) + 16 * kAssetAlignment;
+  std::size_t surface = sizeof(SurfaceHeader) + 16 * kAssetAlignment;
   surface += arrays.blocks.size() * sizeof(SurfaceBlock);
   for (const TreeLevelArrays& level : arrays.levels)
     surface += level.blocks.size() * (sizeof(BallBlock) + sizeof(Origin));
@@ -126,8 +126,8 @@ std::size_t grid_bytes(const FieldArrays& arrays) {
 
 /// The blocks and the grid of a surface. `hierarchy()`: it as a view with a hierarchy.
 template <class Hierarchy>
-FieldArrays laid_out(const FieldMesh& mesh, const Hierarchy& hierarchy) {
-  FieldArrays arrays;
+SurfaceArrays laid_out(const FloatMesh& mesh, const Hierarchy& hierarchy) {
+  SurfaceArrays arrays;
   arrays.header.triangle_count = static_cast<std::uint32_t>(mesh.triangles.size());
   MeshView view;
   tbb::parallel_invoke([&] { cut_into_blocks(mesh, arrays); }, [&] { view = hierarchy(); });
@@ -162,12 +162,12 @@ Approximation clustered(VertexClusters& clusters, SolidSurface& surface, KnownDi
     stop.look();
     Clustered found = clusters.within(tolerance);
     if (found.mesh.triangles.empty()) return best;
-    const FieldHierarchy hierarchy(found.mesh);
-    FieldError error(surface.view(), distances, found, hierarchy, stop);
+    const SurfaceHierarchy hierarchy(found.mesh);
+    SurfaceError error(surface.view(), distances, found, hierarchy, stop);
     std::vector<double> off = error.seen(tolerance);
     const double seen = *std::max_element(off.begin(), off.end());
     if (seen <= 1.25 * tolerance || round >= kRounds) {
-      FieldError::Proven proven = error.proven(seen, kLoose * seen);
+      SurfaceError::Proven proven = error.proven(seen, kLoose * seen);
       if (proven.most < best.error) best = {std::move(found.mesh), proven.most};
       if (proven.most <= kLoose * seen || ++proofs == kProofs) return best;
       off = std::move(proven.at_cluster);
@@ -214,8 +214,8 @@ std::optional<Approximation> simplified(SolidSurface& surface, double max_error,
 
 }  // namespace
 
-std::optional<BuiltField> build_field(const MeshSolid& solid, double max_error,
-                                      const WorkStop& stop) {
+std::optional<BuiltSurface> build_surface(const MeshSolid& solid, double max_error,
+                                          const WorkStop& stop) {
   std::optional<SolidSurface> surface = SolidSurface::of(
       solid, max_error > 0 ? std::min(kOverlapWidth, max_error / 2) : kOverlapWidth);
   if (!surface) return std::nullopt;
@@ -229,8 +229,8 @@ std::optional<BuiltField> build_field(const MeshSolid& solid, double max_error,
     throw Error("the requested surface error is below float precision; request at least " +
                 std::to_string(near.error / left) + " times as much");
   if (near.mesh.triangles.empty()) return std::nullopt;
-  std::optional<FieldHierarchy> hierarchy;
-  BuiltField built = {
+  std::optional<SurfaceHierarchy> hierarchy;
+  BuiltSurface built = {
       laid_out(near.mesh, [&] { return hierarchy.emplace(near.mesh).view(); }), {}, own};
   built.arrays.header.error = near.error + surface->off();
   built.mesh = std::move(near.mesh);

@@ -1,4 +1,4 @@
-#include "bake/field/vertex_clusters.h"
+#include "bake/surface/vertex_clusters.h"
 
 #include <tbb/concurrent_vector.h>
 #include <tbb/parallel_for.h>
@@ -283,16 +283,16 @@ void VertexClusters::raise(const std::vector<double>& distance_of_cluster) {
   }
 }
 
-std::vector<FieldMesh::Triangle> VertexClusters::spanning(
+std::vector<FloatMesh::Triangle> VertexClusters::spanning(
     const std::vector<std::uint32_t>& cluster_of) const {
-  std::vector<std::vector<FieldMesh::Triangle>> parts(chunks_of(mesh_.triangle_count));
+  std::vector<std::vector<FloatMesh::Triangle>> parts(chunks_of(mesh_.triangle_count));
   for_chunks(mesh_.triangle_count, [&](std::size_t chunk, std::size_t t) {
-    FieldMesh::Triangle corners;
+    FloatMesh::Triangle corners;
     for (std::size_t k = 0; k < 3; ++k) corners[k] = cluster_of[mesh_.triangles[3 * t + k]];
     if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0])
       parts[chunk].push_back(corners);
   });
-  std::vector<FieldMesh::Triangle> triangles;
+  std::vector<FloatMesh::Triangle> triangles;
   for (const auto& part : parts) triangles.insert(triangles.end(), part.begin(), part.end());
   return triangles;
 }

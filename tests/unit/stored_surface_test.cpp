@@ -8,21 +8,21 @@
 #include <random>
 #include <utility>
 
-#include "bake/check/check_field.h"
-#include "bake/field/field.h"
-#include "bake/field/field_mesh.h"
+#include "bake/check/check_surface.h"
+#include "bake/surface/build_surface.h"
+#include "bake/surface/float_mesh.h"
 #include "mesh/exact_sign.h"
 #include "query/asset/surface_tree.h"
 #include "query/probe/sides.h"
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
-// The surface that an asset holds for exact queries.
+// The surface that an asset holds for queries of spheres.
 
 namespace ist {
 namespace {
 
-using Corners = CheckSurface::Corners;
+using Corners = CheckedMesh::Corners;
 using Point = Eigen::Vector3d;
 
 ClosedMesh closed(TriangleMesh mesh, const char* name) { return close_mesh(std::move(mesh), name); }
@@ -39,11 +39,11 @@ Asset baked(const ClosedMesh& mesh, double error = 0, unsigned threads = 0) {
   return bake(mesh, settings_of(error, threads));
 }
 
-void expect_sound_field(const Asset& asset, const ClosedMesh& mesh) {
-  ASSERT_TRUE(asset.view().has_field());
+void expect_sound_surface(const Asset& asset, const ClosedMesh& mesh) {
+  ASSERT_TRUE(asset.view().has_surface());
   std::size_t looked_at = 0;
   for (const Invariant& one : check(asset, mesh)) {
-    if (one.name.find("field") == std::string::npos) continue;
+    if (!one.name.starts_with("surface ") && one.name != "mesh near surface") continue;
     ++looked_at;
     EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " at " << one.where;
   }
@@ -63,32 +63,32 @@ Point on_triangle(const Corners& t, std::mt19937_64& random) {
 /// Distances of random points of either surface from the other, by other code than the proof.
 void expect_near(const Asset& asset, const ClosedMesh& mesh) {
   const AssetHeader& header = asset.view().header();
-  const FieldHeader& field = *at<FieldHeader>(header, header.field);
+  const SurfaceHeader& surface = *at<SurfaceHeader>(header, header.surface);
   const MeshSolid solid(mesh);
-  const CheckSurface of_mesh(mesh, solid.frame());
-  const CheckSurface of_field(FieldTriangles(header, field).all());
+  const CheckedMesh of_mesh(mesh, solid.frame());
+  const CheckedMesh of_surface(SurfaceTriangles(header, surface).all());
   std::mt19937_64 random(4);
   double worst = 0;
   for (int i = 0; i < 20'000; ++i) {
-    const auto from = [&](const CheckSurface& surface) {
-      return on_triangle(surface.triangles()[random() % surface.triangles().size()], random);
+    const auto from = [&](const CheckedMesh& side) {
+      return on_triangle(side.triangles()[random() % side.triangles().size()], random);
     };
-    worst = std::max(worst, of_mesh.nearest(from(of_field)).first);
-    worst = std::max(worst, of_field.nearest(from(of_mesh)).first);
+    worst = std::max(worst, of_mesh.nearest(from(of_surface)).first);
+    worst = std::max(worst, of_surface.nearest(from(of_mesh)).first);
   }
-  EXPECT_LE(worst, field.error);
+  EXPECT_LE(worst, surface.error);
   const Point low = solid.frame().to_unit(mesh.report.bounds.min());
   const Point high = solid.frame().to_unit(mesh.report.bounds.max());
   for (int i = 0; i < 5'000; ++i) {
     Point p;
     for (int k = 0; k < 3; ++k)
       p[k] = low[k] + (high[k] - low[k]) * (static_cast<double>(random() >> 11) * 0x1p-53);
-    if (of_field.distance(p, 2 * field.error) <= field.error) continue;
-    EXPECT_EQ(of_field.winding(p), of_mesh.winding(p) >= 1 ? 1 : 0);
+    if (of_surface.distance(p, 2 * surface.error) <= surface.error) continue;
+    EXPECT_EQ(of_surface.winding(p), of_mesh.winding(p) >= 1 ? 1 : 0);
   }
   std::printf("%s: %u triangles, error %.2g, %.2g seen, unit frame; %llu bytes\n",
-              mesh.name.c_str(), field.triangle_count, field.error, worst,
-              static_cast<unsigned long long>(header.file_bytes - header.field));
+              mesh.name.c_str(), surface.triangle_count, surface.error, worst,
+              static_cast<unsigned long long>(header.file_bytes - header.surface));
 }
 
 /// Every triangle cut into four, over and over.
@@ -111,57 +111,57 @@ TriangleMesh finely_cut(TriangleMesh mesh, int times) {
   return mesh;
 }
 
-/// Large triangles of the field lie over many of the mesh, and no part near a side of these is near
-/// one of them alone.
-TEST(Field, WhereOneTriangleLiesOverManyInItsPlaneEachHasItsPart) {
+/// Large triangles of the surface lie over many of the mesh, and no part near a side of these is
+/// near one of them alone.
+TEST(StoredSurface, WhereOneTriangleLiesOverManyInItsPlaneEachHasItsPart) {
   TriangleMesh mesh = finely_cut(testing::cube_mesh(), 6);
   const Eigen::Matrix3d turn =
       Eigen::AngleAxisd(0.7, Point(1, 2, 3).normalized()).toRotationMatrix();
   for (Point& v : mesh.vertices) v = turn * v;
   const ClosedMesh cube = closed(std::move(mesh), "cube");
   const Asset asset = baked(cube, 1e-4);
-  EXPECT_LT(asset.view().field_triangles(), cube.mesh.triangles.size() / 2);
-  expect_sound_field(asset, cube);
+  EXPECT_LT(asset.view().surface_triangles(), cube.mesh.triangles.size() / 2);
+  expect_sound_surface(asset, cube);
 }
 
-TEST(Field, HoldsTheMeshsOwnTriangles) {
+TEST(StoredSurface, HoldsTheMeshsOwnTriangles) {
   const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
   const Asset asset = baked(torus);
-  EXPECT_EQ(asset.view().field_triangles(), torus.mesh.triangles.size());
-  EXPECT_LT(asset.view().field_error(), 2e-7);
-  expect_sound_field(asset, torus);
+  EXPECT_EQ(asset.view().surface_triangles(), torus.mesh.triangles.size());
+  EXPECT_LT(asset.view().surface_error(), 2e-7);
+  expect_sound_surface(asset, torus);
   expect_near(asset, torus);
 }
 
-TEST(Field, HoldsThemHoweverMany) {
+TEST(StoredSurface, HoldsThemHoweverMany) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
   const Asset asset = baked(ball);
-  EXPECT_EQ(asset.view().field_triangles(), ball.mesh.triangles.size());
-  EXPECT_LT(asset.view().field_error(), 2e-7);
-  expect_sound_field(asset, ball);
+  EXPECT_EQ(asset.view().surface_triangles(), ball.mesh.triangles.size());
+  EXPECT_LT(asset.view().surface_error(), 2e-7);
+  expect_sound_surface(asset, ball);
   expect_near(asset, ball);
 }
 
-TEST(Field, SharedMeshes) {
+TEST(StoredSurface, SharedMeshes) {
   for (const char* name : {"oracle/meshes/ico20k.off", "oracle/meshes/dino200k.off"}) {
     IST_NEEDS_SHARED(name);
     const ClosedMesh mesh = close_mesh(load_mesh(testing::shared_path(name)), name);
     const Asset asset = baked(mesh);
-    EXPECT_LT(at<FieldHeader>(asset.view().header(), asset.view().header().field)->error, 5e-3);
-    expect_sound_field(asset, mesh);
+    EXPECT_LT(at<SurfaceHeader>(asset.view().header(), asset.view().header().surface)->error, 5e-3);
+    expect_sound_surface(asset, mesh);
     expect_near(asset, mesh);
   }
 }
 
-TEST(Field, ErrorIsKeptByAsFewTrianglesAsItAllows) {
+TEST(StoredSurface, ErrorIsKeptByAsFewTrianglesAsItAllows) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(4), "ball");
   std::uint32_t last = 0;
   for (const double error : {0.05, 0.01, 2e-3}) {
     const Asset asset = baked(ball, error);
-    EXPECT_LE(asset.view().field_error(), error);
+    EXPECT_LE(asset.view().surface_error(), error);
     EXPECT_EQ(asset.view().header().asked_surface_error, error);
-    EXPECT_GT(asset.view().field_triangles(), 2 * last) << error;
-    last = asset.view().field_triangles();
+    EXPECT_GT(asset.view().surface_triangles(), 2 * last) << error;
+    last = asset.view().surface_triangles();
     expect_near(asset, ball);
   }
   EXPECT_LT(last, ball.mesh.triangles.size());
@@ -169,16 +169,16 @@ TEST(Field, ErrorIsKeptByAsFewTrianglesAsItAllows) {
   EXPECT_THROW(baked(ball, -1), Error);
 }
 
-TEST(Field, NoneWhereNoneIsWanted) {
+TEST(StoredSurface, NoneWhereNoneIsWanted) {
   PackingSettings settings = settings_of(0);
   settings.surface.wanted = false;
   const Asset asset = bake(closed(testing::cube_mesh(), "cube"), settings);
-  EXPECT_FALSE(asset.view().has_field());
-  EXPECT_EQ(asset.view().field_triangles(), 0u);
-  EXPECT_EQ(asset.view().field_error(), 0);
+  EXPECT_FALSE(asset.view().has_surface());
+  EXPECT_EQ(asset.view().surface_triangles(), 0u);
+  EXPECT_EQ(asset.view().surface_error(), 0);
 }
 
-TEST(Field, OfSeveralShellsThoseThatBoundTheSolid) {
+TEST(StoredSurface, OfSeveralShellsThoseThatBoundTheSolid) {
   const Point one = Point::Ones();
   const TriangleMesh outer = testing::box_mesh(-one, one);
   const TriangleMesh inner = testing::box_mesh(-one / 2, one / 2);
@@ -188,12 +188,12 @@ TEST(Field, OfSeveralShellsThoseThatBoundTheSolid) {
       closed(testing::joined(outer, testing::box_mesh(2 * one, 3 * one)), "apart");
   for (const auto& [mesh, triangles] : {std::pair(&cavity, 24u), {&nested, 12u}, {&apart, 24u}}) {
     const Asset asset = baked(*mesh);
-    EXPECT_EQ(asset.view().field_triangles(), triangles) << mesh->name;
-    expect_sound_field(asset, *mesh);
+    EXPECT_EQ(asset.view().surface_triangles(), triangles) << mesh->name;
+    expect_sound_surface(asset, *mesh);
   }
 }
 
-TEST(Field, SameBytesForAnyNumberOfThreads) {
+TEST(StoredSurface, SameBytesForAnyNumberOfThreads) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
   const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 100, 60), "torus");
   for (const ClosedMesh* mesh : {&ball, &torus}) {
@@ -206,8 +206,8 @@ TEST(Field, SameBytesForAnyNumberOfThreads) {
   }
 }
 
-TEST(Field, VertexMapsKeepASurfaceClosed) {
-  FieldMesh mesh;
+TEST(StoredSurface, VertexMapsKeepASurfaceClosed) {
+  FloatMesh mesh;
   // A tetrahedron with a copy of its first vertex, and a flat pair of triangles on its base.
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-0.0f, 0, 0}, {1, 1, 0}};
   mesh.triangles = {{0, 2, 1}, {4, 1, 3}, {1, 2, 3}, {2, 0, 3},
@@ -235,13 +235,13 @@ std::optional<int> crossings(const Point& p, const Point& q, const Corners& t) {
 
 // What a query does: from the cell's reference point to the point asked about, through the cell's
 // triangles.
-TEST(Field, GridTellsInsideFromOutside) {
+TEST(StoredSurface, GridTellsInsideFromOutside) {
   const ClosedMesh torus = closed(testing::torus_mesh(1.0, 0.4, 70, 40), "torus");
   const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
   for (const ClosedMesh* mesh : {&torus, &cube}) {
     const Asset asset = baked(*mesh);
     const SurfaceTree tree = surface_tree(asset.view());
-    const FieldHeader& field = *tree.header;
+    const SurfaceHeader& surface = *tree.header;
     const MeshSolid solid(*mesh);
     std::mt19937_64 random(8);
     std::size_t in_surface_cells = 0;
@@ -249,19 +249,19 @@ TEST(Field, GridTellsInsideFromOutside) {
       Point p, reference;
       std::uint64_t cell[3];
       for (int k = 0; k < 3; ++k) {
-        const double cells = kBrickWidth * field.bricks[k];
+        const double cells = kBrickWidth * surface.bricks[k];
         const double x = cells * (static_cast<double>(random() >> 11) * 0x1p-53);
         cell[k] = static_cast<std::uint64_t>(x);
-        p[k] = field.low[k] + x * field.cell;
+        p[k] = surface.low[k] + x * surface.cell;
         reference[k] =
-            field.low[k] + (static_cast<double>(cell[k]) + kCellReference[k]) * field.cell;
+            surface.low[k] + (static_cast<double>(cell[k]) + kCellReference[k]) * surface.cell;
       }
-      if (solid.closest_point(p).distance <= field.error) continue;
+      if (solid.closest_point(p).distance <= surface.error) continue;
       const std::uint32_t code =
           tree.brick_index[cell[0] / 4 +
-                           field.bricks[0] * (cell[1] / 4 + field.bricks[1] * (cell[2] / 4))];
+                           surface.bricks[0] * (cell[1] / 4 + surface.bricks[1] * (cell[2] / 4))];
       bool inside = code == kInsideBrick;
-      if (code < field.brick_count) {
+      if (code < surface.brick_count) {
         const CellBrick& brick = tree.bricks[code];
         const std::uint64_t bit = cell[0] % 4 + 4 * (cell[1] % 4) + 16 * (cell[2] % 4);
         inside = (brick.inside >> bit & 1) != 0;
@@ -291,36 +291,36 @@ TEST(Field, GridTellsInsideFromOutside) {
   }
 }
 
-/// The field of a mesh that meets itself tells its solid: away from the error for certain.
+/// The surface of a mesh that meets itself tells its solid: away from the error for certain.
 void expect_tells_solid(const Asset& asset, const ClosedMesh& mesh) {
   const AssetHeader& header = asset.view().header();
-  const FieldHeader& field = *at<FieldHeader>(header, header.field);
-  const CheckSurface of_field(FieldTriangles(header, field).all());
+  const SurfaceHeader& surface = *at<SurfaceHeader>(header, header.surface);
+  const CheckedMesh of_surface(SurfaceTriangles(header, surface).all());
   const MeshSolid solid(mesh);
   std::mt19937_64 random(3);
   std::size_t clear = 0;
   for (int i = 0; i < 20'000; ++i) {
     Point p;
     for (int k = 0; k < 3; ++k) p[k] = 2 * (static_cast<double>(random() >> 11) * 0x1p-53) - 1;
-    if (of_field.distance(p, 2 * field.error) <= field.error) continue;
+    if (of_surface.distance(p, 2 * surface.error) <= surface.error) continue;
     ++clear;
-    ASSERT_EQ(of_field.winding(p) % 2 != 0, solid.inside(p)) << p.transpose();
+    ASSERT_EQ(of_surface.winding(p) % 2 != 0, solid.inside(p)) << p.transpose();
   }
   EXPECT_GT(clear, 10'000u);
-  std::printf("%s: %u triangles, error %.2g, unit frame\n", mesh.name.c_str(), field.triangle_count,
-              field.error);
+  std::printf("%s: %u triangles, error %.2g, unit frame\n", mesh.name.c_str(),
+              surface.triangle_count, surface.error);
 }
 
-TEST(Field, OfAMeshThatReachesFarIntoItselfIsTheUnions) {
+TEST(StoredSurface, OfAMeshThatReachesFarIntoItselfIsTheUnions) {
   const ClosedMesh two = closed(testing::overlapping_cubes_mesh(), "two cubes");
   ASSERT_TRUE(two.report.meets_itself);
   const Asset asset = baked(two);
-  EXPECT_TRUE(asset.view().has_field());
-  EXPECT_LE(asset.view().field_error(), 1e-6);
-  expect_sound_field(asset, two);
+  EXPECT_TRUE(asset.view().has_surface());
+  EXPECT_LE(asset.view().surface_error(), 1e-6);
+  expect_sound_surface(asset, two);
 }
 
-TEST(Field, OfASmallOverlapIsTheUnions) {
+TEST(StoredSurface, OfASmallOverlapIsTheUnions) {
   TriangleMesh mesh = testing::icosphere_mesh(4);
   for (const double at : {1.1, 1.102})
     mesh = testing::joined(std::move(mesh),
@@ -328,9 +328,9 @@ TEST(Field, OfASmallOverlapIsTheUnions) {
   const ClosedMesh ball = closed(std::move(mesh), "ball and crumbs");
   ASSERT_TRUE(ball.report.meets_itself);
   const Asset asset = baked(ball);
-  EXPECT_GT(asset.view().field_triangles(), ball.mesh.triangles.size());
-  EXPECT_LE(asset.view().field_error(), 1e-6);
-  expect_sound_field(asset, ball);
+  EXPECT_GT(asset.view().surface_triangles(), ball.mesh.triangles.size());
+  EXPECT_LE(asset.view().surface_error(), 1e-6);
+  expect_sound_surface(asset, ball);
   expect_tells_solid(asset, ball);
 }
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bake/field/field_mesh.h"
+#include "bake/surface/float_mesh.h"
 
 namespace ist {
 
@@ -26,7 +26,7 @@ struct BlockPatch {
 /// that add few vertices and lie near its middle; what is left in small pieces goes together where
 /// it is near, or, where patches are to be `connected`, where they share a vertex besides. Every
 /// triangle is in one patch. Deterministic.
-std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh, bool connected = false);
+std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh, bool connected = false);
 
 /// An order of points in which neighbours are near each other: their box is halved across its
 /// longest side, again and again, so that every group of 16, 256, … from the start is compact. Ties

@@ -1,4 +1,4 @@
-#include "bake/field/cell_entries.h"
+#include "bake/surface/cell_entries.h"
 
 #include <tbb/parallel_for.h>
 

@@ -1,4 +1,4 @@
-#include "bake/field/solid_surface.h"
+#include "bake/surface/solid_surface.h"
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
@@ -119,7 +119,7 @@ struct Overlaps {
 using Part = Overlaps::Part;
 using Point = Eigen::Vector3d;
 
-double between(const MeshView& mesh, std::uint32_t a, std::uint32_t b) {
+double side_length(const MeshView& mesh, std::uint32_t a, std::uint32_t b) {
   return (Eigen::Map<const Point>(mesh.vertices + 3 * std::size_t{a}) -
           Eigen::Map<const Point>(mesh.vertices + 3 * std::size_t{b}))
       .norm();
@@ -141,7 +141,7 @@ double farthest_from_boundary(const MeshView& mesh, const Overlaps& overlaps,
       for (std::size_t k = 0; k < 9; ++k) {
         const std::uint32_t from = mesh.triangles[3 * std::size_t{t} + k / 3];
         const std::uint32_t to = mesh.triangles[3 * std::size_t{t} + k % 3];
-        const double there = way[from] + between(mesh, from, to);
+        const double there = way[from] + side_length(mesh, from, to);
         if (!(there < way[to])) continue;
         way[to] = there;
         shorter = true;
@@ -152,8 +152,8 @@ double farthest_from_boundary(const MeshView& mesh, const Overlaps& overlaps,
     const std::uint32_t* c = mesh.triangles + 3 * std::size_t{t};
     double least = HUGE_VAL;
     for (int k = 0; k < 3; ++k)
-      least = std::min(least, way[c[k]] + std::max(between(mesh, c[k], c[(k + 1) % 3]),
-                                                   between(mesh, c[k], c[(k + 2) % 3])));
+      least = std::min(least, way[c[k]] + std::max(side_length(mesh, c[k], c[(k + 1) % 3]),
+                                                   side_length(mesh, c[k], c[(k + 2) % 3])));
     most = std::max(most, least);
   }
   return most;

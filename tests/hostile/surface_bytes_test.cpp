@@ -11,7 +11,7 @@
 #include "support/asset_bytes.h"
 #include "support/test_meshes.h"
 
-// Assets whose field was damaged or made to harm, by a writer who knows the hash.
+// Assets whose surface was damaged or made to harm, by a writer who knows the hash.
 
 namespace ist {
 namespace {
@@ -28,10 +28,10 @@ Asset baked(TriangleMesh mesh) {
 void walk(const AlignedBytes& bytes) {
   TreeView view;
   ASSERT_EQ(TreeView::from_bytes(bytes.span(), view), AssetStatus::ok);
-  if (!view.has_field()) return;
+  if (!view.has_surface()) return;
   const SurfaceTree tree = surface_tree(view);
-  const FieldHeader& field = *tree.header;
-  EXPECT_GE(view.field_error(), 0);
+  const SurfaceHeader& surface = *tree.header;
+  EXPECT_GE(view.surface_error(), 0);
   double sum = 0;
   for (int k = 1; k <= tree.top; ++k)
     for (std::uint32_t b = 0; b < tree.level[k].count; ++b)
@@ -41,8 +41,8 @@ void walk(const AlignedBytes& bytes) {
           sum += tree.level[k].origins[b].x + double{tree.level[k].balls[b].x[l]};
         }
   std::uint32_t cells = 0;
-  for (std::uint64_t i = 0; i < std::uint64_t{field.bricks[0]} * field.bricks[1] * field.bricks[2];
-       ++i) {
+  for (std::uint64_t i = 0;
+       i < std::uint64_t{surface.bricks[0]} * surface.bricks[1] * surface.bricks[2]; ++i) {
     const std::uint32_t code = tree.brick_index[i];
     if (code == kOutsideBrick || code == kInsideBrick) continue;
     const CellBrick& brick = tree.bricks[code];
@@ -61,18 +61,18 @@ void walk(const AlignedBytes& bytes) {
   EXPECT_TRUE(std::isfinite(sum));
 }
 
-TEST(FieldBytes, EveryHostileWordIsRefusedOrHarmless) {
+TEST(SurfaceBytes, EveryHostileWordIsRefusedOrHarmless) {
   const std::uint32_t values[] = {0u,          1u,          2u,          15u,         16u,
                                   0xffffffffu, 0xfffffffeu, 0x7fffffffu, 0x7fc00000u, 0x7f800000u,
                                   0xff800000u, 0xbf800000u, 0x7149f2cau, 0xf149f2cau, 0x00000001u};
   for (const Asset& asset :
        {baked(testing::cube_mesh()), baked(testing::torus_mesh(1, 0.4, 8, 5))}) {
     const AssetHeader& header = asset.view().header();
-    ASSERT_NE(header.field, 0u);
+    ASSERT_NE(header.surface, 0u);
     AlignedBytes changed(asset.bytes());
     walk(changed);
     std::size_t accepted = 0;
-    for (std::size_t at = header.field; at < asset.bytes().size(); at += 4) {
+    for (std::size_t at = header.surface; at < asset.bytes().size(); at += 4) {
       std::uint32_t before;
       std::memcpy(&before, &changed[at], sizeof(before));
       for (const std::uint32_t value : values) {
@@ -99,69 +99,70 @@ TEST(FieldBytes, EveryHostileWordIsRefusedOrHarmless) {
   }
 }
 
-TEST(FieldBytes, EveryOffsetCountAndRangeIsLookedAt) {
+TEST(SurfaceBytes, EveryOffsetCountAndRangeIsLookedAt) {
   const Asset asset = baked(testing::torus_mesh(1, 0.4, 12, 8));
   const AssetHeader& header = asset.view().header();
-  const FieldHeader& field = *at<FieldHeader>(header, header.field);
-  ASSERT_GE(field.level_count, 2u);
+  const SurfaceHeader& surface = *at<SurfaceHeader>(header, header.surface);
+  ASSERT_GE(surface.level_count, 2u);
   const auto refused = [&](std::uint64_t offset, auto value) {
     AlignedBytes changed(asset.bytes());
     std::memcpy(&changed[offset], &value, sizeof(value));
     changed.seal();
     EXPECT_EQ(changed.status(), AssetStatus::corrupt_layout) << offset << " " << +value;
   };
-  const auto of_field = [&](std::size_t offset) { return header.field + offset; };
+  const auto of_surface = [&](std::size_t offset) { return header.surface + offset; };
   for (const int change : {-64, -16, -1, 1, 16, 64}) {
     const auto moved = [&](std::uint64_t offset, auto value) {
       refused(offset, static_cast<decltype(value)>(value + static_cast<decltype(value)>(change)));
     };
-    moved(offsetof(AssetHeader, field), header.field);
-    moved(of_field(offsetof(FieldHeader, brick_count)), field.brick_count);
-    moved(of_field(offsetof(FieldHeader, cell_count)), field.cell_count);
-    moved(of_field(offsetof(FieldHeader, entry_count)), field.entry_count);
-    moved(of_field(offsetof(FieldHeader, triangle_count)), field.triangle_count);
-    moved(of_field(offsetof(FieldHeader, level_count)), field.level_count);
-    moved(of_field(offsetof(FieldHeader, brick_index)), field.brick_index);
-    moved(of_field(offsetof(FieldHeader, brick_data)), field.brick_data);
-    moved(of_field(offsetof(FieldHeader, list_bytes)), field.list_bytes);
-    moved(of_field(offsetof(FieldHeader, cell_ends)), field.cell_ends);
-    moved(of_field(offsetof(FieldHeader, cell_triangles)), field.cell_triangles);
+    moved(offsetof(AssetHeader, surface), header.surface);
+    moved(of_surface(offsetof(SurfaceHeader, brick_count)), surface.brick_count);
+    moved(of_surface(offsetof(SurfaceHeader, cell_count)), surface.cell_count);
+    moved(of_surface(offsetof(SurfaceHeader, entry_count)), surface.entry_count);
+    moved(of_surface(offsetof(SurfaceHeader, triangle_count)), surface.triangle_count);
+    moved(of_surface(offsetof(SurfaceHeader, level_count)), surface.level_count);
+    moved(of_surface(offsetof(SurfaceHeader, brick_index)), surface.brick_index);
+    moved(of_surface(offsetof(SurfaceHeader, brick_data)), surface.brick_data);
+    moved(of_surface(offsetof(SurfaceHeader, list_bytes)), surface.list_bytes);
+    moved(of_surface(offsetof(SurfaceHeader, cell_ends)), surface.cell_ends);
+    moved(of_surface(offsetof(SurfaceHeader, cell_triangles)), surface.cell_triangles);
     for (std::size_t k = 0; k < kMaxLevels; ++k) {
-      const std::size_t level = of_field(offsetof(FieldHeader, level) + k * sizeof(LevelHeader));
-      moved(level + offsetof(LevelHeader, blocks), field.level[k].blocks);
-      moved(level + offsetof(LevelHeader, origins), field.level[k].origins);
-      moved(level + offsetof(LevelHeader, nodes), field.level[k].nodes);
-      moved(level + offsetof(LevelHeader, count), field.level[k].count);
+      const std::size_t level =
+          of_surface(offsetof(SurfaceHeader, level) + k * sizeof(LevelHeader));
+      moved(level + offsetof(LevelHeader, blocks), surface.level[k].blocks);
+      moved(level + offsetof(LevelHeader, origins), surface.level[k].origins);
+      moved(level + offsetof(LevelHeader, nodes), surface.level[k].nodes);
+      moved(level + offsetof(LevelHeader, count), surface.level[k].count);
     }
   }
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr float kNanf = std::numeric_limits<float>::quiet_NaN();
-  refused(of_field(offsetof(FieldHeader, error)), -1.0);
-  refused(of_field(offsetof(FieldHeader, error)), kNan);
-  refused(of_field(offsetof(FieldHeader, low)), kNan);
-  refused(of_field(offsetof(FieldHeader, cell)), 0.0);
-  refused(of_field(offsetof(FieldHeader, cell)), kNan);
+  refused(of_surface(offsetof(SurfaceHeader, error)), -1.0);
+  refused(of_surface(offsetof(SurfaceHeader, error)), kNan);
+  refused(of_surface(offsetof(SurfaceHeader, low)), kNan);
+  refused(of_surface(offsetof(SurfaceHeader, cell)), 0.0);
+  refused(of_surface(offsetof(SurfaceHeader, cell)), kNan);
   for (std::size_t k = 0; k < 3; ++k)
     for (const std::uint32_t bricks : {0u, 0xffffffffu})
-      refused(of_field(offsetof(FieldHeader, bricks) + 4 * k), bricks);
-  refused(field.level[0].blocks, kNanf);
-  refused(field.level[0].blocks + offsetof(SurfaceBlock, corner), std::uint8_t{16});
-  refused(field.level[0].blocks + offsetof(SurfaceBlock, triangles), 17u);
-  refused(field.level[0].blocks + offsetof(SurfaceBlock, triangles), 0u);
-  refused(field.level[0].blocks + offsetof(SurfaceBlock, vertices), 17u);
-  refused(field.level[1].blocks, kNanf);
-  refused(field.level[1].blocks + offsetof(BallBlock, r), kEmptyRadius);
-  refused(field.level[1].origins, kNan);
-  refused(field.brick_index, field.brick_count);
-  refused(field.brick_data + offsetof(CellBrick, first), 1u);
-  refused(field.brick_data + offsetof(CellBrick, surface), ~std::uint64_t{0});
-  refused(field.brick_data + offsetof(CellBrick, list), 1u);
-  ASSERT_EQ(field.list_bytes, 2u);
-  refused(of_field(offsetof(FieldHeader, list_bytes)), 4u);
-  refused(field.cell_ends, std::uint16_t{0xffff});
-  refused(field.cell_ends + 2 * (field.cell_count - 1),
-          static_cast<std::uint16_t>(field.entry_count + 1));
-  refused(field.cell_triangles, static_cast<std::uint16_t>(kWidth * field.level[0].count));
+      refused(of_surface(offsetof(SurfaceHeader, bricks) + 4 * k), bricks);
+  refused(surface.level[0].blocks, kNanf);
+  refused(surface.level[0].blocks + offsetof(SurfaceBlock, corner), std::uint8_t{16});
+  refused(surface.level[0].blocks + offsetof(SurfaceBlock, triangles), 17u);
+  refused(surface.level[0].blocks + offsetof(SurfaceBlock, triangles), 0u);
+  refused(surface.level[0].blocks + offsetof(SurfaceBlock, vertices), 17u);
+  refused(surface.level[1].blocks, kNanf);
+  refused(surface.level[1].blocks + offsetof(BallBlock, r), kEmptyRadius);
+  refused(surface.level[1].origins, kNan);
+  refused(surface.brick_index, surface.brick_count);
+  refused(surface.brick_data + offsetof(CellBrick, first), 1u);
+  refused(surface.brick_data + offsetof(CellBrick, surface), ~std::uint64_t{0});
+  refused(surface.brick_data + offsetof(CellBrick, list), 1u);
+  ASSERT_EQ(surface.list_bytes, 2u);
+  refused(of_surface(offsetof(SurfaceHeader, list_bytes)), 4u);
+  refused(surface.cell_ends, std::uint16_t{0xffff});
+  refused(surface.cell_ends + 2 * (surface.cell_count - 1),
+          static_cast<std::uint16_t>(surface.entry_count + 1));
+  refused(surface.cell_triangles, static_cast<std::uint16_t>(kWidth * surface.level[0].count));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "bake/field/sign_grid.h"
+#include "bake/surface/sign_grid.h"
 
 #include <tbb/parallel_for.h>
 
@@ -12,9 +12,9 @@
 
 #include <ist/error.h>
 
-#include "bake/field/brick_grid.h"
-#include "bake/field/cell_entries.h"
-#include "bake/field/surface_area.h"
+#include "bake/surface/brick_grid.h"
+#include "bake/surface/cell_entries.h"
+#include "bake/surface/surface_area.h"
 #include "mesh/exact_sign.h"
 #include "mesh/ray_crossing.h"
 #include "mesh/triangle_frame.h"
@@ -131,7 +131,7 @@ void find_inside(const BrickGrid& grid, const MeshView& surface, DenseBricks& br
   });
 }
 
-/// FieldHeader::list_bytes for these lists.
+/// SurfaceHeader::list_bytes for these lists.
 std::uint32_t list_bytes(std::size_t blocks, std::size_t fullest_brick) {
   return kWidth * blocks > 0x10000 || fullest_brick > 0xffff ? 4 : 2;
 }
@@ -144,7 +144,7 @@ std::size_t bytes_of(const BrickGrid& grid, std::size_t blocks, const EntryCount
 }
 
 void write_grid(const BrickGrid& grid, const DenseBricks& bricks,
-                const std::vector<CellEntry>& entries, FieldArrays& arrays) {
+                const std::vector<CellEntry>& entries, SurfaceArrays& arrays) {
   std::copy_n(grid.low, 3, arrays.header.low);
   std::copy_n(grid.bricks, 3, arrays.header.bricks);
   arrays.header.cell = grid.cell;
@@ -230,7 +230,7 @@ double edge_for(const Measures& measures, const std::vector<SurfaceBlock>& block
 
 }  // namespace
 
-void lay_sign_grid(const MeshView& surface, std::size_t bytes, FieldArrays& arrays) {
+void lay_sign_grid(const MeshView& surface, std::size_t bytes, SurfaceArrays& arrays) {
   const Measures measures(surface);
   double edge = edge_for(measures, arrays.blocks, bytes);
   for (int attempt = 0; attempt < kTries; ++attempt) {

@@ -1,4 +1,4 @@
-#include "bake/field/surface_patches.h"
+#include "bake/surface/surface_patches.h"
 
 #include <algorithm>
 #include <array>
@@ -92,7 +92,7 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
 /// Grows patches one after the other.
 class Growth {
  public:
-  explicit Growth(const FieldMesh& mesh)
+  explicit Growth(const FloatMesh& mesh)
       : mesh_(mesh),
         stars_(triangles_at_vertices(mesh.vertices.size(), mesh.triangles)),
         left_(mesh.vertices.size()),
@@ -103,7 +103,7 @@ class Growth {
       left_[v] = static_cast<std::uint32_t>(stars_[v].size());
     for (std::size_t t = 0; t < middle_.size(); ++t)
       for (std::size_t k = 0; k < 3; ++k) {
-        const FieldMesh::Triangle& corners = mesh.triangles[t];
+        const FloatMesh::Triangle& corners = mesh.triangles[t];
         middle_[t][k] = (mesh.vertices[corners[0]][k] + mesh.vertices[corners[1]][k] +
                          mesh.vertices[corners[2]][k]) /
                         3;
@@ -186,7 +186,7 @@ class Growth {
     return std::get<2>(best);
   }
 
-  const FieldMesh& mesh_;
+  const FloatMesh& mesh_;
   const ItemGroups<> stars_;         ///< the triangles around each vertex
   std::vector<std::uint32_t> left_;  ///< of them in no patch yet
   std::vector<std::uint8_t> taken_;
@@ -201,7 +201,7 @@ struct SurfaceExtent {
   double radius;
 };
 
-SurfaceExtent extent_of(const FieldMesh& mesh, const std::vector<std::uint32_t>& vertices) {
+SurfaceExtent extent_of(const FloatMesh& mesh, const std::vector<std::uint32_t>& vertices) {
   FloatPoint low = mesh.vertices[vertices[0]], high = low;
   for (const std::uint32_t v : vertices)
     for (std::size_t k = 0; k < 3; ++k) {
@@ -224,7 +224,7 @@ std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
 }
 
 /// Joins patches that are not full to others near them in space, `connected`: by a vertex.
-std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> patches,
+std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> patches,
                                bool connected) {
   std::vector<FloatPoint> middles(patches.size());
   std::vector<double> radii(patches.size());
@@ -264,7 +264,7 @@ std::vector<BlockPatch> joined(const FieldMesh& mesh, std::vector<BlockPatch> pa
 
 }  // namespace
 
-std::vector<BlockPatch> cut_into_patches(const FieldMesh& mesh, bool connected) {
+std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh, bool connected) {
   return joined(mesh, Growth(mesh).all(), connected);
 }
 

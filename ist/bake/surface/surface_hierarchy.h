@@ -4,19 +4,19 @@
 #include <cstdint>
 #include <vector>
 
-#include "bake/field/field_mesh.h"
+#include "bake/surface/float_mesh.h"
 #include "mesh/bvh.h"
 #include "mesh/mesh_view.h"
 
 namespace ist {
 
-/// A field's surface as the mesh's exact predicates and distances take it.
-class FieldHierarchy {
+/// A surface as the mesh's exact predicates and distances take it.
+class SurfaceHierarchy {
  public:
-  explicit FieldHierarchy(const FieldMesh& mesh) {
-    for (const FieldMesh::Vertex& v : mesh.vertices)
+  explicit SurfaceHierarchy(const FloatMesh& mesh) {
+    for (const FloatMesh::Vertex& v : mesh.vertices)
       vertices_.insert(vertices_.end(), v.begin(), v.end());
-    for (const FieldMesh::Triangle& t : mesh.triangles)
+    for (const FloatMesh::Triangle& t : mesh.triangles)
       corners_.insert(corners_.end(), t.begin(), t.end());
     bvh_ = build_bvh(vertices_, corners_);
     view_ = {vertices_.data(),
@@ -27,8 +27,8 @@ class FieldHierarchy {
              bvh_.blocks.get(),
              bvh_.root};
   }
-  FieldHierarchy(const FieldHierarchy&) = delete;
-  FieldHierarchy& operator=(const FieldHierarchy&) = delete;
+  SurfaceHierarchy(const SurfaceHierarchy&) = delete;
+  SurfaceHierarchy& operator=(const SurfaceHierarchy&) = delete;
 
   const MeshView& view() const { return view_; }
 

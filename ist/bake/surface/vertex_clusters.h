@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bake/field/field_mesh.h"
+#include "bake/surface/float_mesh.h"
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "stage/raw_array.h"
@@ -34,7 +34,7 @@ double farthest_plane(std::span<const CornerPlane> planes, const std::array<doub
 
 /// A surface with its vertices clustered.
 struct Clustered {
-  FieldMesh mesh;
+  FloatMesh mesh;
   std::vector<std::uint32_t> cluster_of;  ///< [mesh vertex]
   std::vector<std::uint32_t> vertex_of;   ///< [cluster] its place in `mesh`; some share one
 
@@ -81,7 +81,7 @@ class VertexClusters {
   /// Names of clusters of all levels, and of single vertices after them, for every vertex.
   std::vector<std::uint32_t> chosen(double tolerance);
   std::array<double, 3> place_of(std::size_t cluster, std::uint32_t vertex) const;
-  std::vector<FieldMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
+  std::vector<FloatMesh::Triangle> spanning(const std::vector<std::uint32_t>& cluster_of) const;
 
   const MeshView mesh_;
   ItemGroups<> corners_;        ///< [vertex] 3 triangle + k

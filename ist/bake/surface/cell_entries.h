@@ -8,7 +8,7 @@
 
 #include <ist/asset_layout.h>
 
-#include "bake/field/brick_grid.h"
+#include "bake/surface/brick_grid.h"
 
 namespace ist {
 

@@ -1,4 +1,4 @@
-#include "bake/field/hull_cuts.h"
+#include "bake/surface/hull_cuts.h"
 
 #include <algorithm>
 #include <array>

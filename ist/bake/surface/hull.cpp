@@ -1,4 +1,4 @@
-#include "bake/field/hull.h"
+#include "bake/surface/hull.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <ist/mesh.h>
+#include <ist/solid.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace ist {
+
+/// A solid as `check` asks it, unit frame. Immutable.
+class CheckedSolid {
+ public:
+  virtual ~CheckedSolid() = default;
+
+  /// Distance to the surface, or less where that is not known exactly; once nothing is nearer than
+  /// `limit`, any value ≥ limit.
+  virtual double distance(const Eigen::Vector3d& p, double limit) const = 0;
+
+  /// Winding number of a point off the surface: ≥ 1 inside.
+  virtual int winding(const Eigen::Vector3d& p) const = 0;
+
+  virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< holds the whole solid
+};
+
+/// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake
+/// in the solid that packing asked is not repeated here. Immutable.
+class CheckedMesh final : public CheckedSolid {
+ public:
+  using Corners = std::array<Eigen::Vector3d, 3>;
+
+  CheckedMesh(const ClosedMesh& mesh, const UnitFrame& frame);
+  /// Of triangles in the unit frame; at least one.
+  explicit CheckedMesh(std::vector<Corners> triangles);
+
+  /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
+  double distance(const Eigen::Vector3d& p, double limit) const override;
+
+  /// The nearest triangle, as an index of triangles(), and its distance, unit frame.
+  std::pair<double, std::uint32_t> nearest(const Eigen::Vector3d& p) const;
+
+  /// In an order of its own.
+  const std::vector<Corners>& triangles() const { return triangles_; }
+
+  /// Winding number of a point off the surface, by a ray in a direction that no mesh was modelled
+  /// along; where rounding leaves a sign open, by the sum of all solid angles.
+  int winding(const Eigen::Vector3d& p) const override;
+
+  const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
+
+ private:
+  struct Node {
+    Eigen::AlignedBox3d box;
+    std::uint32_t begin = 0, end = 0;  ///< triangles
+    std::uint32_t right = 0;           ///< second child; the first is the next node; 0 at a leaf
+  };
+
+  /// `best`: squared distance beyond which nothing is of interest; becomes the least. The triangle
+  /// stays where nothing is nearer.
+  void search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const;
+  void build(std::uint32_t begin, std::uint32_t end);
+  int winding_by_solid_angle(const Eigen::Vector3d& p) const;
+
+  std::vector<Corners> triangles_;
+  std::vector<Node> nodes_;
+  Eigen::AlignedBox3d bounds_;
+};
+
+/// Unit frame, squared.
+double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckedMesh::Corners& t);
+
+}  // namespace ist
