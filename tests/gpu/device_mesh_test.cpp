@@ -14,6 +14,7 @@
 
 #include "mesh/closest_point.h"
 #include "mesh/mesh_solid.h"
+#include "mesh/winding.h"
 #include "support/gpu_mesh_queries.h"
 #include "support/gpu_test.h"
 #include "support/host_wide_tree.h"
@@ -204,7 +205,7 @@ class DeviceMeshTest : public GpuTest {
     const auto found = answers<gpu::LineCrossings>(queue, tree, questions);
     std::vector<Crossing> expected, met;
     for (std::size_t i = 0; i < questions.size(); ++i) {
-      solid.line_crossings(questions[i].y, questions[i].z, expected);
+      line_crossings(solid.view(), questions[i].y, questions[i].z, expected);
       ASSERT_EQ(std::size_t(found[i].count), expected.size());
       if (found[i].count > gpu::LineCrossings::kCapacity) continue;
       met.clear();
