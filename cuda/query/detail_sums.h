@@ -123,20 +123,6 @@ struct DetailMemory {
   std::uint32_t spheres, visits;  ///< of all that was asked
 };
 
-/// Sums a pair of levels to memory.totals.
-template <class Team>
-IST_HD_ONCE void sum_levels(const Team team, const TreeRef& a, const TreeRef& b,
-                            PairMemory& of_pair) {
-  PairMemory& memory = *team.memory(&of_pair);
-  team.sync();
-  copy_words(team, a, memory.tree[0]);
-  copy_words(team, b, memory.tree[1]);
-  team.sync();
-  PairDescent<Team> descent(team, memory);
-  descent.start();
-  descent.run(0, ~0u);
-}
-
 template <class Team>
 class DetailSums {
  public:
@@ -164,37 +150,41 @@ class DetailSums {
     QuickLooker<Team> looker(team_, a_, b_, m_.pair.place.a_from_b, m_.filled);
     DetailWeight sure = {1, 0};
     if (size > 1) sure = m_.chain.quick_weight(looker.look(false).volume, budget);
-    if (sure.weight == 1) {
-      if (coincidence(m_.chain[0]).weight == 0) return false;
-      ask(m_.chain[0]);
-      finish(m_.part);
-      return true;
-    }
-    descend(m_.chain.coarsest().a, m_.chain.coarsest().b);
+    const bool blends = sure.weight < 1;
+    if (!blends && coincidence(m_.chain[0]).weight == 0) return false;
     if (team_.lane() == 0) {
-      m_.coarse = m_.pair.totals;
+      m_.coarse.clear();
       m_.result.clear();
-      m_.chain.share(
-          volume_of(m_.coarse), budget,
-          [](std::size_t i) {
-            return DetailWeight{i == 0 ? 1.0 : 0.0, 0};
-          },
-          [&](std::size_t i, const DetailWeight& weight) { m_.share[i] = weight; });
     }
-    team_.sync();
-    double slope = 0, sure_slope = 0;       // of the blend by the coarse sum, and by the quick look
-    for (std::size_t i = size; i-- > 0;) {  // the order of the CPU's additions
-      const DetailPair& levels = m_.chain[i];
-      const DetailWeight share = m_.share[i];
+    double slope = 0, sure_slope = 0;  // of the blend by the coarse sum, and by the quick look
+    // The coarse sum, then the order of the CPU's additions: one call of ask() for all of them, or
+    // its code is too long for the instruction cache.
+    IST_ROLLED
+    for (std::size_t i = blends ? size + 1 : 1; i-- > 0;) {
+      const bool estimates = i == size;
+      const DetailPair& levels = m_.chain[estimates ? size - 1 : i];
+      const DetailWeight share = blends && !estimates ? m_.share[i] : DetailWeight{1, 0};
       const double alone = i == 0 ? 1 : 0;
       const double weight = sure.weight * alone + (1 - sure.weight) * share.weight;
       if (weight == 0 && share.slope == 0) continue;
-      const bool have = i + 1 == size && coincidence(levels).weight == 0;
-      if (!have) ask(levels);
+      const bool have = blends && i + 1 == size && coincidence(levels).weight == 0;
+      if (!have) ask(levels, estimates);
       const LensTotals& part = have ? m_.coarse : m_.part;
-      slope += (1 - sure.weight) * share.slope * volume_of(part);
-      sure_slope += sure.slope * (alone - share.weight) * volume_of(part);
-      if (team_.lane() == 0) add_part(part, weight, m_.result);
+      if (estimates) {
+        if (team_.lane() == 0) {
+          m_.coarse = m_.part;
+          m_.chain.share(
+              volume_of(m_.coarse), budget,
+              [](std::size_t k) {
+                return DetailWeight{k == 0 ? 1.0 : 0.0, 0};
+              },
+              [&](std::size_t k, const DetailWeight& found) { m_.share[k] = found; });
+        }
+      } else {
+        slope += (1 - sure.weight) * share.slope * volume_of(part);
+        sure_slope += sure.slope * (alone - share.weight) * volume_of(part);
+        if (team_.lane() == 0) add_part(part, weight, m_.result);
+      }
       team_.sync();
     }
     QuickLook seen = {};
@@ -230,36 +220,39 @@ class DetailSums {
                               m_.pair.place.a_from_b);
   }
 
-  /// The sum of two levels, or of unlike ones where copies all but coincide: to m_.part.
-  IST_HD void ask(const DetailPair& levels) {
-    const CoincidenceWeight same = coincidence(levels);
+  /// The sum of two levels, or of unlike ones where copies all but coincide and it is no estimate:
+  /// to m_.part.
+  IST_HD void ask(const DetailPair& levels, bool estimates) {
+    const CoincidenceWeight same = estimates ? CoincidenceWeight() : coincidence(levels);
     const std::uint32_t a = levels.a, b = levels.b, other = a < a_.coarser ? a + 1 : a - 1;
     if (team_.lane() == 0) m_.part.clear();
     double unlike = 0;
-    if (same.weight > 0) {
-      add_descent(a, other, 0.5);
-      add_descent(other, b, 0.5);
-      unlike = volume_of(m_.part);
-      if (same.weight == 1) return;
+    IST_ROLLED
+    for (int k = same.weight > 0 ? 0 : 2; k < (same.weight == 1 ? 2 : 3); ++k) {
+      if (k == 2 && same.weight > 0) {
+        unlike = volume_of(m_.part);
+        team_.sync();
+        if (team_.lane() == 0)
+          for (double& term : m_.part.term) term *= same.weight;
+      }
+      descend(k == 1 ? other : a, k == 0 ? other : b);
+      if (team_.lane() == 0) add_part(m_.pair.totals, k < 2 ? 0.5 : 1 - same.weight, m_.part);
       team_.sync();
-      if (team_.lane() == 0)
-        for (double& term : m_.part.term) term *= same.weight;
     }
-    add_descent(a, b, 1 - same.weight);
-    if (same.weight > 0 && team_.lane() == 0)
+    if (same.weight > 0 && same.weight < 1 && team_.lane() == 0)
       add_slope(same.slope, unlike - volume_of(m_.pair.totals), m_.part);
-    team_.sync();
-  }
-
-  IST_HD void add_descent(std::uint32_t a, std::uint32_t b, double weight) {
-    descend(a, b);
-    if (team_.lane() == 0) add_part(m_.pair.totals, weight, m_.part);
     team_.sync();
   }
 
   /// The whole sum of two levels: to m_.pair.totals.
   IST_HD void descend(std::uint32_t a, std::uint32_t b) {
-    sum_levels(team_, a_.level[a].tree, b_.level[b].tree, *team_.memory(&m_.pair));
+    team_.sync();
+    copy_words(team_, a_.level[a].tree, m_.pair.tree[0]);
+    copy_words(team_, b_.level[b].tree, m_.pair.tree[1]);
+    team_.sync();
+    PairDescent<Team> descent(team_, m_.pair);
+    descent.start();
+    descent.run(0, ~0u);
     if (team_.lane() == 0) {
       m_.spheres += m_.pair.totals.spheres;
       m_.visits += m_.pair.totals.visits;
