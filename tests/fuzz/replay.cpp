@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 namespace {
 
-constexpr int kDamages = 20000;  // of each file
+constexpr int kDamages = 12000;  // of each file
 
 void feed(const std::string& bytes) {
   // On the heap and no larger: the address sanitizer sees what is read beyond its end.
