@@ -44,7 +44,7 @@ inline double size_of(const PlacedTree& placed) {
   return 2 * placed.scale * placed.tree.header().ball_radius;
 }
 
-/// A query that tells how far the surface of what it found is from closed.
+/// A query that also reports how far the surface of its overlap is from closed.
 class GapQuery : public ExactQuery {
  public:
   using ExactQuery::ExactQuery;

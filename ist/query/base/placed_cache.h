@@ -8,8 +8,8 @@
 
 namespace ist {
 
-/// What was placed lately: each place holds the last thing with a number of the same remainder.
-/// forget() that before its first use.
+/// What was placed most recently: slot n % kPlaces holds the last thing whose number has that
+/// remainder. Call forget() before the first use.
 template <class T, std::uint32_t kPlaces>
 struct PlacedCache {
   std::uint32_t number[kPlaces];
@@ -17,7 +17,7 @@ struct PlacedCache {
 
   void forget() noexcept { std::fill_n(number, kPlaces, kNoIndex); }
 
-  /// The place of a number, and whether it holds what was placed with it.
+  /// The slot of number n, and whether it holds what was placed under n.
   std::pair<T&, bool> find(std::uint32_t n) noexcept {
     return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
   }

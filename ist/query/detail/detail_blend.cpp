@@ -238,7 +238,7 @@ Penetration mix_blend(DetailQueries& queries, const DetailChain& chain, const Bl
     const bool is_coarse = i + 1 == chain.size() && !rough && queries.is_estimate(chain[i], most);
     const Penetration part = is_coarse ? coarse : queries.ask(chain[i], most, keep_rounding);
     add(weight, part, result);
-    // At extreme sizes nought times the volume need not be nought.
+    // At extreme sizes unit3 is 0 or the volume infinite: then a slope of 0 would give NaN.
     if (of_rest.slope != 0) slope += (1 - sure.weight) * of_rest.slope / unit3 * part.volume;
     if (sure.slope != 0)
       sure_slope += sure.slope * ((i == 0 ? 1 : 0) - of_rest.weight) * part.volume;

@@ -40,7 +40,7 @@ struct alignas(64) PlacedTriangles {
   float reach;  ///< no coordinate is larger
 };
 
-/// What was placed of a mesh lately.
+/// What recent queries placed of a mesh.
 struct PlacedMesh {
   PlacedCache<PlacedBoxes, 256> boxes;
   PlacedCache<PlacedVertices, 256> vertices;

@@ -28,7 +28,7 @@ void PlanarTriangulation::set(const std::uint32_t cell, const Cell& value) {
   for (const std::uint32_t p : value.corner) cell_at_[p] = cell;
 }
 
-/// What the cell has beyond one of its sides is another one now.
+/// Replaces the neighbour beyond one of the cell's sides.
 void PlanarTriangulation::hand_over(const std::uint32_t cell, const std::uint32_t from,
                                     const std::uint32_t to) {
   if (cell == kNoIndex) return;
