@@ -1,20 +1,26 @@
 // ist as MuJoCo's narrow phase. mj_loadPluginLibrary() runs the function at the end of this file:
 // it registers the plug-in "ist.solid" and puts collide() into the SDF column of MuJoCo's table of
 // collision functions. A geom of type "sdf" with an instance of the plug-in then collides as the
-// solid of its asset; all other geoms collide as before.
+// solid of its asset; all other geoms collide as before. Rays meet the solid's mesh.
 
 #include <ist/ist.h>
+#include <ist/ist_bake.h>
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace {
 
@@ -26,32 +32,130 @@ mjfCollision before[mjNGEOMTYPES][mjNGEOMTYPES];  ///< MuJoCo's functions
 
 struct Tree {
   ist_tree_t tree = {};
+  ist_tree_info_t info = {};
   ~Tree() { ist_tree_release(&tree); }
+  bool has_mesh() const { return info.mesh_triangles > 0; }
 };
 
-/// One copy of a file, whichever models and states use it.
-std::shared_ptr<Tree> load(const std::string& file, ist_status_t& status) {
+/// One copy of what a key names, whichever models and states use it. `make` fills the tree.
+template <class Key, class Make>
+std::shared_ptr<Tree> shared(const Key& key, Make make) {
   static std::mutex mutex;
-  static std::map<std::string, std::weak_ptr<Tree>> loaded;
+  static std::map<Key, std::weak_ptr<Tree>> known;
   const std::lock_guard lock(mutex);
-  std::shared_ptr<Tree> tree = loaded[file].lock();
-  if (tree) return tree;
-  tree = std::make_shared<Tree>();
-  status = ist_tree_load(file.c_str(), nullptr, &tree->tree);
-  if (status < 0) return nullptr;
-  loaded[file] = tree;
+  if (std::shared_ptr<Tree> tree = known[key].lock()) return tree;
+  const auto tree = std::make_shared<Tree>();
+  if (!make(tree->tree)) return nullptr;
+  tree->info.size = sizeof tree->info;
+  ist_tree_get_info(&tree->tree, &tree->info);
+  known[key] = tree;
   return tree;
 }
 
-/// Meshes of more triangles are left to their spheres, which cost the same for any mesh.
-constexpr uint32_t kMostExact = 5000;
+struct Triangles {
+  std::vector<std::array<double, 3>> vertices;
+  std::vector<std::array<uint32_t, 3>> faces;
+
+  /// Bakes the surface alone: exact queries need no spheres.
+  bool bake(ist_tree_t& tree, std::string& message) const {
+    ist_bake_settings_t settings = {};
+    settings.size = sizeof settings;
+    settings.threads = 1;
+    settings.surface_only = 1;
+    char text[512] = "";
+    const ist_status_t status = ist_bake(vertices.data()->data(), vertices.size(), faces.data()->data(),
+                                         faces.size(), &settings, &tree, text, sizeof text);
+    if (status < 0) message = status == IST_NOT_BAKED ? text : ist_describe(status);
+    return status >= 0;
+  }
+};
+
+/// What a primitive geom is a multiple of: its type and its half sizes over `scale_of`. The exact
+/// measure meets it as a mesh, inscribed, so that it makes no contact where the solids are apart.
+using ShapeKey = std::array<double, 4>;
+
+double scale_of(int type, const mjtNum* size) {
+  return type == mjGEOM_BOX || type == mjGEOM_ELLIPSOID ? std::max({size[0], size[1], size[2]})
+                                                        : size[0];
+}
+
+ShapeKey shape_key(int type, const mjtNum* size) {
+  const double by = 1 / scale_of(type, size);
+  switch (type) {
+    case mjGEOM_SPHERE:
+      return {double(type), 1, 1, 1};
+    case mjGEOM_CAPSULE:
+    case mjGEOM_CYLINDER:
+      return {double(type), 1, 1, size[1] * by};
+    default:
+      return {double(type), size[0] * by, size[1] * by, size[2] * by};
+  }
+}
+
+bool is_primitive(int type) { return type >= mjGEOM_SPHERE && type <= mjGEOM_BOX; }
+
+/// A profile from pole to pole, turned about z: within 1/1,800 of the radius of what is round.
+Triangles mesh_of(const ShapeKey& key) {
+  constexpr int kAround = 96;
+  const int type = static_cast<int>(key[0]);
+  std::vector<std::array<double, 2>> rings;  // radius, height
+  const double top = type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER ? key[3] : 1;
+  if (type == mjGEOM_BOX || type == mjGEOM_CYLINDER) {
+    rings = {{1, -top}, {1, top}};
+  } else {
+    for (int k = 1; k < kAround / 2; ++k) {
+      const double angle = std::numbers::pi * (2.0 * k / kAround - 0.5);
+      const double shift = type != mjGEOM_CAPSULE ? 0 : 4 * k < kAround ? -top : top;
+      if (type == mjGEOM_CAPSULE && 4 * k == kAround) rings.push_back({1, -top});
+      rings.push_back({std::cos(angle), std::sin(angle) + shift});
+    }
+  }
+  const double pole = type == mjGEOM_CAPSULE ? top + 1 : top;
+  const int around = type == mjGEOM_BOX ? 4 : kAround;
+  const bool round = type != mjGEOM_BOX;
+  Triangles out;
+  const std::array<double, 3> by = round && type != mjGEOM_ELLIPSOID
+                                       ? std::array<double, 3>{1, 1, 1}
+                                       : std::array<double, 3>{key[1], key[2], key[3]};
+  for (const auto& [radius, height] : rings) {
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * std::numbers::pi * k / around;
+      const double x = round ? radius * std::cos(angle) : k == 0 || k == 3 ? 1 : -1;
+      const double y = round ? radius * std::sin(angle) : k < 2 ? 1 : -1;
+      out.vertices.push_back({x * by[0], y * by[1], height * by[2]});
+    }
+  }
+  const auto n = static_cast<uint32_t>(around), count = static_cast<uint32_t>(rings.size());
+  const uint32_t low = n * count, high = low + 1;
+  out.vertices.push_back({0, 0, -pole * by[2]});
+  out.vertices.push_back({0, 0, pole * by[2]});
+  for (uint32_t k = 0; k < n; ++k) {
+    const uint32_t next = (k + 1) % n, last = n * (count - 1);
+    out.faces.push_back({low, next, k});
+    out.faces.push_back({high, last + k, last + next});
+    for (uint32_t ring = 0; ring + 1 < count; ++ring) {
+      const uint32_t here = n * ring, above = here + n;
+      out.faces.push_back({here + k, here + next, above + next});
+      out.faces.push_back({here + k, above + next, above + k});
+    }
+  }
+  return out;
+}
+
+struct Shape {
+  std::shared_ptr<Tree> tree;
+  ShapeKey key = {};
+};
 
 /// What an <instance> configures.
 struct Instance {
   std::shared_ptr<Tree> tree;
   int patches = 0;  ///< 0: by the pair's measure
-  uint32_t measure = IST_MATCHED;
+  uint32_t measure = IST_EXACT;
   double scale = 0;  ///< 0: the mesh's
+  int geom = -1;     ///< one that has this instance
+  ist_placed_t local = {};  ///< the asset in that geom's own frame, for rays
+  std::vector<Shape> shapes;  ///< of the model's primitive geoms, by geom; else empty
 };
 
 /// A thread's own scratch memory.
@@ -80,19 +184,18 @@ void write_pose(Pose& pose, const mjtNum* q, const mjtNum* t) {
 }
 
 /// An asset is in the frame of the mesh's file; MuJoCo moves a mesh to its centre of mass and turns
-/// it to its principal axes.
-ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& solid) {
+/// it to its principal axes. `quat`, `pos`: of the geom.
+ist_placed_t place(const mjModel* m, const mjtNum* quat, const mjtNum* pos, int geom,
+                   const Instance& solid) {
   ist_placed_t out = {};
   out.size = sizeof out;
   out.tree = &solid.tree->tree;
-  mjtNum q[4] = {d->geom_xquat[4 * geom], d->geom_xquat[4 * geom + 1], d->geom_xquat[4 * geom + 2],
-                 d->geom_xquat[4 * geom + 3]};
-  mjtNum t[3] = {d->geom_xpos[3 * geom], d->geom_xpos[3 * geom + 1], d->geom_xpos[3 * geom + 2]};
+  mjtNum q[4] = {quat[0], quat[1], quat[2], quat[3]}, t[3] = {pos[0], pos[1], pos[2]};
   out.scale = solid.scale > 0 ? solid.scale : 1;
   if (const int mesh = m->geom_dataid[geom]; mesh >= 0) {
     mjtNum back[4], shift[3];
     mju_negQuat(back, m->mesh_quat + 4 * mesh);
-    mju_mulQuat(q, d->geom_xquat + 4 * geom, back);
+    mju_mulQuat(q, quat, back);
     mju_normalize4(q);
     mju_rotVecQuat(shift, m->mesh_pos + 3 * mesh, q);
     mju_subFrom3(t, shift);
@@ -100,6 +203,10 @@ ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& 
   }
   write_pose(out.pose, q, t);
   return out;
+}
+
+ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& solid) {
+  return place(m, d->geom_xquat + 4 * geom, d->geom_xpos + 3 * geom, geom, solid);
 }
 
 /// A geom without an asset, as a shape. False: there is none for it.
@@ -160,30 +267,68 @@ void complain_once(const char* text) {
   if (!std::exchange(said[text], true)) mju_warning("%s", text);
 }
 
+/// MuJoCo's own function for a geom of `type` against the hull of g2's mesh. It may write as many
+/// contacts as two geoms can have, and there may be room for fewer.
+int collide_hull(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
+  mjPreContact all[mjMAXCONPAIR];
+  const mjfCollision collide_convex = before[m->geom_type[g1]][mjGEOM_MESH];
+  // A margin of metres, as mj_geomDistance() has, makes depths of what overlaps wrong.
+  int count = collide_convex(m, d, all, g1, g2, 0);
+  if (count == 0 && margin > 0) count = collide_convex(m, d, all, g1, g2, margin);
+  count = std::min(count, mj_maxContact(m, g1, g2, margin > 0));
+  std::copy_n(all, count, out);
+  return count;
+}
+
+/// The measure of two solids, or nothing if what they hold does not serve one.
+std::optional<uint32_t> measure_of(const Instance& a, const Instance& b) {
+  const uint32_t wish = a.measure == IST_EXACT ? b.measure : a.measure;
+  if (wish != IST_EXACT && a.tree->info.spheres > 0 && b.tree->info.spheres > 0) return wish;
+  if (a.tree->has_mesh() && b.tree->has_mesh()) return IST_EXACT;
+  return std::nullopt;
+}
+
 /// MuJoCo's collision function of two geoms of which the second is of type sdf: types come in the
 /// order of mjtGeom, and sdf is the last.
 int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
+  const int type = m->geom_type[g1];
   const Instance *first = instance_of(m, d, g1), *second = instance_of(m, d, g2);
-  if (first == nullptr && second == nullptr)
-    return before[m->geom_type[g1]][m->geom_type[g2]](m, d, out, g1, g2, margin);
-  Scratch& memory = scratch();
-  ist_placed_t a;
-  ist_field_t field;
-  if (first != nullptr) a = place(m, d, g1, *first);
-  if (second == nullptr || (first == nullptr && !shape_of(m, d, g1, field, a))) {
-    complain_once(
-        "ist.solid: a solid meets an ellipsoid, a height field, or a mesh or SDF without an "
-        "ist.solid: "
-        "they do not collide. ist.mujoco.attach() makes solids of meshes.");
-    return 0;
-  }
-  const ist_placed_t b = place(m, d, g2, *second);
+  // An SDF of another plug-in: MuJoCo asks both for distances.
+  if (second == nullptr || (first == nullptr && type == mjGEOM_SDF))
+    return before[type][mjGEOM_SDF](m, d, out, g1, g2, margin);
   ist_contact_settings_t settings = {};
   settings.size = sizeof settings;
-  settings.measure = second->measure;
-  // A shape has no mesh, so that matched spheres meet it.
-  if (settings.measure == IST_EXACT && (first == nullptr || first->measure != IST_EXACT))
-    settings.measure = IST_MATCHED;
+  ist_placed_t a;
+  ist_field_t field;
+  if (first != nullptr) {
+    const std::optional<uint32_t> measure = measure_of(*first, *second);
+    if (!measure) {
+      complain_once(
+          "ist.solid: of two solids one has no spheres and the other no mesh: their hulls collide");
+      return collide_hull(m, d, out, g1, g2, margin);
+    }
+    settings.measure = *measure;
+    a = place(m, d, g1, *first);
+  } else if (!is_primitive(type)) {
+    return collide_hull(m, d, out, g1, g2, margin);
+  } else if (second->measure != IST_EXACT && shape_of(m, d, g1, field, a)) {
+    settings.measure = second->measure;
+  } else {
+    const Shape& shape = second->shapes[static_cast<size_t>(g1)];
+    const ShapeKey now = shape_key(type, m->geom_size + 3 * g1);
+    bool same = shape.tree != nullptr && second->tree->has_mesh();
+    for (size_t k = 0; k < now.size(); ++k) same = same && std::fabs(now[k] - shape.key[k]) < 1e-6;
+    // Where the model has changed since mjData was made, MuJoCo's function asks our distances.
+    if (!same) return before[type][mjGEOM_SDF](m, d, out, g1, g2, margin);
+    settings.measure = IST_EXACT;
+    a = {};
+    a.size = sizeof a;
+    a.tree = &shape.tree->tree;
+    a.scale = scale_of(type, m->geom_size + 3 * g1);
+    write_pose(a.pose, d->geom_xquat + 4 * g1, d->geom_xpos + 3 * g1);
+  }
+  Scratch& memory = scratch();
+  const ist_placed_t b = place(m, d, g2, *second);
   // Steps of this pair in this data are those of one motion.
   settings.pair_id = static_cast<uint32_t>((reinterpret_cast<uintptr_t>(d) >> 4) * 31 +
                                            static_cast<uintptr_t>(g1 * m->ngeom + g2 + 1));
@@ -220,6 +365,84 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   return 1;
 }
 
+/// MuJoCo marches along a ray by sdf_distance(), 40 steps at most, which misses what the ray
+/// grazes. After reset() the first point is the ray's origin and the second lies as far along it
+/// as the first distance: so the second answer is the rest of the way to the hit, and the third 0.
+struct March {
+  const void* solid = nullptr;  ///< null: no march
+  int step = 0;
+  double way = 0;    ///< from the origin to the next point
+  mjtNum origin[3] = {}, target[3] = {}, normal[3] = {};
+};
+thread_local March march;
+
+bool near(double a, double b, double size) { return std::fabs(a - b) <= 1e-9 * (size + b); }
+
+/// Positive outside. A point is in the geom's own frame, and the answers too.
+ist_surface_point_t nearest(const Instance& solid, const mjtNum x[3]) {
+  ist_surface_point_t answer = {};
+  ist_status_t status = ist_closest_point(&solid.local, x, 1, &answer, sizeof answer);
+  if (status == IST_NOT_HELD) {
+    ist_field_t surface = {};
+    surface.size = sizeof surface;
+    surface.kind = IST_MESH;
+    surface.as.mesh.tree = solid.local.tree;
+    ist_placed_t placed = solid.local;
+    placed.tree = nullptr;
+    placed.field = &surface;
+    status = ist_closest_point(&placed, x, 1, &answer, sizeof answer);
+  }
+  if (status >= 0) return answer;
+  complain_once("ist.solid: a solid has no mesh: neither rays nor cloths meet it");
+  answer.distance = 2e6;  // MuJoCo takes 1e6 for a miss
+  return answer;
+}
+
+mjtNum distance(const mjtNum x[3], const mjData* d, int i) {
+  const auto& solid = *reinterpret_cast<const Instance*>(d->plugin_data[i]);
+  March& now = march;
+  if (now.solid == &solid && now.step > 0) {
+    mjtNum way[3];
+    mju_sub3(way, x, now.origin);
+    const double length = mju_norm3(way);
+    if (!near(length, now.way, mju_norm3(now.origin) + mju_norm3(x))) {
+      now.solid = nullptr;
+    } else if (now.step == 2) {
+      now.step = 3;
+      return 0;
+    } else if (now.step == 1 && solid.tree->has_mesh()) {
+      ist_ray_t ray = {};
+      mju_copy3(ray.origin, now.origin);
+      mju_copy3(ray.direction, way);
+      ist_ray_hit_t hit = {};
+      if (ist_raycast(&solid.local, &ray, 1, &hit, sizeof hit) < 0 || !std::isfinite(hit.distance))
+        return 2e6;
+      now.step = 2;
+      now.way = std::max(hit.distance, length);
+      mju_copy3(now.target, hit.point);
+      mju_copy3(now.normal, hit.normal);
+      return now.way - length;
+    }
+  }
+  const double answer = nearest(solid, x).distance;
+  if (now.solid == &solid && now.step == 0) {
+    now.step = 1;
+    now.way = std::fabs(answer);
+    mju_copy3(now.origin, x);
+  }
+  return answer;
+}
+
+void gradient(mjtNum out[3], const mjtNum x[3], const mjData* d, int i) {
+  const auto& solid = *reinterpret_cast<const Instance*>(d->plugin_data[i]);
+  if (march.solid == &solid && march.step >= 2 &&
+      mju_dist3(x, march.target) <= 1e-6 * (march.way + mju_norm3(x))) {
+    mju_copy3(out, march.normal);
+    return;
+  }
+  mju_copy3(out, nearest(solid, x).gradient);
+}
+
 /// Refuses what cannot be read: MuJoCo raises an error of its own after the warning.
 bool read_number(const mjModel* m, int i, const char* key, double& value) {
   const char* text = mj_getPluginConfig(m, i, key);
@@ -231,12 +454,77 @@ bool read_number(const mjModel* m, int i, const char* key, double& value) {
   return false;
 }
 
+bool collides(const mjModel* m, int geom) {
+  bool paired = m->geom_contype[geom] != 0 || m->geom_conaffinity[geom] != 0;
+  for (int k = 0; k < m->npair && !paired; ++k)
+    paired = m->pair_geom1[k] == geom || m->pair_geom2[k] == geom;
+  return paired;
+}
+
+/// The mesh of a geom as the model has it: in the frame of its file, with its scale.
+Triangles mesh_of_model(const mjModel* m, int mesh) {
+  Triangles out;
+  const float* const v = m->mesh_vert + 3 * m->mesh_vertadr[mesh];
+  const int* const f = m->mesh_face + 3 * m->mesh_faceadr[mesh];
+  for (int k = 0; k < m->mesh_vertnum[mesh]; ++k) {
+    const mjtNum x[3] = {v[3 * k], v[3 * k + 1], v[3 * k + 2]};
+    std::array<double, 3> y;
+    mju_rotVecQuat(y.data(), x, m->mesh_quat + 4 * mesh);
+    mju_addTo3(y.data(), m->mesh_pos + 3 * mesh);
+    out.vertices.push_back(y);
+  }
+  for (int k = 0; k < m->mesh_facenum[mesh]; ++k)
+    out.faces.push_back({static_cast<uint32_t>(f[3 * k]), static_cast<uint32_t>(f[3 * k + 1]),
+                         static_cast<uint32_t>(f[3 * k + 2])});
+  return out;
+}
+
+/// Loads the file, or bakes the model's own mesh where there is none, such as after a move.
+bool find_tree(const mjModel* m, const char* file, Instance& out) {
+  ist_status_t status = IST_OK;
+  if (file != nullptr && *file != 0) {
+    out.tree = shared(std::string(file), [&](ist_tree_t& tree) {
+      errno = 0;
+      return (status = ist_tree_load(file, nullptr, &tree)) >= 0;
+    });
+    if (out.tree) return true;
+    if (status != IST_CANNOT_READ || errno != ENOENT) {
+      mju_warning("ist.solid: %s: %s", file, ist_describe(status));
+      return false;
+    }
+  }
+  const int mesh = out.geom < 0 ? -1 : m->geom_dataid[out.geom];
+  if (mesh < 0) {
+    mju_warning("ist.solid: the instance has no file, and no geom with a mesh has the instance");
+    return false;
+  }
+  const Triangles triangles = mesh_of_model(m, mesh);
+  std::string message;
+  std::string key(reinterpret_cast<const char*>(triangles.vertices.data()),
+                  triangles.vertices.size() * sizeof triangles.vertices[0]);
+  key.append(reinterpret_cast<const char*>(triangles.faces.data()),
+             triangles.faces.size() * sizeof triangles.faces[0]);
+  out.tree = shared(key, [&](ist_tree_t& tree) { return triangles.bake(tree, message); });
+  out.scale = 1;
+  const char* const name = m->names + m->name_meshadr[mesh];
+  if (!out.tree) {
+    mju_warning("ist.solid: the mesh \"%s\" cannot be baked: %s", name, message.c_str());
+    return false;
+  }
+  if (file != nullptr && *file != 0)
+    mju_warning("ist.solid: there is no %s: the solid is MuJoCo's copy of the mesh \"%s\"", file, name);
+  return true;
+}
+
 int init(const mjModel* m, mjData* d, int i) {
   auto made = std::make_unique<Instance>();
   double patches = made->patches;
   if (!read_number(m, i, "patches", patches) || !read_number(m, i, "scale", made->scale)) return -1;
-  made->patches =
-      patches > 0 ? static_cast<int>(std::clamp(patches, 1.0, double{kMostPatches})) : 0;
+  if (patches != 0 && !(patches >= 1 && patches <= kMostPatches && patches == std::floor(patches))) {
+    mju_warning("ist.solid: patches=\"%g\" is not a whole number from 1 to %d", patches, kMostPatches);
+    return -1;
+  }
+  made->patches = static_cast<int>(patches);
   const char* measure = mj_getPluginConfig(m, i, "measure");
   const bool chosen = measure != nullptr && *measure != 0;
   if (chosen) {
@@ -249,22 +537,16 @@ int init(const mjModel* m, mjData* d, int i) {
     }
     made->measure = found->second;
   }
+  for (auto geom = static_cast<int>(m->ngeom); geom-- > 0;)
+    if (m->geom_plugin[geom] == i) made->geom = geom;
   const char* file = mj_getPluginConfig(m, i, "file");
-  if (file == nullptr || *file == 0) {
-    mju_warning("ist.solid: the instance has no config key \"file\", the path of an .ist file");
+  if (!find_tree(m, file, *made)) return -1;
+  if (!chosen && !made->tree->has_mesh()) made->measure = IST_INNER;
+  if (made->measure == IST_EXACT ? !made->tree->has_mesh() : made->tree->info.spheres == 0) {
+    mju_warning("ist.solid: %s: measure=\"%s\" needs an asset with %s", file ? file : "a mesh without file",
+                measure, made->measure == IST_EXACT ? "a mesh" : "spheres");
     return -1;
   }
-  ist_status_t status = IST_OK;
-  made->tree = load(file, status);
-  if (!made->tree) {
-    mju_warning("ist.solid: %s: %s", file, ist_describe(status));
-    return -1;
-  }
-  ist_tree_info_t info = {};
-  info.size = sizeof info;
-  if (!chosen && ist_tree_get_info(&made->tree->tree, &info) == IST_OK && info.mesh_triangles > 0 &&
-      info.mesh_triangles <= kMostExact && info.counted_twice == 0)
-    made->measure = IST_EXACT;
   for (int geom = 0; geom < m->ngeom && !(made->scale > 0); ++geom) {
     const int mesh = m->geom_dataid[geom];
     if (m->geom_plugin[geom] != i || mesh < 0) continue;
@@ -276,6 +558,24 @@ int init(const mjModel* m, mjData* d, int i) {
         file, s[0], s[1], s[2], s[0], s[1], s[2]);
     return -1;
   }
+  if (made->geom >= 0) {
+    const mjtNum quat[4] = {1, 0, 0, 0}, pos[3] = {0, 0, 0};
+    made->local = place(m, quat, pos, made->geom, *made);
+  }
+  made->shapes.resize(static_cast<size_t>(m->ngeom));
+  for (int geom = 0; geom < m->ngeom; ++geom) {
+    const int type = m->geom_type[geom];
+    if (!is_primitive(type) || !collides(m, geom)) continue;
+    Shape& shape = made->shapes[static_cast<size_t>(geom)];
+    shape.key = shape_key(type, m->geom_size + 3 * geom);
+    std::string message;
+    shape.tree = shared(shape.key, [&](ist_tree_t& tree) {
+      return mesh_of(shape.key).bake(tree, message);
+    });
+    if (shape.tree) continue;
+    mju_warning("ist.solid: the shape of geom %d cannot be baked: %s", geom, message.c_str());
+    return -1;
+  }
   d->plugin_data[i] = reinterpret_cast<uintptr_t>(made.release());
   return 0;
 }
@@ -283,9 +583,10 @@ int init(const mjModel* m, mjData* d, int i) {
 }  // namespace
 
 mjPLUGIN_LIB_INIT(ist) {
-  if (mj_version() != mjVERSION_HEADER) {
-    mju_warning("ist.solid is for MuJoCo %d; this is %d: it is not registered", mjVERSION_HEADER,
-                mj_version());
+  // Of 4000000, 4.0.0, the last three digits are fixes, which change no type.
+  if (mj_version() / 1000 != mjVERSION_HEADER / 1000) {
+    mju_warning("ist.solid is for MuJoCo %d.%d; this is %d: it is not registered",
+                mjVERSION_HEADER / 1000000, mjVERSION_HEADER / 1000 % 1000, mj_version());
     return;
   }
   if (mjp_getPlugin(kName, nullptr) != nullptr) {
@@ -313,15 +614,15 @@ mjPLUGIN_LIB_INIT(ist) {
     delete reinterpret_cast<Instance*>(d->plugin_data[i]);
     d->plugin_data[i] = 0;
   };
-  plugin.reset = [](const mjModel*, mjtNum*, void*, int) {};
-  plugin.compute = [](const mjModel*, mjData*, int, int) {};
-  // MuJoCo asks these of SDF geoms that it collides itself, and builds an octree by one of them.
-  // No geom of ours comes there.
-  plugin.sdf_distance = [](const mjtNum*, const mjData*, int) -> mjtNum { return 1; };
-  plugin.sdf_gradient = [](mjtNum gradient[3], const mjtNum*, const mjData*, int) {
-    gradient[0] = gradient[1] = 0;
-    gradient[2] = 1;
+  plugin.reset = [](const mjModel*, mjtNum*, void* solid, int) {
+    march.solid = solid;
+    march.step = 0;
   };
+  plugin.compute = [](const mjModel*, mjData*, int, int) { march.solid = nullptr; };
+  // MuJoCo asks these for rays, cloths, touch grids and SDFs of other plug-ins.
+  plugin.sdf_distance = distance;
+  plugin.sdf_gradient = gradient;
+  // A mesh made by marching cubes would be these; an asset's is a file.
   plugin.sdf_staticdistance = [](const mjtNum x[3], const mjtNum*) -> mjtNum {
     return mju_norm3(x) - 0.5;
   };

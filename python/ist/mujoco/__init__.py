@@ -9,28 +9,36 @@
 `python -m ist.mujoco scene.xml` runs a scene. docs/mujoco.md has the settings that matter.
 """
 
-import hashlib
+from __future__ import annotations
+
+import collections.abc
+import ctypes
 import os
 import pathlib
+import typing
+import warnings
 
 import ist
 import mujoco
+from ist.mujoco import _masses, _solids
 
 __all__ = ["attach", "load", "plugin_path"]
 
-#: The version of MuJoCo that the plug-in is built for.
-VERSION = "4.0.0"
+#: The version of MuJoCo that the plug-in is built for, without the number of the fix.
+VERSION = "4.0"
 
 _loaded = False
 
 
-def plugin_path():
+def plugin_path() -> str:
     """Path of libmujoco_ist.so, for hosts that load plug-ins themselves."""
     return str(pathlib.Path(__file__).with_name("libmujoco_ist.so"))
 
 
-def load():
+def load() -> str:
     """Loads the plug-in `ist.solid` into MuJoCo, once a process. Returns its path.
+
+    The import of ist.mujoco has called it: a model from an .mjb file needs no more than the import.
 
     Raises ImportError where MuJoCo is not of the version that the plug-in is built for, or where
     this build of ist has no plug-in.
@@ -39,61 +47,103 @@ def load():
     path = plugin_path()
     if _loaded:
         return path
-    if mujoco.__version__ != VERSION:
+    if mujoco.__version__.split(".")[:2] != VERSION.split("."):
         raise ImportError(f"ist.mujoco is built for MuJoCo {VERSION}, not {mujoco.__version__}. "
-                          f"Install it: pip install mujoco=={VERSION}")
+                          f"Install it: pip install 'mujoco=={VERSION}.*'")
     if not os.path.exists(path):
         raise ImportError("this build of ist has no plug-in for MuJoCo: see docs/mujoco.md")
+    # The plug-in finds MuJoCo's functions by name: it names no version of the library.
+    library = pathlib.Path(mujoco.__file__).with_name(f"libmujoco.so.{mujoco.__version__}")
+    ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     mujoco.mj_loadPluginLibrary(path)
     _loaded = True
     return path
 
 
-def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=None):
+def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = None,
+           cache: str | os.PathLike[str] | None = None, *, spheres: int = 4000,
+           patches: int | None = None,
+           measure: typing.Literal["matched", "inner", "exact"] | None = None,
+           repair: bool = False) -> int:
     """Makes solids of the colliding mesh geoms of an MjSpec; returns their number.
 
     Each such geom becomes one of type sdf with an instance of the plug-in `ist.solid`. Its mesh is
-    baked from the vertices that MuJoCo has, so scales of any kind are right, and has the solid's
-    mass properties (inertia="exact"). Compile the spec afterwards.
+    baked from its file, or from MuJoCo's copy where there is no file that ist reads, with the
+    mesh's scale, refpos and refquat. A body whose mass MuJoCo infers gets the mass and inertia of
+    its solids, at each geom's density or mass. Compile the spec afterwards.
 
-    geoms: names of geoms; None: all mesh geoms with a contype or a conaffinity. A mesh that
-        is left out does not collide with a solid.
+    geoms: names of geoms; None: all mesh geoms that collide, by contype and conaffinity or in a
+        <pair>. A mesh that is left out stays its hull, for solids too.
     cache: folder of baked assets; None: $XDG_CACHE_HOME/ist or ~/.cache/ist.
-    spheres: of each solid, at most.
+    spheres: of each solid, at most; baked where the measure is not "exact".
     patches: contacts of a pair, at most, 1 to 50; None: 16 of exact overlaps, 8 of spheres.
         MuJoCo's own limit is sdf_initpoints (40).
-    measure: "matched", "inner" or "exact"; exact between two solids that both have it. None: exact
-        for meshes of at most 5,000 triangles, matched for others.
+    measure: None or "exact": the true overlap, between two solids that both have it and with
+        primitive geoms. A solid whose mesh cannot serve has "inner" by default. "matched" and
+        "inner": by spheres.
+    repair: close the holes of meshes that are not closed, as ist.close_mesh(…, repair=True).
 
-    Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.close_mesh) or
-    leave it out of `geoms`.
+    Warns of each mesh that cannot be baked, which stays MuJoCo's hull, of findings of the bakes, of
+    files that MuJoCo has read differently, and of flexes that solids do not meet. Raises
+    ist.OpenMeshError for such a mesh of a geom that `geoms` names, and ValueError or TypeError for
+    an argument; then the spec is as it was.
     """
     load()
+    if not isinstance(spec, mujoco.MjSpec):
+        raise TypeError(f"attach takes an MjSpec, not {type(spec).__name__}: "
+                        "mujoco.MjSpec.from_file(path)")
+    if isinstance(geoms, str):
+        raise TypeError(f"geoms is a list of names: [{geoms!r}]")
+    if patches is not None and not (isinstance(patches, int) and 1 <= patches <= 50):
+        raise ValueError(f"patches={patches!r} is not a whole number from 1 to 50")
+    if measure not in (None, "matched", "inner", "exact"):
+        raise ValueError(f"measure={measure!r} is none of 'matched', 'inner', 'exact'")
     model = spec.compile()
     wanted = None if geoms is None else set(geoms)
-    if wanted is not None:
-        unknown = wanted - {g.name for g in spec.geoms if g.type == mujoco.mjtGeom.mjGEOM_MESH}
+    meshes = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_MESH and geom.id >= 0]
+    if wanted is None:
+        paired = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
+        chosen = [geom for geom in meshes if model.geom_contype[geom.id] or model.geom_conaffinity[geom.id]
+                  or geom.name in paired]
+    else:
+        unknown = wanted - {geom.name for geom in meshes}
         if unknown:
             raise ValueError(f"geoms: the scene has no mesh geom named {sorted(unknown)[0]!r}")
+        chosen = [geom for geom in meshes if geom.name in wanted]
     folder = _folder(cache)
-    instances = {}
-    count = 0
-    for geom in spec.geoms:
-        if geom.type != mujoco.mjtGeom.mjGEOM_MESH:
+    solids: dict[int, _solids.Solid | None] = {}
+    for geom in chosen:
+        mesh = int(model.geom_dataid[geom.id])
+        if mesh in solids:
             continue
-        if wanted is not None and geom.name not in wanted:
-            continue
-        if wanted is None and model.geom_contype[geom.id] == 0 and model.geom_conaffinity[geom.id] == 0:
-            continue
+        try:
+            solids[mesh] = _solids.of_mesh(spec, model, mesh, geom.meshname, folder, spheres, measure, repair)
+        except ist.Error as error:
+            if wanted is not None:
+                raise
+            solids[mesh] = None
+            way = "" if repair else "attach(repair=True) may close it, "
+            _warn(f"mesh {geom.meshname!r} stays the hull that MuJoCo makes of it: {error}. {way}geoms= can leave it out")
+    for flex in spec.flexes:
+        if chosen and flex.dim != 2 and (flex.contype or flex.conaffinity):
+            _warn(f"flex {flex.name!r} does not meet solids: MuJoCo collides only flexes of dim 2 with geoms of type sdf")
+    # Nothing is changed until here.
+    chosen = [geom for geom in chosen if solids[int(model.geom_dataid[geom.id])] is not None]
+    _masses.set_bodies(spec, model, {geom.id: solids[int(model.geom_dataid[geom.id])] for geom in chosen})
+    instances: dict[int, str] = {}
+    for geom in chosen:
         mesh = int(model.geom_dataid[geom.id])
         if mesh not in instances:
-            instances[mesh] = _instance(spec, model, mesh, geom.meshname, folder, spheres, patches, measure)
+            instances[mesh] = _instance(spec, geom.meshname, solids[mesh], patches, measure)
         geom.type = mujoco.mjtGeom.mjGEOM_SDF
         geom.plugin.active = True
         geom.plugin.plugin_name = "ist.solid"
         geom.plugin.name = instances[mesh]
-        count += 1
-    return count
+    return len(chosen)
+
+
+def _warn(text):
+    warnings.warn(f"ist.mujoco: {text}", stacklevel=3)
 
 
 def _folder(cache):
@@ -104,40 +154,18 @@ def _folder(cache):
     return folder.absolute()
 
 
-def _instance(spec, model, mesh, name, folder, spheres, patches, measure):
+def _instance(spec, name, solid, patches, measure):
     if not any(p.plugin_name == "ist.solid" for p in spec.plugins):
         spec.activate_plugin("ist.solid")
     plugin = spec.add_plugin(name=f"ist {name} {len(spec.plugins)}", plugin_name="ist.solid", active=True)
-    plugin.config = {
-        "file": str(_baked(model, mesh, name, folder, spheres)),
-        "scale": "1",
-    } | {key: str(value) for key, value in {"patches": patches, "measure": measure}.items() if value is not None}
-    for m in spec.meshes:
-        if m.name == name:
-            m.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT
+    plugin.config = {"file": str(solid.path), "scale": "1"} | {
+        key: str(value) for key, value in {"patches": patches, "measure": measure}.items() if value is not None}
+    stock = any(geom.type == mujoco.mjtGeom.mjGEOM_SDF and geom.meshname == name and not geom.plugin.active
+                for geom in spec.geoms)
+    for mesh in spec.meshes:
+        if mesh.name == name and not stock:
+            mesh.octree_maxdepth = 1  # MuJoCo makes an octree of each sdf geom's mesh: unused here
     return plugin.name
 
 
-def _baked(model, mesh, name, folder, spheres):
-    """The asset of a compiled mesh, in the frame of its file but with its scale."""
-    import numpy as np
-
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.mesh_quat[mesh])
-    vertices = model.mesh_vert[first:first + count].astype(float) @ turn.reshape(3, 3).T + model.mesh_pos[mesh]
-    first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    faces = np.ascontiguousarray(model.mesh_face[first:first + count], dtype=np.uint32)
-    key = hashlib.sha256(f"{ist._core._bake_revision} {spheres} ".encode() + vertices.tobytes() + faces.tobytes())
-    path = folder / f"{key.hexdigest()[:32]}.ist"
-    if path.exists():
-        try:
-            ist.Asset.load(path)
-            return path
-        except ist.Error:  # of another format: baked again
-            pass
-    asset = ist.bake(ist.close_mesh(ist.Mesh(vertices, faces), name=name), max_spheres=spheres)
-    part = path.with_suffix(f".{os.getpid()}")
-    asset.save(part)
-    os.replace(part, path)  # another process may bake the same
-    return path
+load()
