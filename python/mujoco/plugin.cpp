@@ -94,50 +94,61 @@ ShapeKey shape_key(int type, const mjtNum* size) {
 
 bool is_primitive(int type) { return type >= mjGEOM_SPHERE && type <= mjGEOM_BOX; }
 
-/// A profile from pole to pole, turned about z: within 1/1,800 of the radius of what is round.
+/// Rings from pole to pole. A ball's are those of an octahedron's faces, divided: no vertex has many
+/// triangles. Within 1/1,800 of the radius of what is round.
 Triangles mesh_of(const ShapeKey& key) {
-  constexpr int kAround = 96;
-  const int type = static_cast<int>(key[0]);
-  std::vector<std::array<double, 2>> rings;  // radius, height
-  const double top = type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER ? key[3] : 1;
-  if (type == mjGEOM_BOX || type == mjGEOM_CYLINDER) {
-    rings = {{1, -top}, {1, top}};
+  constexpr uint32_t kQuarter = 24;  // of a ring's points
+  struct Ring {
+    uint32_t count;
+    double radius, height;
+  };
+  const auto type = static_cast<int>(key[0]);
+  const bool capsule = type == mjGEOM_CAPSULE, box = type == mjGEOM_BOX;
+  std::vector<Ring> lower;  // and its mirror image
+  const double half = capsule || type == mjGEOM_CYLINDER ? key[3] : 1;
+  if (box || type == mjGEOM_CYLINDER) {
+    lower = {{1, 0, -half}, {box ? 4 : 4 * kQuarter, 1, -half}};
   } else {
-    for (int k = 1; k < kAround / 2; ++k) {
-      const double angle = std::numbers::pi * (2.0 * k / kAround - 0.5);
-      const double shift = type != mjGEOM_CAPSULE ? 0 : 4 * k < kAround ? -top : top;
-      if (type == mjGEOM_CAPSULE && 4 * k == kAround) rings.push_back({1, -top});
-      rings.push_back({std::cos(angle), std::sin(angle) + shift});
+    for (uint32_t k = 0; k <= kQuarter; ++k) {
+      const double angle = 0.5 * std::numbers::pi * k / kQuarter;
+      lower.push_back({std::max(1u, 4 * k), std::sin(angle),
+                       (k < kQuarter ? -std::cos(angle) : 0) - (capsule ? half : 0)});
     }
   }
-  const double pole = type == mjGEOM_CAPSULE ? top + 1 : top;
-  const int around = type == mjGEOM_BOX ? 4 : kAround;
-  const bool round = type != mjGEOM_BOX;
+  const bool stretched = box || type == mjGEOM_ELLIPSOID;
+  const double by[3] = {stretched ? key[1] : 1, stretched ? key[2] : 1, stretched ? key[3] : 1};
   Triangles out;
-  const std::array<double, 3> by = round && type != mjGEOM_ELLIPSOID
-                                       ? std::array<double, 3>{1, 1, 1}
-                                       : std::array<double, 3>{key[1], key[2], key[3]};
-  for (const auto& [radius, height] : rings) {
-    for (int k = 0; k < around; ++k) {
-      const double angle = 2 * std::numbers::pi * k / around;
-      const double x = round ? radius * std::cos(angle) : k == 0 || k == 3 ? 1 : -1;
-      const double y = round ? radius * std::sin(angle) : k < 2 ? 1 : -1;
-      out.vertices.push_back({x * by[0], y * by[1], height * by[2]});
+  const auto add = [&](const Ring& ring, double sign) {
+    for (uint32_t k = 0; k < ring.count; ++k) {
+      const double angle = 2 * std::numbers::pi * k / ring.count;
+      const double x = box && ring.count > 1 ? (k % 3 == 0 ? 1 : -1) : ring.radius * std::cos(angle);
+      const double y = box && ring.count > 1 ? (k < 2 ? 1 : -1) : ring.radius * std::sin(angle);
+      out.vertices.push_back({x * by[0], y * by[1], sign * ring.height * by[2]});
     }
+  };
+  std::vector<uint32_t> counts;
+  for (const Ring& ring : lower) {
+    counts.push_back(ring.count);
+    add(ring, 1);
   }
-  const auto n = static_cast<uint32_t>(around), count = static_cast<uint32_t>(rings.size());
-  const uint32_t low = n * count, high = low + 1;
-  out.vertices.push_back({0, 0, -pole * by[2]});
-  out.vertices.push_back({0, 0, pole * by[2]});
-  for (uint32_t k = 0; k < n; ++k) {
-    const uint32_t next = (k + 1) % n, last = n * (count - 1);
-    out.faces.push_back({low, next, k});
-    out.faces.push_back({high, last + k, last + next});
-    for (uint32_t ring = 0; ring + 1 < count; ++ring) {
-      const uint32_t here = n * ring, above = here + n;
-      out.faces.push_back({here + k, here + next, above + next});
-      out.faces.push_back({here + k, above + next, above + k});
+  const size_t shared_rings = lower.back().height == 0 ? 1 : 0;  // a ball's equator
+  for (size_t k = lower.size() - shared_rings; k-- > 0;) {
+    counts.push_back(lower[k].count);
+    add(lower[k], -1);
+  }
+  uint32_t below = 0;
+  for (size_t ring = 0; ring + 1 < counts.size(); ++ring) {
+    const uint32_t a = counts[ring], b = counts[ring + 1], above = below + a;
+    for (uint32_t i = 0, j = 0; i < a || j < b;) {
+      if (j == b || (i < a && (i + 1) * b <= (j + 1) * a)) {
+        if (a > 1) out.faces.push_back({below + i, below + (i + 1) % a, above + j % b});
+        ++i;
+      } else {
+        if (b > 1) out.faces.push_back({below + i % a, above + (j + 1) % b, above + j});
+        ++j;
+      }
     }
+    below = above;
   }
   return out;
 }
@@ -512,7 +523,8 @@ bool find_tree(const mjModel* m, const char* file, Instance& out) {
     return false;
   }
   if (file != nullptr && *file != 0)
-    mju_warning("ist.solid: there is no %s: the solid is MuJoCo's copy of the mesh \"%s\"", file, name);
+    complain_once(("ist.solid: there is no " + std::string(file) +
+                   ": the solid is MuJoCo's copy of the mesh \"" + name + "\"").c_str());
   return true;
 }
 

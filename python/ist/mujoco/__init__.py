@@ -139,7 +139,47 @@ def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = No
         geom.plugin.active = True
         geom.plugin.plugin_name = "ist.solid"
         geom.plugin.name = instances[mesh]
+    _meet_terrains(spec, chosen)
     return len(chosen)
+
+
+def _meet_terrains(spec, solids):
+    """MuJoCo has no room for contacts of a height field with a geom of type sdf: hulls meet it."""
+    terrains = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD]
+    excluded = {frozenset((pair.bodyname1, pair.bodyname2)) for pair in spec.excludes}
+    taken = {geom.name for geom in spec.geoms}
+
+    def named(geom, like):
+        if not geom.name:
+            geom.name = next(name for name in (f"{like} {k}" for k in range(len(taken) + 1)) if name not in taken)
+            taken.add(geom.name)
+        return geom.name
+
+    for solid in solids if terrains else ():
+        hull = None
+        for terrain in terrains:
+            names = {terrain.name, solid.name}
+            paired = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} == names]
+            if not paired and (
+                    not (solid.contype & terrain.conaffinity or terrain.contype & solid.conaffinity)
+                    or solid.parent.id == terrain.parent.id
+                    or frozenset((solid.parent.name, terrain.parent.name)) in excluded):
+                continue
+            if hull is None:
+                hull = solid.parent.add_geom(
+                    type=mujoco.mjtGeom.mjGEOM_MESH, meshname=solid.meshname, pos=solid.pos, quat=solid.quat,
+                    contype=0, conaffinity=0, mass=0, rgba=[0, 0, 0, 0], group=solid.group,
+                    friction=solid.friction, solref=solid.solref, solimp=solid.solimp, condim=solid.condim,
+                    margin=solid.margin, gap=solid.gap, priority=solid.priority, solmix=solid.solmix)
+                named(hull, "ist hull")
+            for pair in paired:
+                pair.geomname1, pair.geomname2 = named(terrain, "ist terrain"), hull.name
+            if not paired:
+                first = max((solid, terrain), key=lambda geom: (geom.priority, geom.condim))
+                undefined = float("nan")  # MuJoCo mixes what the two geoms have
+                spec.add_pair(geomname1=named(terrain, "ist terrain"), geomname2=hull.name, condim=first.condim,
+                              friction=[undefined] * 5, solref=[undefined] * 2, solimp=[undefined] * 5,
+                              margin=undefined, gap=undefined)
 
 
 def _warn(text):

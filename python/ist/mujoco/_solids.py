@@ -60,7 +60,7 @@ def _from_file(spec, model, mesh, name):
         _warn(f"mesh {name!r} is MuJoCo's copy, since its file is not read: {error}")
         return vertices, faces
     turn = np.zeros(9)
-    mujoco.mju_quat2Mat(turn, entry.refquat)
+    mujoco.mju_quat2Mat(turn, entry.refquat / np.linalg.norm(entry.refquat))
     own = (loaded.vertices - entry.refpos) @ turn.reshape(3, 3) * entry.scale
     triangles = np.ascontiguousarray(loaded.triangles[:, ::-1] if np.prod(entry.scale) < 0 else loaded.triangles)
     size = np.ptp(vertices, axis=0).max()
