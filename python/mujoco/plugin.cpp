@@ -328,8 +328,11 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     const Shape& shape = second->shapes[static_cast<size_t>(g1)];
     const ShapeKey now = shape_key(type, m->geom_size + 3 * g1);
     bool same = shape.tree != nullptr && second->tree->has_mesh();
+    // A planet's facets are too coarse for a stone.
+    const bool flat = type == mjGEOM_BOX || type == mjGEOM_CYLINDER;
+    same = same && (flat || scale_of(type, m->geom_size + 3 * g1) < 50 * m->geom_rbound[g2]);
     for (size_t k = 0; k < now.size(); ++k) same = same && std::fabs(now[k] - shape.key[k]) < 1e-6;
-    // Where the model has changed since mjData was made, MuJoCo's function asks our distances.
+    // There, and where the model has changed since mjData was made, MuJoCo asks for distances.
     if (!same) return before[type][mjGEOM_SDF](m, d, out, g1, g2, margin);
     settings.measure = IST_EXACT;
     a = {};
