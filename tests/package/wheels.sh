@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Wheels as users get them: each in new environments without packages of the system, with NumPy 1.26
-# and 2 where there are such, and the last with JAX, trimesh and MuJoCo. PyPI is asked for these alone.
+# and 2 where there are such, and the last with JAX, trimesh and MuJoCo. PyPI is asked for these alone,
+# and for models of MuJoCo's.
 # Of wheels with and without the GPU, those without, which have the version of the source package.
 # usage: wheels.sh DIST FOLDER PYTHON…
 set -euo pipefail
@@ -29,8 +30,10 @@ bin=$PWD/$environment/bin
 mujoco=$("$bin/python" -c 'from importlib.metadata import requires
 print(*(r.split(";")[0] for r in requires("ist") if r.startswith("mujoco")))')
 "${pip[@]}" install jax pytest trimesh "$mujoco"
+mapfile -t models < <(sed -n 's/^mujoco_models=(\(.*\))$/\1/p' "$here/../../dev" | tr ' ' '\n')
+"${pip[@]}" install --no-deps "${models[@]}"
 export PYTHONDONTWRITEBYTECODE=1 IST_PROGRAM=$bin/ist
-"$bin/python" -m pytest -q -rs -p no:cacheprovider "$here"/../python/test_{jax,mujoco}.py
+"$bin/python" -m pytest -q -rs -p no:cacheprovider "$here"/../python/test_{jax,mujoco,mujoco_models}.py
 "$bin/python" - <<'END'
 import ist, trimesh
 assert abs(ist.bake(trimesh.creation.box((1, 2, 3)), max_spheres=100).volume - 6) < 1e-9
