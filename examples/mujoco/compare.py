@@ -87,6 +87,10 @@ class Scene:
 
     seconds, step, options = 1.0, 0.001, ""
     settings = {"spheres": 4000}  # of ist.mujoco.attach
+    meshes = {}
+
+    def start(self, model, data):
+        """Before the first step."""
 
     def judge(self, model, data, log):
         """(holds, words)"""
@@ -111,6 +115,24 @@ class Nut(Scene):
             return False, f"does not turn, {off:.2g} mm off its axis"
         pitch = 1e3 * abs(np.polyfit(turn / (2 * np.pi), log[:, 2], 1)[0])
         return abs(pitch - 2) < 0.05, f"{pitch:.3f} mm a turn over {turns:.2f}, {off:.3f} mm off its axis"
+
+
+class Thread(Nut):
+    """The bolt stands on its head, and the nut runs down from its end by 3.2 turns and more."""
+
+    seconds = 1.2
+    bodies = f"""<geom name="bolt" mesh="bolt" {STIFF} friction="0" pos="0 0 .021" euler="180 0 0"/>
+      <body name="nut" pos="0 0 .0185"><freejoint/><geom name="nut" mesh="nut" {STIFF} friction="0"/></body>"""
+
+    def judge(self, model, data, log):
+        log = np.array(log)
+        turn = np.unwrap(2 * np.arctan2(log[:, 6], log[:, 3]), period=2 * np.pi) / (2 * np.pi)
+        log = log[100:int(np.searchsorted(np.abs(turn), 3.2))]
+        turn = turn[100:100 + len(log)]
+        if len(log) < 100:
+            return False, "does not turn"
+        off = min(np.ptp(1e3 * log[:, 2] + sign * 2 * turn) / 2 for sign in (-1, 1))
+        return bool(off < 0.2), f"{abs(turn[-1]):.2f} turns, height within {off:.3f} mm of the helix, {1e3 * np.abs(log[:, :2]).max():.3f} mm off its axis"
 
 
 class Mug(Scene):
@@ -244,7 +266,51 @@ class Torch(Scene):
                 f"{height[-1]:.2f} mm high (9 on the floor), {tilt.max():.2f}° tilted, {speed:.1f} mm/s at the end")
 
 
-SCENES = {scene.__name__.lower(): scene for scene in (Nut, Mug, Pin, Bowl, Chain, Hook, Pipe, Gears, Torch)}
+class Cloth(Scene):
+    """A cloth falls over a table's corner: MuJoCo's own contacts of a flex, by distances of the solid."""
+
+    seconds, step = 0.3, 0.001
+    options = '<option sdf_iterations="3"/>'
+    meshes = {"table": (turned([(.002, -.02), (.05, -.02), (.05, 0), (.002, 0)]), "1")}
+    bodies = """<geom name="table" mesh="table"/><flexcomp name="cloth" type="grid" count="9 9 1" spacing=".02 .02 .02"
+      dim="2" pos="0 0 .01" radius=".002" mass=".2"><contact selfcollide="none"/>
+      <elasticity young="3e3" poisson=".1" thickness="5e-3" elastic2d="stretch"/><edge damping=".001"/></flexcomp>"""
+
+    def judge(self, model, data, log):
+        middle = 1e3 * data.flexvert_xpos[40, 2]
+        return bool(abs(middle) < 5), f"its middle is {middle:.1f} mm above the table"
+
+
+class Arm(Scene):
+    """A torque turns an arm that a package ships about its first joint: no contact brakes it."""
+
+    seconds, step = 0.5, 0.002
+    file, joint = "gym_xarm/tasks/assets/reach.xml", "joint1"
+
+    def spec(self):
+        for folder in sys.path:
+            if (path := pathlib.Path(folder) / self.file).is_file():
+                spec = mujoco.MjSpec.from_file(str(path))
+                spec.option.gravity, spec.option.timestep = [0, 0, 0], self.step
+                return spec
+        raise ValueError(f"no {self.file} in PYTHONPATH: pip install --no-deps gym-xarm==0.1.1")
+
+    def start(self, model, data):
+        data.qfrc_applied[model.joint(self.joint).dofadr[0]] = 30
+
+    def judge(self, model, data, log):
+        place = model.joint(self.joint).qposadr[0]
+        free, flags = mujoco.MjData(model), model.opt.disableflags
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        self.start(model, free)
+        for _ in log:
+            mujoco.mj_step(model, free)
+        model.opt.disableflags = flags
+        turned, expected = log[-1][place], free.qpos[place]
+        return bool(abs(turned - expected) < 0.02 * abs(expected)), f"turns {turned:.3f} rad, {expected:.3f} without contacts"
+
+
+SCENES = {scene.__name__.lower(): scene for scene in (Nut, Thread, Mug, Pin, Bowl, Chain, Hook, Pipe, Gears, Torch, Arm, Cloth)}
 
 
 def write_obj(path, mesh):
@@ -255,6 +321,16 @@ def write_obj(path, mesh):
 
 def spec_of(scene, way, folder, measure=None):
     """The scene as an mjSpec; its meshes are files of a folder. `measure`: of ist.mujoco.attach."""
+    if isinstance(scene, Arm):
+        spec = scene.spec()
+        for geom in spec.geoms if way == "sdf" else ():
+            if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
+                geom.type = mujoco.mjtGeom.mjGEOM_SDF
+        if way == "ist":
+            ist.mujoco.attach(spec, cache=folder.parent / "cache", measure=measure)
+        elif way == "pieces":
+            raise ValueError("not divided")
+        return spec
     assets, pieces = [], {}
     for name, (mesh, scale) in scene.meshes.items():
         if way == "pieces":
@@ -324,7 +400,8 @@ def run(name, way, folder, films, measure=None):
     except ValueError as error:
         return row | {"holds": False, "words": str(error).splitlines()[0]}
     data = mujoco.MjData(model)
-    truth = Truth(scene) if way != "pieces" else None
+    scene.start(model, data)
+    truth = Truth(scene) if way != "pieces" and scene.meshes else None
     film = None
     if films and way == "ist":
         from ist.mujoco.film import Film
