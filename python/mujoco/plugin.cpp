@@ -63,8 +63,9 @@ struct Triangles {
     settings.threads = 1;
     settings.surface_only = 1;
     char text[512] = "";
-    const ist_status_t status = ist_bake(vertices.data()->data(), vertices.size(), faces.data()->data(),
-                                         faces.size(), &settings, &tree, text, sizeof text);
+    const ist_status_t status =
+        ist_bake(vertices.data()->data(), vertices.size(), faces.data()->data(), faces.size(),
+                 &settings, &tree, text, sizeof text);
     if (status < 0) message = status == IST_NOT_BAKED ? text : ist_describe(status);
     return status >= 0;
   }
@@ -82,8 +83,6 @@ double scale_of(int type, const mjtNum* size) {
 ShapeKey shape_key(int type, const mjtNum* size) {
   const double by = 1 / scale_of(type, size);
   switch (type) {
-    case mjGEOM_SPHERE:
-      return {double(type), 1, 1, 1};
     case mjGEOM_CAPSULE:
     case mjGEOM_CYLINDER:
       return {double(type), 1, 1, size[1] * by};
@@ -94,8 +93,8 @@ ShapeKey shape_key(int type, const mjtNum* size) {
 
 bool is_primitive(int type) { return type >= mjGEOM_SPHERE && type <= mjGEOM_BOX; }
 
-/// Rings from pole to pole. A ball's are those of an octahedron's faces, divided: no vertex has many
-/// triangles. Within 1/1,800 of the radius of what is round.
+/// Rings from pole to pole. A ball's are those of an octahedron's faces, divided: no vertex has
+/// many triangles. Within 1/1,800 of the radius of what is round.
 Triangles mesh_of(const ShapeKey& key) {
   constexpr uint32_t kQuarter = 24;  // of a ring's points
   struct Ring {
@@ -121,7 +120,8 @@ Triangles mesh_of(const ShapeKey& key) {
   const auto add = [&](const Ring& ring, double sign) {
     for (uint32_t k = 0; k < ring.count; ++k) {
       const double angle = 2 * std::numbers::pi * k / ring.count;
-      const double x = box && ring.count > 1 ? (k % 3 == 0 ? 1 : -1) : ring.radius * std::cos(angle);
+      const double x =
+          box && ring.count > 1 ? (k % 3 == 0 ? 1 : -1) : ring.radius * std::cos(angle);
       const double y = box && ring.count > 1 ? (k < 2 ? 1 : -1) : ring.radius * std::sin(angle);
       out.vertices.push_back({x * by[0], y * by[1], sign * ring.height * by[2]});
     }
@@ -163,9 +163,9 @@ struct Instance {
   std::shared_ptr<Tree> tree;
   int patches = 0;  ///< 0: by the pair's measure
   uint32_t measure = IST_EXACT;
-  double scale = 0;  ///< 0: the mesh's
-  int geom = -1;     ///< one that has this instance
-  ist_placed_t local = {};  ///< the asset in that geom's own frame, for rays
+  double scale = 0;           ///< 0: the mesh's
+  int geom = -1;              ///< one that has this instance
+  ist_placed_t local = {};    ///< the asset in that geom's own frame, for rays
   std::vector<Shape> shapes;  ///< of the model's primitive geoms, by geom; else empty
 };
 
@@ -291,6 +291,37 @@ int collide_hull(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2,
   return count;
 }
 
+/// A ball g1 against a solid's mesh: the nearest point of the mesh, and whatever else the ball is
+/// in once it is pushed out there, such as the other wall of a groove.
+int collide_ball(const mjModel* m, mjData* d, mjPreContact* out, int g1, const ist_placed_t& solid,
+                 mjtNum margin, int most) {
+  const mjtNum radius = m->geom_size[3 * g1];
+  const mjtNum* const centre = d->geom_xpos + 3 * g1;
+  mjtNum place[3] = {centre[0], centre[1], centre[2]};
+  int count = 0;
+  for (mjtNum deep = 0; count < std::min(most, 4); ++count) {
+    ist_surface_point_t near = {};
+    if (const ist_status_t status = ist_closest_point(&solid, place, 1, &near, sizeof near);
+        status < 0) {
+      complain_once((std::string("ist.solid: ") + ist_describe(status)).c_str());
+      return count;
+    }
+    const mjtNum push = radius - near.distance;
+    if (count == 0 ? push <= -margin : push <= 0.02 * deep) return count;
+    mjtNum way[3];
+    mju_sub3(way, centre, near.point);
+    mjPreContact& contact = out[count];
+    contact.dist = mju_dot3(way, near.gradient) - radius;
+    if (count > 0 && contact.dist > 0) return count;
+    mju_scl3(contact.normal, near.gradient, -1);
+    mju_addScl3(contact.pos, centre, near.gradient, -(radius + 0.5 * contact.dist));
+    mju_zero3(contact.tangent);
+    mju_addToScl3(place, near.gradient, push);
+    deep = std::max(deep, push);
+  }
+  return count;
+}
+
 /// The measure of two solids, or nothing if what they hold does not serve one.
 std::optional<uint32_t> measure_of(const Instance& a, const Instance& b) {
   const uint32_t wish = a.measure == IST_EXACT ? b.measure : a.measure;
@@ -324,6 +355,10 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     return collide_hull(m, d, out, g1, g2, margin);
   } else if (second->measure != IST_EXACT && shape_of(m, d, g1, field, a)) {
     settings.measure = second->measure;
+  } else if (type == mjGEOM_SPHERE) {
+    return collide_ball(m, d, out, g1, place(m, d, g2, *second), margin,
+                        std::min(second->patches > 0 ? second->patches : kMostPatches,
+                                 mj_maxContact(m, g1, g2, margin > 0)));
   } else {
     const Shape& shape = second->shapes[static_cast<size_t>(g1)];
     const ShapeKey now = shape_key(type, m->geom_size + 3 * g1);
@@ -385,7 +420,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
 struct March {
   const void* solid = nullptr;  ///< null: no march
   int step = 0;
-  double way = 0;    ///< from the origin to the next point
+  double way = 0;  ///< from the origin to the next point
   mjtNum origin[3] = {}, target[3] = {}, normal[3] = {};
 };
 thread_local March march;
@@ -527,7 +562,8 @@ bool find_tree(const mjModel* m, const char* file, Instance& out) {
   }
   if (file != nullptr && *file != 0)
     complain_once(("ist.solid: there is no " + std::string(file) +
-                   ": the solid is MuJoCo's copy of the mesh \"" + name + "\"").c_str());
+                   ": the solid is MuJoCo's copy of the mesh \"" + name + "\"")
+                      .c_str());
   return true;
 }
 
@@ -535,8 +571,10 @@ int init(const mjModel* m, mjData* d, int i) {
   auto made = std::make_unique<Instance>();
   double patches = made->patches;
   if (!read_number(m, i, "patches", patches) || !read_number(m, i, "scale", made->scale)) return -1;
-  if (patches != 0 && !(patches >= 1 && patches <= kMostPatches && patches == std::floor(patches))) {
-    mju_warning("ist.solid: patches=\"%g\" is not a whole number from 1 to %d", patches, kMostPatches);
+  if (patches != 0 &&
+      !(patches >= 1 && patches <= kMostPatches && patches == std::floor(patches))) {
+    mju_warning("ist.solid: patches=\"%g\" is not a whole number from 1 to %d", patches,
+                kMostPatches);
     return -1;
   }
   made->patches = static_cast<int>(patches);
@@ -558,8 +596,9 @@ int init(const mjModel* m, mjData* d, int i) {
   if (!find_tree(m, file, *made)) return -1;
   if (!chosen && !made->tree->has_mesh()) made->measure = IST_INNER;
   if (made->measure == IST_EXACT ? !made->tree->has_mesh() : made->tree->info.spheres == 0) {
-    mju_warning("ist.solid: %s: measure=\"%s\" needs an asset with %s", file ? file : "a mesh without file",
-                measure, made->measure == IST_EXACT ? "a mesh" : "spheres");
+    mju_warning("ist.solid: %s: measure=\"%s\" needs an asset with %s",
+                file ? file : "a mesh without file", measure,
+                made->measure == IST_EXACT ? "a mesh" : "spheres");
     return -1;
   }
   for (int geom = 0; geom < m->ngeom && !(made->scale > 0); ++geom) {
@@ -580,13 +619,12 @@ int init(const mjModel* m, mjData* d, int i) {
   made->shapes.resize(static_cast<size_t>(m->ngeom));
   for (int geom = 0; geom < m->ngeom; ++geom) {
     const int type = m->geom_type[geom];
-    if (!is_primitive(type) || !collides(m, geom)) continue;
+    if (!is_primitive(type) || type == mjGEOM_SPHERE || !collides(m, geom)) continue;
     Shape& shape = made->shapes[static_cast<size_t>(geom)];
     shape.key = shape_key(type, m->geom_size + 3 * geom);
     std::string message;
-    shape.tree = shared(shape.key, [&](ist_tree_t& tree) {
-      return mesh_of(shape.key).bake(tree, message);
-    });
+    shape.tree =
+        shared(shape.key, [&](ist_tree_t& tree) { return mesh_of(shape.key).bake(tree, message); });
     if (shape.tree) continue;
     mju_warning("ist.solid: the shape of geom %d cannot be baked: %s", geom, message.c_str());
     return -1;

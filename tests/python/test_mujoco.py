@@ -302,6 +302,23 @@ def test_geoms_of_a_pair_alone_are_solids(folder):
     assert data.ncon == 4 and model.geom_type[data.contact.geom.max()] == mujoco.mjtGeom.mjGEOM_SDF
 
 
+def test_a_ball_rests_on_both_walls_of_a_groove(folder):
+    profile = [(-.1, 0), (.1, 0), (.1, .1), (0, .02), (-.1, .1)]
+    n = len(profile)
+    sides = [(i, n + i, n + (i + 1) % n, (i + 1) % n) for i in range(n)]
+    write(folder / "groove.obj", ([(x, y, z) for y in (-.1, .1) for x, z in profile],
+                                  [list(range(n)), [n + i for i in range(n)][::-1]] + sides))
+    (folder / "groove.xml").write_text("""<mujoco><asset><mesh name="groove" file="groove.obj"/></asset>
+      <default><geom solref="-2e4 -200" condim="6" friction="1 .1 .1"/></default><worldbody><geom type="mesh" mesh="groove"/>
+        <body pos=".002 0 .0604"><freejoint/><geom type="sphere" size=".03"/></body></worldbody></mujoco>""")
+    spec = mujoco.MjSpec.from_file(str(folder / "groove.xml"))
+    assert ist.mujoco.attach(spec, cache=folder / "cache") == 1
+    model = spec.compile()
+    data = run(model, mujoco.MjData(model), 1500)
+    assert data.ncon == 2 and np.abs(data.qvel).max() < 1e-3
+    assert data.qpos[2] == pytest.approx(.02 + .03 * np.hypot(1, .8), abs=1e-4) and abs(data.qpos[0]) < 1e-4
+
+
 def test_a_link_that_fits_is_free(folder):
     """A hub in a ring with a gap of 1 mm, and with shoulders 1 mm over it, aligned: matched spheres lock it."""
     turn = 2 * np.pi * np.arange(48) / 48
