@@ -60,11 +60,18 @@ def _finish():
                  SurfacePoints):  # noqa: F405
         kind._statuses = ImpactStatus if kind.__name__ == "TimeOfImpact" else QueryStatus
         kind.__repr__ = _shown.text_of
+        kind.__len__, kind.__getitem__ = _shown.rows_of, _shown.row_of
+        kind.__bool__ = lambda self: True  # whatever the number of rows
         column = vars(kind).get("status")
         if column is not None:
             kind.status = property(
                 lambda self, column=column: _one(column.fget(self), self._statuses), None, None,
                 column.__doc__)
+    for kind in (MeshReport, MassProperties, Bounds, PairFit, Invariant, PartnerError,  # noqa: F405
+                 TargetedAsset, Progress):  # noqa: F405
+        kind.__repr__ = _shown.fields_of
+    for kind in (Mesh, ClosedMesh):  # noqa: F405
+        kind.__repr__ = _shown.mesh_of
     Asset._repr_html_ = _shown.html_of  # noqa: F405
 
 

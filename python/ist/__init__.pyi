@@ -17,7 +17,9 @@ from . import gpu as gpu
 __version__: str
 
 _Path = str | os.PathLike[str]
-_Column = Any  # NDArray of one row a pose; a number for one pose
+# One row a pose. For a single pose a number, which has the methods of a NumPy scalar's type.
+_Column = NDArray[np.float64]
+_Count = NDArray[np.uint32]
 _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
 _SurfaceUse = Literal["automatic", "never", "always"]
@@ -252,6 +254,8 @@ _Rows = Any  # ArrayLike; of solids on a GPU an array of any framework in its me
 
 @final
 class Penetration:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> Penetration: ...  # a row, or some
     volume: Final[_Column]  # (n,) [u³]
     volume_min: Final[_Column]  # (n,) [u³] exact: the true volume is at least this; else the sum's interval
     volume_max: Final[_Column]  # (n,) [u³] and at most this
@@ -262,9 +266,9 @@ class Penetration:
     pose_gradient_a: Final[NDArray[np.float64]]  # (n, 7) dV/d(pose of A)
     scale_gradient: Final[_Column | None]  # (n,) [u³] dV/d(scale of B)
     scale_gradient_a: Final[_Column | None]  # (n,) [u³] dV/d(scale of A)
-    status: Final[_Column]  # (n,) QueryStatus
-    node_visits: Final[_Column]  # (n,)
-    sphere_pairs: Final[_Column]  # (n,)
+    status: Final[_Count]  # (n,) QueryStatus
+    node_visits: Final[_Count]  # (n,)
+    sphere_pairs: Final[_Count]  # (n,)
 
 @final
 class Lenses:
@@ -308,38 +312,46 @@ def pair_fit(a: Asset, b: Asset, *, scale: float = 1.0, scale_a: float = 1.0) ->
 
 @final
 class RayHits:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> RayHits: ...  # a row, or some
     distance: Final[_Column]  # (n,) [u] inf: no hit
     point: Final[NDArray[np.float64]]  # (n, 3) [u] world
     normal: Final[NDArray[np.float64]]  # (n, 3) unit, outward
-    triangle: Final[_Column]  # (n,)
-    status: Final[_Column]  # (n,) QueryStatus
+    triangle: Final[_Count]  # (n,)
+    status: Final[_Count]  # (n,) QueryStatus
 
 @final
 class SurfacePoints:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> SurfacePoints: ...  # a row, or some
     distance: Final[_Column]  # (n,) [u] < 0 inside
     error: Final[_Column]  # (n,) [u]
     point: Final[NDArray[np.float64]]  # (n, 3) [u] world
     gradient: Final[NDArray[np.float64]]  # (n, 3) unit, outward
-    triangle: Final[_Column]  # (n,)
-    status: Final[_Column]  # (n,) QueryStatus
+    triangle: Final[_Count]  # (n,)
+    status: Final[_Count]  # (n,) QueryStatus
 
 @final
 class Separation:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> Separation: ...  # a row, or some
     distance: Final[_Column]  # (n,) [u]
     distance_min: Final[_Column]  # (n,) [u] certified
     distance_max: Final[_Column]  # (n,) [u] certified
     point_a: Final[NDArray[np.float64]]  # (n, 3) [u] world
     point_b: Final[NDArray[np.float64]]  # (n, 3) [u] world
     normal: Final[NDArray[np.float64]]  # (n, 3) unit, from A to B
-    status: Final[_Column]  # (n,) QueryStatus
-    node_visits: Final[_Column]  # (n,)
-    sphere_pairs: Final[_Column]  # (n,)
+    status: Final[_Count]  # (n,) QueryStatus
+    node_visits: Final[_Count]  # (n,)
+    sphere_pairs: Final[_Count]  # (n,)
 
 @final
 class ContactPatches:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> ContactPatches: ...  # a row, or some
     penetration: Final[Penetration]
-    status: Final[_Column]  # (n,) QueryStatus
-    count: Final[_Column]  # (n,)
+    status: Final[_Count]  # (n,) QueryStatus
+    count: Final[_Count]  # (n,)
     id: Final[NDArray[np.uint64]]  # (n, m)
     centroid: Final[NDArray[np.float64]]  # (n, m, 3) [u]
     normal: Final[NDArray[np.float64]]  # (n, m, 3) unit, from A to B
@@ -359,15 +371,17 @@ class OverlapOutline:
 
 @final
 class TimeOfImpact:
+    def __len__(self) -> int: ...  # rows
+    def __getitem__(self, index: Any) -> TimeOfImpact: ...  # a row, or some
     time: Final[_Column]  # (n,) [T]
     distance_min: Final[_Column]  # (n,) [u]
     distance_max: Final[_Column]  # (n,) [u]
     point_a: Final[NDArray[np.float64]]  # (n, 3) [u]
     point_b: Final[NDArray[np.float64]]  # (n, 3) [u]
     normal: Final[NDArray[np.float64]]  # (n, 3) unit, from A to B
-    status: Final[_Column]  # (n,) ImpactStatus
-    node_visits: Final[_Column]  # (n,)
-    surface_pairs: Final[_Column]  # (n,)
+    status: Final[_Count]  # (n,) ImpactStatus
+    node_visits: Final[_Count]  # (n,)
+    surface_pairs: Final[_Count]  # (n,)
 
 def penetration(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
@@ -391,7 +405,7 @@ def closest_point(
 ) -> SurfacePoints: ...
 def contains(
     solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
-) -> Any: ...  # (n,) uint32, Overlapping
+) -> _Count: ...  # (n,) of Overlapping; one for one pose
 def contact_patches(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
@@ -407,7 +421,7 @@ def overlap_outline(
 def overlap(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,
-) -> Any: ...  # (n,) uint32, Overlapping
+) -> _Count: ...  # (n,) of Overlapping; one for one pose
 def time_of_impact(
     a: _Solid, b: _Solid, poses: ArrayLike, poses_to: ArrayLike, *,
     about: ArrayLike = (0.0, 0.0, 0.0), scales: ArrayLike | None = None,

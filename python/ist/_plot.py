@@ -49,6 +49,8 @@ def plot(solids, poses=None, *, scales=None, path=None):
         if not isinstance(solid, (ist.Asset, ist.Mesh, ist.ClosedMesh)):
             raise TypeError(f"solids[{k}]: a {type(solid).__name__}; wanted an Asset, a Mesh or a "
                             "ClosedMesh")
+    if isinstance(poses, (ist.Asset, ist.Mesh, ist.ClosedMesh)):
+        raise TypeError(f"poses: a {type(poses).__name__}; several solids are a list: plot([a, b])")
     poses, scales = _placed(len(solids), poses, scales)
     parts = [_part(solid, pose, scale) for solid, pose, scale in zip(solids, poses, scales)]
     outline, lines = _overlaps(solids, poses, scales)

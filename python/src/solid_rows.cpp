@@ -70,6 +70,10 @@ void add_solid_rows(py::module_& module) {
         return "<solids " +
                (py::isinstance<py::int_>(self.index) ? text_of(self.index) : "of many rows") +
                " of ist.Solids on " + self.among().device() + ">";
+      })
+      .def("__reduce__", [](const SolidRows& self) {
+        return py::make_tuple(py::module_::import_("operator").attr("getitem"),
+                              py::make_tuple(self.solids, self.index));
       });
   py::class_<Solids>(
       module, "Solids",
@@ -92,6 +96,16 @@ void add_solid_rows(py::module_& module) {
              return "<ist.Solids of " + std::to_string(self.count) + " on " + self.device() + ">";
            })
       .def("__len__", [](const Solids& self) { return self.count; })
+      .def("__reduce__",
+           [](const Solids& self) {
+             if (self.on_device != nullptr)
+               throw type_error("Solids on " + self.device() +
+                                " are not pickled: pickle the assets, and make them again");
+             py::list solids;
+             for (const py::object& solid : self.owners) solids.append(solid);
+             return py::make_tuple(py::module_::import_("ist").attr("Solids"),
+                                   py::make_tuple(solids));
+           })
       .def(
           "__getitem__",
           [](const py::object& self, const py::object& index) {

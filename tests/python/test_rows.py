@@ -2,6 +2,8 @@
 
 Without a card, and without the emulated one of test_emulated_gpu.py, the latter is skipped.
 """
+import pickle
+
 import numpy as np
 import pytest
 
@@ -230,3 +232,54 @@ def test_assets_that_no_cache_holds_are_asked_in_order(knot, random_poses):
         one = ist.penetration(copies[a[i]], copies[b[i]], poses[i], poses_a=poses_a[i])
         assert one.volume == found[i]
     assert (found > 0).any()
+
+
+def rows_of_answers(cube):
+    poses = np.tile([1.0, 0, 0, 0, 0, 0, 0], (5, 1))
+    poses[:, 4] = [0, .3, .9, 1.5, np.nan]
+    yield ist.penetration(cube, cube, poses, measure="exact", scale_gradients=True)
+    yield ist.penetration(cube, cube, poses)
+    yield ist.separation(cube, cube, poses)
+    yield ist.contact_patches(cube, cube, poses, max_patches=3)
+    yield ist.raycast(cube, None, poses[:, 4:] * [5, 0, 0], poses[:, 4:] + [1, 0, 0])
+    yield ist.closest_point(cube, None, poses[:, 4:])
+
+
+def test_answers_are_counted_and_indexed(cube):
+    for answer in rows_of_answers(cube):
+        assert len(answer) == 5 and answer
+        for index in (slice(1, 3), [4, 0], np.arange(5) % 2 == 0, slice(0, 0)):
+            some = answer[index]
+            assert type(some) is type(answer) and len(some) == len(np.arange(5)[index]) and some
+            assert np.array_equal(some.status, answer.status[index])
+        one = answer[-2]
+        assert one.status == answer.status[3] and repr(one).startswith(f"ist.{type(one).__name__}(")
+        assert [a.status for a in answer] == answer.status.tolist()
+        with pytest.raises(IndexError):
+            answer[5]
+        with pytest.raises(TypeError, match="of one pose"):
+            len(one)
+    patches = ist.contact_patches(cube, cube, [[1, 0, 0, 0, .3, 0, 0], [1, 0, 0, 0, .9, 0, 0]])
+    assert patches[1].penetration.volume == patches.penetration.volume[1]
+    assert np.array_equal(patches[1].point, patches.point[1])
+
+
+def test_solids_and_their_rows_pickle(cube):
+    solids = ist.Solids([cube, ist.BallField(.3)])
+    first, second = pickle.loads(pickle.dumps((solids[0], solids[np.array([1, 0])])))
+    poses = np.tile([1.0, 0, 0, 0, .4, 0, 0], (2, 1))
+    found = ist.penetration(first, second, poses)
+    assert np.array_equal(found.volume, ist.penetration(solids[0], solids[np.array([1, 0])], poses).volume)
+    assert len(pickle.loads(pickle.dumps(solids))) == 2
+
+
+def test_meshes_and_reports_show_what_they_are():
+    mesh = ist.sample_mesh("cube")
+    closed = ist.close_mesh(mesh, name="die")
+    assert repr(mesh) == "<ist.Mesh of 8 vertices, 12 triangles>"
+    assert repr(closed) == "<ist.ClosedMesh 'die' of 8 vertices, 12 triangles>"
+    assert repr(closed.report).startswith("ist.MeshReport(vertices=8, triangles=12, components=1")
+    asset = ist.bake_surface(closed)
+    assert "volume=1" in repr(asset.mass_properties()) and "radius=" in repr(asset.bounds())
+    with pytest.raises(TypeError, match=r"poses: a Asset; several solids are a list: plot\(\[a, b\]\)"):
+        ist.plot(asset, asset)
