@@ -421,6 +421,11 @@ def test_the_solid_is_the_file_not_mujocos_copy(folder):
         x = ((np.array(x) - [.1, .2, .3]) @ back.reshape(3, 3) * [1, 1, -1] - model.mesh_pos[0]) @ turn.reshape(3, 3)
         place = data.geom_xpos[0] + data.geom_xmat[0].reshape(3, 3) @ x
         assert .05 <= cast(model, data, place, np.array([0., 0, 1]))[0] < .09
+    text = (folder / "two.xml").read_text()
+    spec = mujoco.MjSpec.from_string(text, assets={"two.obj": (folder / "two.obj").read_bytes()})
+    with pytest.warns(UserWarning, match="12 of 24 triangles"):
+        assert ist.mujoco.attach(spec, cache=folder / "cache") == 1
+    assert spec.compile().body_mass[1] == pytest.approx(2, rel=1e-6)
     ell = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
     vertices = [(.1 * x, .1 * y, z) for z in (0, .1) for x, y in ell]
     for k in range(6):  # a concave face, from each of its corners on

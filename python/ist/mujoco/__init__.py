@@ -83,8 +83,9 @@ def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = No
         "inner": by spheres.
     repair: close the holes of meshes that are not closed, as ist.close_mesh(…, repair=True).
 
-    Warns of each mesh that cannot be baked, which stays MuJoCo's hull, of findings of the bakes, of
-    files that MuJoCo has read differently, and of flexes that solids do not meet. Raises
+    Warns of each mesh that cannot be baked, which stays MuJoCo's hull, of findings of bakes (not of
+    those in the cache), of files that MuJoCo has read differently, and of flexes that solids do not
+    meet. Raises
     ist.OpenMeshError for such a mesh of a geom that `geoms` names, and ValueError or TypeError for
     an argument; then the spec is as it was.
     """

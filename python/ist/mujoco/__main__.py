@@ -22,6 +22,7 @@ def main(arguments=None):
     parser.add_argument("--spheres", type=int, default=4000, help="of each solid, at most")
     parser.add_argument("--patches", type=int, help="contacts of a pair, at most, 1 to 50")
     parser.add_argument("--measure", choices=("matched", "inner", "exact"))
+    parser.add_argument("--repair", action="store_true", help="close meshes that are open")
     parser.add_argument("--cache", help="folder of baked assets (default: ~/.cache/ist)")
     parser.add_argument("--film", metavar="OUT.glb", help="write the motion, 30 frames a second")
     parser.add_argument("--json", action="store_true", help="report as JSON on stdout")
@@ -48,7 +49,7 @@ def run(options):
     if not options.stock:
         say(options, "baking the meshes that are not in the cache")
         solids = ist.mujoco.attach(spec, cache=options.cache, spheres=options.spheres,
-                                   patches=options.patches, measure=options.measure)
+                                   patches=options.patches, measure=options.measure, repair=options.repair)
     model = spec.compile()
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data = mujoco.MjData(model)

@@ -4,6 +4,7 @@ import dataclasses
 import hashlib
 import os
 import pathlib
+import tempfile
 import warnings
 
 import ist
@@ -51,11 +52,10 @@ def _from_file(spec, model, mesh, name):
     """Vertices and triangles in the frame that MuJoCo reads a mesh in, with its scale."""
     vertices, faces = _of_model(model, mesh)
     entry = next((m for m in spec.meshes if m.name == name), None)
-    data = _file_of(spec, entry)
-    if data is None:
-        return vertices, faces
     try:
-        loaded = ist.load_mesh(data)
+        loaded = _loaded(spec, entry)
+        if loaded is None:
+            return vertices, faces
     except ist.Error as error:
         _warn(f"mesh {name!r} is MuJoCo's copy, since its file is not read: {error}")
         return vertices, faces
@@ -84,15 +84,20 @@ def _of_model(model, mesh):
     return vertices, np.ascontiguousarray(model.mesh_face[first:first + count], dtype=np.uint32)
 
 
-def _file_of(spec, entry):
-    """The path of a mesh's file, or None: ist reads other files in other ways than MuJoCo does."""
+def _loaded(spec, entry):
+    """The mesh of a file, or None without one: ist reads other files in other ways than MuJoCo does."""
     if entry is None or pathlib.Path(entry.file).suffix.lower() not in (".obj", ".stl"):
         return None
-    folder = pathlib.Path(spec.modelfiledir or ".")
     for meshdir in (entry.compiler.meshdir, spec.compiler.meshdir):
-        path = folder / (meshdir or "") / entry.file
+        for name in (entry.file, os.path.join(meshdir or "", entry.file)):
+            if name in spec.assets:
+                with tempfile.TemporaryDirectory() as folder:
+                    path = pathlib.Path(folder) / pathlib.Path(name).name
+                    path.write_bytes(spec.assets[name])
+                    return ist.load_mesh(path)
+        path = pathlib.Path(spec.modelfiledir or ".") / (meshdir or "") / entry.file
         if path.is_file():
-            return path
+            return ist.load_mesh(path)
     return None
 
 
