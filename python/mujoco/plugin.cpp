@@ -9,6 +9,8 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <bit>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -164,6 +166,7 @@ struct Instance {
   int patches = 0;  ///< 0: by the pair's measure
   uint32_t measure = IST_EXACT;
   double scale = 0;           ///< 0: the mesh's
+  uint64_t number = 0;        ///< its own in this process; copies have the same content
   int geom = -1;              ///< one that has this instance
   ist_placed_t local = {};    ///< the asset in that geom's own frame, for rays
   std::vector<Shape> shapes;  ///< of the model's primitive geoms, by geom; else empty
@@ -428,7 +431,7 @@ thread_local March march;
 bool near(double a, double b, double size) { return std::fabs(a - b) <= 1e-9 * (size + b); }
 
 /// Positive outside. A point is in the geom's own frame, and the answers too.
-ist_surface_point_t nearest(const Instance& solid, const mjtNum x[3]) {
+ist_surface_point_t find_nearest(const Instance& solid, const mjtNum x[3]) {
   ist_surface_point_t answer = {};
   ist_status_t status = ist_closest_point(&solid.local, x, 1, &answer, sizeof answer);
   if (status == IST_NOT_HELD) {
@@ -445,6 +448,25 @@ ist_surface_point_t nearest(const Instance& solid, const mjtNum x[3]) {
   complain_once("ist.solid: a solid has no mesh: neither rays nor cloths meet it");
   answer.distance = 2e6;  // MuJoCo takes 1e6 for a miss
   return answer;
+}
+
+/// MuJoCo's search on a triangle asks again and again at its corners: answers are kept.
+ist_surface_point_t nearest(const Instance& solid, const mjtNum x[3]) {
+  struct Known {
+    uint64_t number = 0;
+    mjtNum x[3] = {};
+    ist_surface_point_t answer = {};
+  };
+  static thread_local Known known[64];
+  uint64_t bits = solid.number;
+  for (int k = 0; k < 3; ++k) bits = (bits ^ std::bit_cast<uint64_t>(x[k])) * 0x9e3779b97f4a7c15u;
+  Known& one = known[bits >> 58];
+  if (one.number != solid.number || std::memcmp(one.x, x, sizeof one.x) != 0) {
+    one.answer = find_nearest(solid, x);
+    one.number = solid.number;
+    mju_copy3(one.x, x);
+  }
+  return one.answer;
 }
 
 mjtNum distance(const mjtNum x[3], const mjData* d, int i) {
@@ -568,7 +590,9 @@ bool find_tree(const mjModel* m, const char* file, Instance& out) {
 }
 
 int init(const mjModel* m, mjData* d, int i) {
+  static std::atomic<uint64_t> count = 0;
   auto made = std::make_unique<Instance>();
+  made->number = ++count;
   double patches = made->patches;
   if (!read_number(m, i, "patches", patches) || !read_number(m, i, "scale", made->scale)) return -1;
   if (patches != 0 &&

@@ -66,11 +66,12 @@ void add_solid_rows(py::module_& module) {
   py::class_<SolidRows>(module, "SolidRows",
                         "Solids of the rows of a query, which takes them as `a` or `b`: "
                         "ist.Solids[index].")
-      .def("__repr__", [](const SolidRows& self) {
-        return "<solids " +
-               (py::isinstance<py::int_>(self.index) ? text_of(self.index) : "of many rows") +
-               " of ist.Solids on " + self.among().device() + ">";
-      })
+      .def("__repr__",
+           [](const SolidRows& self) {
+             return "<solids " +
+                    (py::isinstance<py::int_>(self.index) ? text_of(self.index) : "of many rows") +
+                    " of ist.Solids on " + self.among().device() + ">";
+           })
       .def("__reduce__", [](const SolidRows& self) {
         return py::make_tuple(py::module_::import_("operator").attr("getitem"),
                               py::make_tuple(self.solids, self.index));
