@@ -114,6 +114,13 @@ def test_a_scaled_box_rests_on_what_it_meets(folder, ground):
     assert weight == pytest.approx(9.81 * model.body_mass[1], rel=0.05)
 
 
+@pytest.mark.parametrize("measure", ["matched", "inner"])
+def test_spheres_rest_within_what_they_lack(folder, measure):
+    for ground in ('<geom type="box" size="1 1 .1" pos="0 0 -.1"/>', '<geom type="ellipsoid" size="2 3 .5" pos="0 0 -.5"/>'):
+        model, data = cube(folder, ground, measure=measure, spheres=300)
+        assert abs(run(model, data, 300).qpos[2] - 0.03) < 3e-3 and data.ncon > 0
+
+
 @pytest.mark.parametrize("kind, size", [
     ("box", ".02 .02 .02"), ("sphere", ".02"), ("cylinder", ".02 .02"), ("capsule", ".02 .03"), ("ellipsoid", ".03 .04 .02")])
 def test_primitives_rest_on_a_solid(folder, kind, size):
