@@ -37,7 +37,7 @@ class Film:
         meshes, nodes, channels, samplers, materials, made = [], [], [], [], [], {}
         for geom in range(self._model.ngeom):
             shape = shape_of(self._model, geom)
-            if shape is None:
+            if shape is None or self._model.geom_rgba[geom][3] == 0:
                 continue
             key = (int(self._model.geom_type[geom]), int(self._model.geom_dataid[geom]),
                    tuple(self._model.geom_size[geom]), tuple(self._model.geom_rgba[geom]))
