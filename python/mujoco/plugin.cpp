@@ -281,11 +281,12 @@ void complain_once(const char* text) {
   if (!std::exchange(said[text], true)) mju_warning("%s", text);
 }
 
-/// MuJoCo's own function for a geom of `type` against the hull of g2's mesh. It may write as many
+/// MuJoCo's own function for a geom against the hull of g2's mesh. It may write as many
 /// contacts as two geoms can have, and there may be room for fewer.
 int collide_hull(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
   mjPreContact all[mjMAXCONPAIR];
-  const mjfCollision collide_convex = before[m->geom_type[g1]][mjGEOM_MESH];
+  const int type = std::min<int>(m->geom_type[g1], mjGEOM_MESH);  // of a solid its hull too
+  const mjfCollision collide_convex = before[type][mjGEOM_MESH];
   // A margin of metres, as mj_geomDistance() has, makes depths of what overlaps wrong.
   int count = collide_convex(m, d, all, g1, g2, 0);
   if (count == 0 && margin > 0) count = collide_convex(m, d, all, g1, g2, margin);
@@ -399,6 +400,10 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     complain_once((std::string("ist.solid: ") + ist_describe(status)).c_str());
     return 0;
   }
+  if (std::isnan(whole.volume)) {
+    complain_once("ist.solid: a limit stopped an exact query: there the hulls collide");
+    return collide_hull(m, d, out, g1, g2, margin);
+  }
   int count = 0;
   for (size_t i = 0; i < patches.count; ++i)
     if (memory.patches[i].area > 0) write_contact(memory.patches[i], out[count++]);
@@ -423,6 +428,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
 struct March {
   const void* solid = nullptr;  ///< null: no march
   int step = 0;
+  bool missed = false;
   double way = 0;  ///< from the origin to the next point
   mjtNum origin[3] = {}, target[3] = {}, normal[3] = {};
 };
@@ -486,8 +492,11 @@ mjtNum distance(const mjtNum x[3], const mjData* d, int i) {
       mju_copy3(ray.origin, now.origin);
       mju_copy3(ray.direction, way);
       ist_ray_hit_t hit = {};
-      if (ist_raycast(&solid.local, &ray, 1, &hit, sizeof hit) < 0 || !std::isfinite(hit.distance))
+      if (ist_raycast(&solid.local, &ray, 1, &hit, sizeof hit) < 0 ||
+          !std::isfinite(hit.distance)) {
+        now.missed = true;
         return 2e6;
+      }
       now.step = 2;
       now.way = std::max(hit.distance, length);
       mju_copy3(now.target, hit.point);
@@ -691,9 +700,11 @@ mjPLUGIN_LIB_INIT(ist) {
     delete reinterpret_cast<Instance*>(d->plugin_data[i]);
     d->plugin_data[i] = 0;
   };
-  plugin.reset = [](const mjModel*, mjtNum*, void* solid, int) {
-    march.solid = solid;
-    march.step = 0;
+  // A ray begins with a call without state, and ends with one where it misses.
+  plugin.reset = [](const mjModel*, mjtNum* state, void* solid, int) {
+    const bool ends = march.solid == solid && march.missed;
+    march = {};
+    if (state == nullptr && !ends) march.solid = solid;
   };
   plugin.compute = [](const mjModel*, mjData*, int, int) { march.solid = nullptr; };
   // MuJoCo asks these for rays, cloths, touch grids and SDFs of other plug-ins.

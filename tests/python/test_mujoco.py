@@ -539,6 +539,23 @@ def test_a_scale_of_each_axis_is_baked(tmp_path):
     assert mujoco.mj_geomDistance(model, data, 0, 1, 1.0, np.zeros(6)) == pytest.approx(.06, abs=2e-3)
 
 
+def test_solids_that_no_measure_serves_collide_as_hulls(tmp_path, capfd):
+    ist.bake(ist.sample_mesh("cube"), max_spheres=100, surface="none").save(tmp_path / "spheres.ist")
+    ist.bake_surface(ist.sample_mesh("cube")).save(tmp_path / "mesh.ist")
+    ground = '<geom type="sdf" mesh="cube" pos="0 0 -.03"><plugin instance="j"/></geom>'
+    spec = mujoco.MjSpec.from_string(CUBE.format(ground=ground, height=.0295).replace("<asset>", f"""<extension>
+      <plugin plugin="ist.solid"><instance name="i"><config key="file" value="{tmp_path}/spheres.ist"/></instance>
+      <instance name="j"><config key="file" value="{tmp_path}/mesh.ist"/></instance></plugin></extension><asset>""")
+      .replace('type="mesh" mesh="cube"/>', 'type="sdf" mesh="cube"><plugin instance="i"/></geom>').replace(".05 .04 .03", ".05 .05 .03"))
+    for mesh in spec.meshes:
+        mesh.scale = [.03, .03, .03]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ncon > 0 and data.contact.dist.min() == pytest.approx(-.0005, abs=1e-6)
+    assert "their hulls collide" in "".join(capfd.readouterr())
+
+
 def test_what_is_not_there_has_a_name(folder):
     spec = mujoco.MjSpec.from_file(str(folder / "nut.xml"))
     with pytest.raises(ValueError, match="no mesh geom named 'nuts'"):
