@@ -179,7 +179,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   ExactScratch& scratch = workspace.impl()->exact;
   auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (!found.complete) {
+  if (!found.complete || !query.holds_crossings()) {
     const auto by_spheres = [&] {
       ContactSettings others = settings;
       others.measure = Measure::matched;

@@ -8,6 +8,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/exact/nearest_points.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/points-inl.h"
 
@@ -26,11 +27,17 @@ class TriangleSearch {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
+    scratch_.straddling->count = 0;
   }
 
-  CrossingsFound run(std::uint32_t count, KeptPairs* keep) {
+  CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
+                     KeptPairs* keep) {
     keep_ = keep;
-    for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
+    found_.crossings = first;
+    std::uint32_t n = next;
+    for (; n < count && found_.complete; ++n) {
+      // Two blocks add at most 256, and as many may wait.
+      if (keep_ == nullptr && found_.crossings + 2 * 256 > scratch_.most_crossings) break;
       // Where many more are near than cross, keeping them would not pay. Two blocks add at most
       // 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
@@ -43,6 +50,7 @@ class TriangleSearch {
            static_cast<std::uint32_t>(scratch_.keys[n]));
     }
     if (keep_ != nullptr) test_kept(*keep);
+    found_.next = n;
     return finish();
   }
 
@@ -69,6 +77,7 @@ class TriangleSearch {
 
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
+    if (found_.complete) test_edges();
     // Sums go over eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
@@ -187,32 +196,35 @@ class TriangleSearch {
             hn::Load(d, pairs.corner[side][c][2] + l)};
   }
 
-  /// What signs say of eight pairs, a bit each.
-  struct alignas(64) Signs {
-    double height[2][3][8], error[2][3][8];  ///< of A's corners over B's plane, of B's over A's
-    std::uint32_t positive[2][3] = {};       ///< such a height
-    std::uint32_t pierced[6] = {};           ///< edge: A's three, B's three
-    std::uint32_t apart = 0;                 ///< likewise by a plane
-    std::uint32_t sure = 0;                  ///< no sign is unclear
-  };
-
   static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
-  static std::uint32_t alike(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    return (x & y & z) | ~(x | y | z);
+  static std::uint32_t alike(const std::uint32_t (&bits)[3]) {
+    return each(bits) | ~(bits[0] | bits[1] | bits[2]);
   }
 
-  /// In double. A sign is clear if it stays wherever points move by `move`.
-  HWY_INLINE void find_signs(const TrianglePairs& pairs, std::uint32_t count, double move,
-                             Signs& out) const {
+  /// Heights of eight pairs, and what their signs say: a bit each.
+  struct alignas(64) Heights {
+    double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
+    double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
+    std::uint32_t positive[2][3] = {};      ///< with B moved aside
+    std::uint32_t certain[2][3] = {};       ///< in double
+    std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
+
+    /// Pairs that a plane keeps apart.
+    std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
+      return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
+    }
+  };
+
+  HWY_INLINE void find_heights(const TrianglePairs& pairs, Heights& out) const {
     const D d;
-    std::uint32_t certain[2][3] = {};
-    std::uint32_t round_positive[3][3] = {}, round_certain[3][3] = {};  // [A's edge][B's edge]
-    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+    const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
+    const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
+    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
+                        hn::Set(d, search_.aside.z)};
+    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const V room = hn::Set(d, move);
-      const V filter = hn::Set(d, exact::kFilter), two = hn::Set(d, 2.0), six = hn::Set(d, 6.0);
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
         const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
@@ -221,22 +233,145 @@ class TriangleSearch {
         const Vec3 normal = {ax - bx, ay - by, az - bz};
         const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                            hn::Abs(az) + hn::Abs(bz)};
+        const V along = dot(aside, normal), shift = side == 1 ? along : hn::Neg(along);
+        const V shift_error = filter * absolute_dot(aside, size);
+        hn::Store(hn::Abs(along), d, out.shift[side] + l);
         const V longest = hn::Max(largest(u), largest(v)) + room;
         for (int c = 0; c < 3; ++c) {
           const Vec3 r = corner[side][c] - plane[0];
-          const V value = dot(r, normal);
-          const V error =
-              filter * ((hn::Abs(r.x) * size.x + hn::Abs(r.y) * size.y) + hn::Abs(r.z) * size.z);
+          const V value = dot(r, normal), error = filter * absolute_dot(r, size);
+          const V moved = value + shift, away = hn::Abs(moved), sure = error + shift_error;
           // What the room moves: six products of three numbers.
-          const V moved = six * room * longest * (two * largest(r) + longest);
-          hn::Store(value, d, out.height[side][c] + l);
-          hn::Store(error, d, out.error[side][c] + l);
-          out.positive[side][c] |= mask_bits(d, value > hn::Zero(d)) << l;
-          certain[side][c] |= mask_bits(d, hn::Abs(value) > error + moved) << l;
+          const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
+          hn::Store(value, d, out.value[side][c] + l);
+          // Where moving aside decides, the plane may lie on the other side of the corner.
+          const V height = hn::Abs(value);
+          hn::Store(error + hn::IfThenElseZero(height <= hn::Abs(shift), height), d,
+                    out.error[side][c] + l);
+          out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
+          out.certain[side][c] |= mask_bits(d, away > sure) << l;
+          out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
         }
       }
-      Vec3 edge_b[3];
+    }
+  }
+
+  struct ExactCorners {
+    exact::Point of[2][3];
+
+    ExactCorners(const TrianglePairs& pairs, std::uint32_t n) {
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c)
+          of[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n], pairs.corner[s][c][2][n]};
+    }
+  };
+
+  static void put(std::uint32_t& bits, std::uint32_t n, bool bit) {
+    bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
+  }
+
+  /// Of pair n, where doubles leave a sign unclear.
+  HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
+                                         Heights& out) const {
+    const ExactCorners corners(pairs, n);
+    for (int s = 1; s >= 0; --s) {
+      for (int c = 0; c < 3; ++c) {
+        if (out.certain[s][c] >> n & 1) continue;
+        const exact::Determinant height =
+            s == 1 ? exact::height_over_a(corners.of[0], corners.of[1][c], search_.aside)
+                   : exact::height_over_b(corners.of[1], corners.of[0][c], search_.aside);
+        out.value[s][c][n] = height.value;
+        out.error[s][c][n] =
+            height.error + (height.value * height.sign < 0 ? std::abs(height.value) : 0);
+        put(out.positive[s][c], n, height.sign > 0);
+        put(out.certain[s][c], n, true);
+      }
+      if ((out.apart(out.certain) >> n & 1) != 0) return;
+    }
+  }
+
+  /// Tests what has been gathered by the planes of both triangles.
+  void test_pairs() {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
+    if (count == 0 || !found_.complete) return;  // two blocks go on to their end
+    Heights heights;
+    find_heights(pairs, heights);
+    pairs.count = 0;
+    const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
+    for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
+         left &= left - 1)
+      find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
+    const std::uint32_t apart = heights.apart(heights.certain);
+    for (std::uint32_t left = all & apart & ~heights.apart(heights.settled); left != 0;
+         left &= left - 1)
+      note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+    for (std::uint32_t left = all & ~apart; left != 0; left &= left - 1)
+      add_straddling(pairs, heights, static_cast<std::uint32_t>(std::countr_zero(left)));
+  }
+
+  void add_straddling(const TrianglePairs& pairs, const Heights& heights, std::uint32_t from) {
+    StraddlingPairs& out = *scratch_.straddling;
+    const std::uint32_t n = out.count;
+    bool settled = true;
+    for (int s = 0; s < 2; ++s) {
+      out.triangle[s][n] = pairs.triangle[s][from];
+      out.shift[s][n] = heights.shift[s][from];
+      for (int c = 0; c < 3; ++c) {
+        for (int k = 0; k < 3; ++k) out.corner[s][c][k][n] = pairs.corner[s][c][k][from];
+        out.height[s][c][n] = heights.value[s][c][from];
+        out.error[s][c][n] = heights.error[s][c][from];
+        put(out.positive[s][c], n, (heights.positive[s][c] >> from & 1) != 0);
+        settled &= (heights.settled[s][c] >> from & 1) != 0;
+      }
+    }
+    put(out.settled, n, settled);
+    if (++out.count == 8) test_edges();
+  }
+
+  /// Which way round A's edges go about B's: a bit a pair.
+  struct WaysRound {
+    std::uint32_t positive[3][3] = {};  ///< [A's edge][B's edge]
+    std::uint32_t certain[3][3] = {}, settled[3][3] = {};
+
+    /// Pairs of which an edge, that goes through the other's plane (`parts`: A's, B's), may go
+    /// through the triangle as far as `known` tells.
+    void may_pierce(const std::uint32_t (&parts)[2][3], const std::uint32_t (&known)[3][3],
+                    std::uint32_t (&out)[2][3]) const {
+      for (int k = 0; k < 3; ++k)
+        for (int s = 0; s < 2; ++s) {
+          std::uint32_t plus = 0, minus = 0;
+          for (int j = 0; j < 3; ++j) {
+            const int a = s == 0 ? k : j, b = s == 0 ? j : k;
+            plus |= known[a][b] & positive[a][b];
+            minus |= known[a][b] & ~positive[a][b];
+          }
+          out[s][k] = parts[s][k] & ~(plus & minus);
+        }
+    }
+    /// Whether all signs that matter are known.
+    std::uint32_t decided(const std::uint32_t (&parts)[2][3],
+                          const std::uint32_t (&known)[3][3]) const {
+      std::uint32_t asked[2][3], out = ~0u;
+      may_pierce(parts, known, asked);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) out &= ~(asked[0][i] | asked[1][j]) | known[i][j];
+      return out;
+    }
+  };
+
+  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, WaysRound& out) const {
+    const D d;
+    const V room = hn::Set(d, double{search_.room});
+    const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
+    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
+                        hn::Set(d, search_.aside.z)};
+    const V by_aside = largest(aside);
+    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3], edge_b[3];
       V size_b[3];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
         size_b[j] = largest(edge_b[j]) + room;
@@ -244,77 +379,76 @@ class TriangleSearch {
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
         const V size_a = largest(edge_a) + room;
-        const V error_a = six * filter * size_a, moved_a = six * room * size_a;
         for (int j = 0; j < 3; ++j) {
-          const Vec3 r = corner[1][j] - corner[0][i];
-          const V value = dot(r, cross(edge_a, edge_b[j])), size = largest(r);
-          const V error = error_a * size * size_b[j] + moved_a * size_b[j] +
-                          six * room * size * (size_a + size_b[j]);
-          round_positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
-          round_certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
+          const Vec3 r = corner[1][j] - corner[0][i], normal = cross(edge_a, edge_b[j]);
+          const V value = dot(r, normal) + dot(aside, normal), size = largest(r) + by_aside;
+          const V error = filter * size_a * size * size_b[j];
+          const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
+          out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
+          out.certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
+          out.settled[i][j] |= mask_bits(d, hn::Abs(value) > error + moved) << l;
         }
       }
     }
-    out.sure = each(certain[0]) & each(certain[1]);
-    for (int s = 0; s < 2; ++s)
-      out.apart |=
-          each(certain[s]) & alike(out.positive[s][0], out.positive[s][1], out.positive[s][2]);
-    for (int i = 0; i < 3; ++i) out.sure &= each(round_certain[i]);
-    for (int k = 0; k < 3; ++k) {
-      const auto parts = [&](int s) { return out.positive[s][k] ^ out.positive[s][(k + 1) % 3]; };
-      out.pierced[k] =
-          parts(0) & alike(round_positive[k][0], round_positive[k][1], round_positive[k][2]);
-      out.pierced[3 + k] =
-          parts(1) & alike(round_positive[0][k], round_positive[1][k], round_positive[2][k]);
-    }
   }
 
-  /// Of pair n, where doubles leave a sign unclear.
-  static void find_exactly(const TrianglePairs& pairs, std::uint32_t n, Signs& out) {
-    exact::Point corner[2][3];
+  /// Tests by edges what planes left.
+  void test_edges() {
+    StraddlingPairs& pairs = *scratch_.straddling;
+    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
+    if (count == 0 || !found_.complete) return;
+    WaysRound round;
+    find_ways_round(pairs, round);
+    pairs.count = 0;
+    std::uint32_t parts[2][3], pierced[2][3];
     for (int s = 0; s < 2; ++s)
-      for (int c = 0; c < 3; ++c)
-        corner[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n],
-                        pairs.corner[s][c][2][n]};
-    const exact::TriangleSigns signs = exact::cross_exactly(corner[0], corner[1]);
-    const auto put = [&](std::uint32_t& bits, bool bit) {
-      bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
-    };
-    for (int k = 0; k < 6; ++k) put(out.pierced[k], (signs.pierced >> k & 1) != 0);
-    if (signs.pierced == 0) return;
-    for (int s = 0; s < 2; ++s)
-      for (int c = 0; c < 3; ++c) {
-        out.height[s][c][n] = signs.height[s][c].value;
-        out.error[s][c][n] = signs.height[s][c].error;
-        put(out.positive[s][c], signs.height[s][c].sign > 0);
+      for (int k = 0; k < 3; ++k)
+        parts[s][k] = pairs.positive[s][k] ^ pairs.positive[s][(k + 1) % 3];
+    for (std::uint32_t left = all & ~(pairs.settled & round.decided(parts, round.settled));
+         left != 0; left &= left - 1)
+      note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+    for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
+         left &= left - 1)
+      find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
+    round.may_pierce(parts, round.certain, pierced);
+    // Two edges pierce where triangles cross, none else.
+    std::uint32_t once = 0, twice = 0, more = 0;
+    for (const auto& of_side : pierced)
+      for (const std::uint32_t bits : of_side) {
+        more |= twice & bits & all;
+        twice |= once & bits & all;
+        once |= bits & all;
+      }
+    found_.consistent &= once == twice && more == 0;
+    if (twice != 0) add_crossings(pairs, pierced, twice);
+  }
+
+  HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
+                                       const std::uint32_t (&parts)[2][3], std::uint32_t n,
+                                       WaysRound& out) const {
+    const ExactCorners corners(pairs, n);
+    const exact::Point(&a)[3] = corners.of[0], (&b)[3] = corners.of[1];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        if (((parts[0][i] | parts[1][j]) >> n & 1) == 0 || (out.certain[i][j] >> n & 1) != 0)
+          continue;
+        const int sign =
+            exact::way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], search_.aside).sign;
+        put(out.positive[i][j], n, sign > 0);
+        put(out.certain[i][j], n, true);
       }
   }
 
-  /// Tests what has been gathered.
-  void test_pairs() {
-    const TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
-    scratch_.pairs->count = 0;
-    if (count == 0 || !found_.complete) return;  // two blocks go on to their end
-    Signs signs;
-    find_signs(pairs, count, search_.room, signs);
-    for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      find_exactly(pairs, n, signs);
-      scratch_.other_keys[found_.unsure++] =
-          std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
-      found_.complete &= found_.unsure + 8 < scratch_.most_pairs();
-    }
-    // Two edges pierce where triangles cross, none else.
-    std::uint32_t once = 0, twice = 0, more = 0;
-    for (const std::uint32_t pierced : signs.pierced) {
-      const std::uint32_t bits = pierced & all & ~signs.apart;
-      more |= twice & bits;
-      twice |= once & bits;
-      once |= bits;
-    }
-    found_.consistent &= once == twice && more == 0;
-    if (twice != 0) add_crossings(pairs, signs, twice);
+  /// A pair whose signs might be others if points moved by the room marks its blocks, if it is as
+  /// near: the same ones whichever search found it.
+  HWY_NOINLINE void note_near(const TrianglePairs& pairs, std::uint32_t n) {
+    const std::uint32_t block_a = pairs.triangle[0][n] / kWidth,
+                        block_b = pairs.triangle[1][n] / kWidth;
+    if (has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b)) return;
+    const ExactCorners corners(pairs, n);
+    if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
+    set(scratch_.a.near, block_a);
+    set(scratch_.b.near, block_b);
   }
 
   /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps
@@ -366,10 +500,11 @@ class TriangleSearch {
   /// Where an edge, from p to q, goes through the other triangle.
   struct Piercing {
     Vec3 p, q;
-    V height_p, height_q, error, edge;
+    V height_p, height_q, error, shift, edge;
   };
 
-  void add_crossings(const TrianglePairs& pairs, const Signs& signs, std::uint32_t crossing) {
+  void add_crossings(const StraddlingPairs& pairs, const std::uint32_t (&pierced)[2][3],
+                     std::uint32_t crossing) {
     const auto added = static_cast<std::uint32_t>(std::popcount(crossing));
     if (found_.crossings + added > scratch_.most_crossings) {
       found_.complete = false;
@@ -392,20 +527,20 @@ class TriangleSearch {
       Piercing end[2];
       for (Piercing& e : end) {
         const V zero = hn::Zero(d);
-        e = {{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero};
+        e = {{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero, zero};
       }
       for (int edge = 0; edge < 6; ++edge) {
         const int s = edge / 3, k = edge % 3, next = (k + 1) % 3;
-        if ((signs.pierced[edge] & crossing) == 0) continue;
+        if ((pierced[s][k] & crossing) == 0) continue;
         const Vec3 p = corner_of(pairs, s, k, l), q = corner_of(pairs, s, next, l);
-        const V hp = hn::Load(d, signs.height[s][k] + l),
-                hq = hn::Load(d, signs.height[s][next] + l);
-        const V error = hn::Load(d, signs.error[s][k] + l) + hn::Load(d, signs.error[s][next] + l);
+        const V hp = hn::Load(d, pairs.height[s][k] + l),
+                hq = hn::Load(d, pairs.height[s][next] + l);
+        const V error = hn::Load(d, pairs.error[s][k] + l) + hn::Load(d, pairs.error[s][next] + l);
         // An edge that goes down enters the other solid.
-        const std::uint32_t down = signs.positive[s][k], ends = s == 0 ? down : ~down;
+        const std::uint32_t down = pairs.positive[s][k], ends = s == 0 ? down : ~down;
         for (int e = 0; e < 2; ++e) {
           const auto take =
-              mask_of_bits(d, signs.pierced[edge] >> l & (e == 1 ? ends : ~ends) >> l & lanes);
+              mask_of_bits(d, pierced[s][k] >> l & (e == 1 ? ends : ~ends) >> l & lanes);
           const auto put = [&](V& to, V from) { to = hn::IfThenElse(take, from, to); };
           put(end[e].p.x, p.x);
           put(end[e].p.y, p.y);
@@ -416,6 +551,7 @@ class TriangleSearch {
           put(end[e].height_p, hp);
           put(end[e].height_q, hq);
           put(end[e].error, error);
+          put(end[e].shift, hn::Load(d, pairs.shift[s] + l));
           put(end[e].edge, hn::Set(d, static_cast<double>(edge)));
         }
       }
@@ -435,7 +571,7 @@ class TriangleSearch {
     const auto turned = hn::Or(hq < hp, hn::And(hq == hp, before));
     // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
     const auto flat = whole == hn::Zero(d);
-    const V one = hn::Set(d, 1.0);
+    const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
     const V share =
         hn::IfThenElse(flat, hn::Set(d, 0.5), hn::Min(hp, hq) / hn::IfThenElse(flat, one, whole));
     const auto put = [&](int number, V value) {
@@ -453,7 +589,9 @@ class TriangleSearch {
     put(Crossings::kTError,
         hn::IfThenElse(
             flat, one,
-            (from.error + from.error) / hn::IfThenElse(flat, one, whole) + hn::Set(d, 1e-15)));
+            // Which of two places comes first is asked with B moved aside.
+            two * (from.error + two * from.shift) / hn::IfThenElse(flat, one, whole) +
+                hn::Set(d, 1e-15)));
     put(Crossings::kHeightError, from.error);
     put(Crossings::kEdge, hn::IfThenElse(turned, from.edge, from.edge + hn::Set(d, 8.0)));
   }
@@ -469,9 +607,10 @@ class TriangleSearch {
   CrossingsFound found_;
 };
 
-CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
+CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t first,
+                                std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                                 ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).run(count, keep);
+  return TriangleSearch(search, scratch).run(first, next, count, keep);
 }
 
 CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
@@ -494,9 +633,10 @@ HWY_EXPORT(search_triangles);
 HWY_EXPORT(search_kept);
 HWY_EXPORT(place_one);
 
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
+                              std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, count, keep, scratch);
+  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, first, next, count, keep, scratch);
 }
 
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,

@@ -14,6 +14,7 @@ struct CrossingSearch {
   const MeshTree* b;
   Similarity a_from_b;  ///< unit frames
   Similarity b_from_a;
+  exact::Point aside = {0, 0, 0};  ///< A's unit frame: signs are those of B moved by this
   float room = 0;                ///< A's unit frame: points may be off by this
   float near = 0;                ///< pairs that come as near are found, ≥ room
   float reach = 0;               ///< and those that may, for what is kept: ≥ near
@@ -29,9 +30,7 @@ struct BlockPairs {
 
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
-  /// Pairs of triangles whose signs might be others where points move by `room`, and some that are
-  /// far apart: in ExactScratch::other_keys, A's triangle << 32 | B's.
-  std::uint32_t unsure = 0;
+  std::uint32_t next = 0;       ///< the pair of blocks to go on from: `count` at the end
   bool complete = true;    ///< no limit or room was short
   bool consistent = true;  ///< signs agree with each other
 };
@@ -40,9 +39,12 @@ struct CrossingsFound {
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
 /// Of `count` pairs of blocks (ExactScratch::keys) all triangles that cross, in the order of the
-/// pairs, by exact signs where need be. The same crossings on every instruction set. `keep`, unless
-/// null, gets the pairs of triangles that may do so before B has moved by its margin.
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
+/// pairs, by exact signs where need be. The same crossings on every instruction set. It goes on from
+/// crossing `first` and pair `next`, and stops where there is no room for more. Marks the blocks
+/// (BlockMarks::near) whose signs might be others if points moved by `room`. `keep`, unless null,
+/// gets the pairs of triangles that may cross before B has moved by its margin.
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
+                              std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept;
 
 /// The same crossings, of pairs of triangles that are kept.

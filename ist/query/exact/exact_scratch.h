@@ -57,8 +57,18 @@ struct PlacedMesh {
 struct alignas(64) TrianglePairs {
   /// [A, B][corner][axis]; finite in lanes without a pair, which are computed too.
   double corner[2][3][3][8] = {};
-  std::uint32_t triangle[2][8];
+  std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
+};
+
+/// Eight of them whose corners lie on both sides of each other's planes.
+struct alignas(64) StraddlingPairs : TrianglePairs {
+  /// [side][corner] of A's corners over B's plane, of B's over A's, times twice its area.
+  alignas(64) double height[2][3][8] = {};
+  double error[2][3][8] = {};             ///< of it
+  double shift[2][8] = {};                ///< what moving B aside adds to the heights of a side
+  std::uint32_t positive[2][3] = {};      ///< a bit a pair: with B moved aside
+  std::uint32_t settled = 0;              ///< no such sign changes if points move by the room
 };
 
 /// A pair of nodes that waits.
@@ -145,6 +155,13 @@ class Crossings {
     return triangle_[2 * i + side];
   }
 
+  /// Crossings from `from` on, fewer than eight, become the first.
+  void move_to_front(std::uint32_t from, std::uint32_t count) noexcept {
+    for (int number = 0; number < kNumbers; ++number)
+      std::copy_n(at(number) + from, count, at(number));
+    std::copy_n(triangle_.get() + 2 * std::size_t{from}, 2 * std::size_t{count}, triangle_.get());
+  }
+
   /// Zeros in crossings [from, to): they add nothing to a sum.
   void clear(std::uint32_t from, std::uint32_t to) noexcept {
     for (int number = 0; number < kNumbers; ++number)
@@ -184,6 +201,9 @@ class Crossings {
 /// One bit a block, or a shell.
 inline bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
   return bits[i / 64] >> i % 64 & 1;
+}
+inline void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
+  bits[i / 64] |= std::uint64_t{1} << i % 64;
 }
 
 /// What a query knows of the blocks of one solid.
@@ -254,11 +274,12 @@ struct CurveExtent {
 struct ExactScratch {
   ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
       : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
-        most_crossed(most_blocks / 256 + 8),
+        most_crossed(most_blocks / 64 + 8),
         most_crossings(most_blocks / 16 + 128),
         placed_a(hooked<PlacedMesh>(hooks)),
         placed_b(hooked<PlacedMesh>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
+        straddling(hooked<StraddlingPairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
         gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
         crossings(most_crossings, hooks),
@@ -301,7 +322,7 @@ struct ExactScratch {
   }
 
   /// Pairs of blocks, or of triangles, that are kept for later.
-  std::uint32_t most_pairs() const noexcept { return 4 * most_crossings; }
+  std::uint32_t most_pairs() const noexcept { return 16 * most_crossings; }
 
   /// Crossings, vertices of crossed blocks and blocks of both solids.
   std::size_t elements() const noexcept {
@@ -314,6 +335,7 @@ struct ExactScratch {
   Hooked<PlacedMesh> placed_a, placed_b;
   std::uint64_t hash_a = 0;  ///< of the asset that `placed_a` is of
   Hooked<TrianglePairs> pairs;
+  Hooked<StraddlingPairs> straddling;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
   Crossings crossings;

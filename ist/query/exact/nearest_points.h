@@ -96,4 +96,18 @@ inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Hei
     }
 }
 
+/// Whether triangles that do not cross come as near.
+inline bool come_within(double distance, const Point (&a)[3], const Point (&b)[3]) noexcept {
+  const FlatTriangle of_a(a[0], a[1], a[2]), of_b(b[0], b[1], b[2]);
+  Heights over_a, over_b;
+  for (std::size_t k = 0; k < 3; ++k) {
+    over_a[k] = dot(of_a.normal, b[k] - a[0]);
+    over_b[k] = dot(of_b.normal, a[k] - b[0]);
+  }
+  NearestPair best;
+  best.squared = distance * distance;
+  take_nearest(of_a, of_b, over_a, over_b, best);
+  return best.squared < distance * distance;
+}
+
 }  // namespace ist::exact
