@@ -10,6 +10,7 @@
 
 #include "query/exact/nearest_points.h"
 #include "query/exact/placed_mesh-inl.h"
+#include "query/exact/plane_sides-inl.h"
 #include "query/exact/points-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -102,44 +103,6 @@ class TriangleSearch {
     return bits;
   }
 
-  /// Lanes whose three heights do not all lie clear on one side of a plane.
-  static HWY_INLINE hn::Mask<F> straddle(const hn::Vec<F> (&height)[3], hn::Vec<F> over) {
-    return hn::And(hn::Min(height[0], hn::Min(height[1], height[2])) <= over,
-                   hn::Max(height[0], hn::Max(height[1], height[2])) >= hn::Neg(over));
-  }
-
-  /// Which of B's triangles have boxes that meet that of A's triangle i, reach through its plane
-  /// and have it reach through theirs.
-  HWY_INLINE std::uint32_t crossable(const PlacedTriangles& a, std::uint32_t i,
-                                     const PlacedTriangles& b, std::uint32_t lanes) const {
-    const OneBox box(a.low, a.high, i, reach_);
-    lanes &= meeting(b.low, b.high, box.low, box.high);
-    if (lanes == 0) return 0;
-    const F d;
-    // Coordinates are floats, and points of both blocks that matter are no further apart than this.
-    const float blur = 1e-6f * (a.reach + b.reach) + reach_, size = a.size + b.size;
-    const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
-    std::uint32_t bits = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
-      const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
-                          hn::Load(d, b.slack + l) * hn::Set(d, size);
-      hn::Vec<F> of_b[3], of_a[3];
-      for (int c = 0; c < 3; ++c) {
-        of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
-                    hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
-                   hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
-                  hn::Set(d, a.offset[i]);
-        of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
-                    hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
-                   hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
-                  hn::Load(d, b.offset + l);
-      }
-      bits |= mask_bits(d, hn::And(straddle(of_b, over_a), straddle(of_a, over_b))) << l;
-    }
-    return lanes & bits;
-  }
-
   /// Tests the triangles of two blocks by boxes and planes.
   void meet(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedTriangles& a = placed_.triangles(false, number_a);
@@ -161,16 +124,93 @@ class TriangleSearch {
     const std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
-    const PlacedVertices& vertices_a = placed_.vertices(false, number_a);
-    const PlacedVertices& vertices_b = placed_.vertices(true, number_b);
+    Meeting now(*this, number_a, number_b);
+    const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
+      return high[lane] - low[lane] <= 2 * slack_;
+    };
+    if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now.beside(false)) ||
+        (thin(box_b.slab_low, box_b.slab_high, lane_b) && now.beside(true)))
+      return;
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
-      for (std::uint32_t lanes = crossable(a, i, b, in_a); lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, vertices_a,
+      const OneBox box(a.low, a.high, i, reach_);
+      std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
+      if (lanes != 0) lanes = now.straddling(i, lanes);
+      for (; lanes != 0; lanes &= lanes - 1)
+        add_pair(kWidth * number_a + i, *now.vertices[0],
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 vertices_b);
+                 *now.vertices[1]);
     }
   }
+
+  /// Two blocks whose triangles are tested by the planes of either side, in double. Where a sign is
+  /// not settled, a plane does not keep them apart unless both blocks are marked as near anyway.
+  class Meeting {
+   public:
+    Meeting(TriangleSearch& all, std::uint32_t a, std::uint32_t b)
+        : vertices{&all.placed_.vertices(false, a), &all.placed_.vertices(true, b)},
+          all_(all),
+          number_{a, b} {
+      const bool near = has(all.scratch_.a.near, a) && has(all.scratch_.b.near, b);
+      margin_ = all.keep_ != nullptr ? Margin::reach : near ? Margin::rounding : Margin::room;
+      by_ = all.keep_ != nullptr ? double{all.reach_} : double{all.search_.room};
+    }
+
+    const PlacedVertices* const vertices[2];
+
+    /// Whether the planes of A's or B's block lie beside the other block as a whole.
+    bool beside(bool of_b) {
+      const PlacedPlanes& planes = planes_of(of_b);
+      const PlaneSides found = sides(of_b, planes.widest, planes.low, planes.high);
+      constexpr std::uint32_t kAll = (1u << kWidth) - 1;
+      return found.above == kAll || found.below == kAll;
+    }
+
+    /// Which of `lanes` of B no plane keeps apart from A's triangle i.
+    std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
+      const MeshBlock &a = all_.a_.blocks[number_[0]], &b = all_.b_.blocks[number_[1]];
+      const PlaneSides row = sides(false, i, 0, 0);
+      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
+        if (keeps_apart(row, b, j)) {
+          lanes ^= 1u << j;
+          continue;
+        }
+        if ((known_ >> j & 1) == 0) {
+          columns_[j] = sides(true, j, 0, 0);
+          known_ |= 1u << j;
+        }
+        if (keeps_apart(columns_[j], a, i)) lanes ^= 1u << j;
+      }
+      return lanes;
+    }
+
+   private:
+    const PlacedPlanes& planes_of(bool of_b) {
+      return of_b ? placed_planes(all_.b_, number_[1], &all_.search_.a_from_b,
+                                  *all_.scratch_.placed_b)
+                  : placed_planes(all_.a_, number_[0], nullptr, *all_.scratch_.placed_a);
+    }
+    /// Of the other block's vertices.
+    PlaneSides sides(bool of_b, std::uint32_t t, double low, double high) {
+      return sides_of(*vertices[of_b ? 0 : 1], planes_of(of_b), t, low, high,
+                      (of_b ? -1.0 : 1.0) * all_.search_.aside, margin_, by_);
+    }
+    static bool keeps_apart(const PlaneSides& sides, const MeshBlock& block, std::uint32_t t) {
+      const auto all = [&](std::uint32_t bits) {
+        return (bits >> block.corner[0][t] & bits >> block.corner[1][t] &
+                bits >> block.corner[2][t] & 1) != 0;
+      };
+      return all(sides.above) || all(sides.below);
+    }
+
+    TriangleSearch& all_;
+    std::uint32_t number_[2];
+    Margin margin_;
+    double by_;
+    PlaneSides columns_[kWidth];  ///< of B's planes
+    std::uint32_t known_ = 0;
+  };
 
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
                 std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
@@ -303,11 +343,35 @@ class TriangleSearch {
          left &= left - 1)
       find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
     const std::uint32_t apart = heights.apart(heights.certain);
-    for (std::uint32_t left = all & apart & ~heights.apart(heights.settled); left != 0;
-         left &= left - 1)
+    std::uint32_t unsettled = all & apart & ~heights.apart(heights.settled);
+    if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count);
+    for (std::uint32_t left = unsettled; left != 0; left &= left - 1)
       note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
     for (std::uint32_t left = all & ~apart; left != 0; left &= left - 1)
       add_straddling(pairs, heights, static_cast<std::uint32_t>(std::countr_zero(left)));
+  }
+
+  /// Pairs that are further apart than is near along the plane of one of them, as those in one plane
+  /// may be.
+  HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count) const {
+    const D d;
+    std::uint32_t out = 0;
+    const V least = hn::Set(d, double{search_.near} * double{search_.near} * (1 + 1e-6));
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      for (int s = 0; s < 2; ++s) {
+        const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
+        for (int k = 0; k < 3; ++k) {
+          const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
+          const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
+                             dot(out_of, corner[1 - s][2] - p));
+          out |= mask_bits(d, gap * hn::Abs(gap) > least * dot(out_of, out_of)) << l;
+        }
+      }
+    }
+    return out;
   }
 
   void add_straddling(const TrianglePairs& pairs, const Heights& heights, std::uint32_t from) {
@@ -517,6 +581,8 @@ class TriangleSearch {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
       out.triangle(0, i) = pairs.triangle[0][n];
       out.triangle(1, i) = pairs.triangle[1][n];
+      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
     }
     const D d;
     const std::uint32_t lanes = (1u << hn::Lanes(d)) - 1;

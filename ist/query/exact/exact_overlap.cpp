@@ -352,8 +352,7 @@ void ExactQuery::bound_near(const Side& own) noexcept {
   const std::uint32_t blocks = own.mesh.level[0].count;
   const double scale = own.is_b ? a_from_b_.scale : 1;
   for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-    for (std::uint64_t left = own.marks.near[w] | own.marks.crossed[w]; left != 0;
-         left &= left - 1) {
+    for (std::uint64_t left = own.marks.near[w]; left != 0; left &= left - 1) {
       const std::uint32_t b = 64 * w + static_cast<std::uint32_t>(std::countr_zero(left));
       const std::uint32_t i = b / kWidth, lane = b % kWidth;
       const BoxBlock& box = own.mesh.level[1].boxes[i];

@@ -40,13 +40,27 @@ struct alignas(64) PlacedTriangles {
   float reach;  ///< no coordinate is larger
 };
 
+/// The planes of a block's triangles in A's unit frame.
+struct alignas(64) PlacedPlanes {
+  double at[3][kWidth];      ///< their first corners
+  double normal[3][kWidth];  ///< product of two sides
+  double size[3][kWidth];    ///< the same of absolute values
+  double longest[kWidth];    ///< no coordinate of these sides is larger
+  /// The block's vertices lie between these heights over the plane of `widest`, times the length of
+  /// its normal.
+  double low, high;
+  std::uint32_t widest;  ///< the largest triangle
+};
+
 /// What recent queries placed of a mesh.
 struct PlacedMesh {
   PlacedCache<PlacedBoxes, 256> boxes;
   PlacedCache<PlacedVertices, 256> vertices;
   PlacedCache<PlacedTriangles, 256> triangles;
+  PlacedCache<PlacedPlanes, 256> planes;
 
   void forget() noexcept {
+    planes.forget();
     boxes.forget();
     vertices.forget();
     triangles.forget();
