@@ -28,7 +28,6 @@ class TriangleSearch {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
-    scratch_.straddling->count = 0;
   }
 
   CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
@@ -78,7 +77,6 @@ class TriangleSearch {
 
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
-    if (found_.complete) test_edges();
     // Sums go over eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
@@ -154,14 +152,22 @@ class TriangleSearch {
       const bool near = has(all.scratch_.a.near, a) && has(all.scratch_.b.near, b);
       margin_ = all.keep_ != nullptr ? Margin::reach : near ? Margin::rounding : Margin::room;
       by_ = all.keep_ != nullptr ? double{all.reach_} : double{all.search_.room};
+      const PlacedTriangles &of_a = all.placed_.triangles(false, a),
+                            &of_b = all.placed_.triangles(true, b);
+      for (int k = 0; k < 3; ++k)
+        apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
+                                      std::min(of_a.all_low[k], of_b.all_low[k]));
+      apart_ += all.search_.room;
     }
 
     const PlacedVertices* const vertices[2];
 
     /// Whether the planes of A's or B's block lie beside the other block as a whole.
     bool beside(bool of_b) {
+      // Its own heights are off by as much as the other's.
       const PlacedPlanes& planes = planes_of(of_b);
-      const PlaneSides found = sides(of_b, planes.widest, planes.low, planes.high);
+      const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
+      const PlaneSides found = sides(of_b, planes.widest, planes.low - off, planes.high + off);
       constexpr std::uint32_t kAll = (1u << kWidth) - 1;
       return found.above == kAll || found.below == kAll;
     }
@@ -169,18 +175,14 @@ class TriangleSearch {
     /// Which of `lanes` of B no plane keeps apart from A's triangle i.
     std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
       const MeshBlock &a = all_.a_.blocks[number_[0]], &b = all_.b_.blocks[number_[1]];
-      const PlaneSides row = sides(false, i, 0, 0);
+      lanes &= ~kept_apart(sides(false, i, 0, 0), b);
       for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
         const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
-        if (keeps_apart(row, b, j)) {
-          lanes ^= 1u << j;
-          continue;
-        }
         if ((known_ >> j & 1) == 0) {
-          columns_[j] = sides(true, j, 0, 0);
           known_ |= 1u << j;
+          columns_[j] = kept_apart(sides(true, j, 0, 0), a);
         }
-        if (keeps_apart(columns_[j], a, i)) lanes ^= 1u << j;
+        lanes &= ~((columns_[j] >> i & 1) << j);
       }
       return lanes;
     }
@@ -194,21 +196,18 @@ class TriangleSearch {
     /// Of the other block's vertices.
     PlaneSides sides(bool of_b, std::uint32_t t, double low, double high) {
       return sides_of(*vertices[of_b ? 0 : 1], planes_of(of_b), t, low, high,
-                      (of_b ? -1.0 : 1.0) * all_.search_.aside, margin_, by_);
+                      (of_b ? -1.0 : 1.0) * all_.search_.aside, double{apart_}, margin_, by_);
     }
-    static bool keeps_apart(const PlaneSides& sides, const MeshBlock& block, std::uint32_t t) {
-      const auto all = [&](std::uint32_t bits) {
-        return (bits >> block.corner[0][t] & bits >> block.corner[1][t] &
-                bits >> block.corner[2][t] & 1) != 0;
-      };
-      return all(sides.above) || all(sides.below);
+    static std::uint32_t kept_apart(const PlaneSides& sides, const MeshBlock& block) {
+      return triangles_of(sides.above, block) | triangles_of(sides.below, block);
     }
 
     TriangleSearch& all_;
     std::uint32_t number_[2];
     Margin margin_;
     double by_;
-    PlaneSides columns_[kWidth];  ///< of B's planes
+    float apart_ = 0;               ///< no coordinates of both blocks differ by more
+    std::uint32_t columns_[kWidth];  ///< A's triangles that B's plane keeps apart, a bit each
     std::uint32_t known_ = 0;
   };
 
@@ -347,8 +346,7 @@ class TriangleSearch {
     if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count);
     for (std::uint32_t left = unsettled; left != 0; left &= left - 1)
       note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
-    for (std::uint32_t left = all & ~apart; left != 0; left &= left - 1)
-      add_straddling(pairs, heights, static_cast<std::uint32_t>(std::countr_zero(left)));
+    if ((all & ~apart) != 0) test_edges(pairs, heights, all & ~apart);
   }
 
   /// Pairs that are further apart than is near along the plane of one of them, as those in one plane
@@ -372,25 +370,6 @@ class TriangleSearch {
       }
     }
     return out;
-  }
-
-  void add_straddling(const TrianglePairs& pairs, const Heights& heights, std::uint32_t from) {
-    StraddlingPairs& out = *scratch_.straddling;
-    const std::uint32_t n = out.count;
-    bool settled = true;
-    for (int s = 0; s < 2; ++s) {
-      out.triangle[s][n] = pairs.triangle[s][from];
-      out.shift[s][n] = heights.shift[s][from];
-      for (int c = 0; c < 3; ++c) {
-        for (int k = 0; k < 3; ++k) out.corner[s][c][k][n] = pairs.corner[s][c][k][from];
-        out.height[s][c][n] = heights.value[s][c][from];
-        out.error[s][c][n] = heights.error[s][c][from];
-        put(out.positive[s][c], n, (heights.positive[s][c] >> from & 1) != 0);
-        settled &= (heights.settled[s][c] >> from & 1) != 0;
-      }
-    }
-    put(out.settled, n, settled);
-    if (++out.count == 8) test_edges();
   }
 
   /// Which way round A's edges go about B's: a bit a pair.
@@ -424,14 +403,15 @@ class TriangleSearch {
     }
   };
 
-  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, WaysRound& out) const {
+  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
+                                  WaysRound& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room});
     const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
                         hn::Set(d, search_.aside.z)};
     const V by_aside = largest(aside);
-    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3], edge_b[3];
       V size_b[3];
       for (int s = 0; s < 2; ++s)
@@ -456,20 +436,18 @@ class TriangleSearch {
     }
   }
 
-  /// Tests by edges what planes left.
-  void test_edges() {
-    StraddlingPairs& pairs = *scratch_.straddling;
-    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
-    if (count == 0 || !found_.complete) return;
+  /// Tests by edges the pairs that planes left.
+  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights,
+                             std::uint32_t all) {
     WaysRound round;
-    find_ways_round(pairs, round);
-    pairs.count = 0;
+    find_ways_round(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
     for (int s = 0; s < 2; ++s)
       for (int k = 0; k < 3; ++k)
-        parts[s][k] = pairs.positive[s][k] ^ pairs.positive[s][(k + 1) % 3];
-    for (std::uint32_t left = all & ~(pairs.settled & round.decided(parts, round.settled));
-         left != 0; left &= left - 1)
+        parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
+    const std::uint32_t settled = each(heights.settled[0]) & each(heights.settled[1]) &
+                                  round.decided(parts, round.settled);
+    for (std::uint32_t left = all & ~settled; left != 0; left &= left - 1)
       note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
     for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
          left &= left - 1)
@@ -484,7 +462,7 @@ class TriangleSearch {
         once |= bits & all;
       }
     found_.consistent &= once == twice && more == 0;
-    if (twice != 0) add_crossings(pairs, pierced, twice);
+    if (twice != 0) add_crossings(pairs, heights, pierced, twice);
   }
 
   HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
@@ -561,105 +539,59 @@ class TriangleSearch {
     }
   }
 
-  /// Where an edge, from p to q, goes through the other triangle.
-  struct Piercing {
-    Vec3 p, q;
-    V height_p, height_q, error, shift, edge;
-  };
-
-  void add_crossings(const StraddlingPairs& pairs, const std::uint32_t (&pierced)[2][3],
-                     std::uint32_t crossing) {
-    const auto added = static_cast<std::uint32_t>(std::popcount(crossing));
-    if (found_.crossings + added > scratch_.most_crossings) {
+  void add_crossings(const TrianglePairs& pairs, const Heights& heights,
+                     const std::uint32_t (&pierced)[2][3], std::uint32_t crossing) {
+    if (found_.crossings + static_cast<std::uint32_t>(std::popcount(crossing)) >
+        scratch_.most_crossings) {
       found_.complete = false;
       return;
     }
-    Crossings& out = scratch_.crossings;
-    std::uint32_t at = found_.crossings;
-    found_.crossings += added;
-    for (std::uint32_t left = crossing, i = at; left != 0; left &= left - 1, ++i) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      out.triangle(0, i) = pairs.triangle[0][n];
-      out.triangle(1, i) = pairs.triangle[1][n];
-      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
-      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
-    }
-    const D d;
-    const std::uint32_t lanes = (1u << hn::Lanes(d)) - 1;
-    for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
-      const std::uint32_t here = crossing >> l & lanes;
-      if (here == 0) continue;
-      const Compressor<D> chosen(d, mask_of_bits(d, here));
-      Piercing end[2];
-      for (Piercing& e : end) {
-        const V zero = hn::Zero(d);
-        e = {{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero, zero};
+    for (; crossing != 0; crossing &= crossing - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
+      const std::uint32_t at = found_.crossings++;
+      for (int s = 0; s < 2; ++s) {
+        scratch_.crossings.triangle(s, at) = pairs.triangle[s][n];
+        set((s == 0 ? scratch_.a : scratch_.b).near, pairs.triangle[s][n] / kWidth);
+        for (int k = 0; k < 3; ++k)
+          if (pierced[s][k] >> n & 1) add_end(pairs, heights, n, s, k, at);
       }
-      for (int edge = 0; edge < 6; ++edge) {
-        const int s = edge / 3, k = edge % 3, next = (k + 1) % 3;
-        if ((pierced[s][k] & crossing) == 0) continue;
-        const Vec3 p = corner_of(pairs, s, k, l), q = corner_of(pairs, s, next, l);
-        const V hp = hn::Load(d, pairs.height[s][k] + l),
-                hq = hn::Load(d, pairs.height[s][next] + l);
-        const V error = hn::Load(d, pairs.error[s][k] + l) + hn::Load(d, pairs.error[s][next] + l);
-        // An edge that goes down enters the other solid.
-        const std::uint32_t down = pairs.positive[s][k], ends = s == 0 ? down : ~down;
-        for (int e = 0; e < 2; ++e) {
-          const auto take =
-              mask_of_bits(d, pierced[s][k] >> l & (e == 1 ? ends : ~ends) >> l & lanes);
-          const auto put = [&](V& to, V from) { to = hn::IfThenElse(take, from, to); };
-          put(end[e].p.x, p.x);
-          put(end[e].p.y, p.y);
-          put(end[e].p.z, p.z);
-          put(end[e].q.x, q.x);
-          put(end[e].q.y, q.y);
-          put(end[e].q.z, q.z);
-          put(end[e].height_p, hp);
-          put(end[e].height_q, hq);
-          put(end[e].error, error);
-          put(end[e].shift, hn::Load(d, pairs.shift[s] + l));
-          put(end[e].edge, hn::Set(d, static_cast<double>(edge)));
-        }
-      }
-      for (int e = 0; e < 2; ++e) add_end(end[e], chosen, e, at);
-      at += static_cast<std::uint32_t>(chosen.count());
     }
   }
 
-  void add_end(const Piercing& from, const Compressor<D>& chosen, int e, std::uint32_t at) {
-    const D d;
-    const V hp = hn::Abs(from.height_p), hq = hn::Abs(from.height_q), whole = hp + hq;
+  /// Where edge k of a side of pair n goes through the other triangle.
+  void add_end(const TrianglePairs& pairs, const Heights& heights, std::uint32_t n, int s, int k,
+               std::uint32_t at) {
+    const int next = (k + 1) % 3;
+    const double hp = std::abs(heights.value[s][k][n]), hq = std::abs(heights.value[s][next][n]);
+    const double whole = hp + hq, error = heights.error[s][k][n] + heights.error[s][next][n];
+    const auto& corner = pairs.corner[s];
+    const auto before = [&] {
+      for (int c = 0; c < 3; ++c)
+        if (corner[k][c][n] != corner[next][c][n]) return corner[next][c][n] < corner[k][c][n];
+      return false;
+    };
     // From the nearer end, and between two as near from the first in space, so that both triangles
     // at an edge do alike.
-    const Vec3 &p = from.p, &q = from.q;
-    const auto before =
-        hn::Or(q.x < p.x, hn::And(q.x == p.x, hn::Or(q.y < p.y, hn::And(q.y == p.y, q.z < p.z))));
-    const auto turned = hn::Or(hq < hp, hn::And(hq == hp, before));
+    const bool turned = hq < hp || (hq == hp && before());
     // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
-    const auto flat = whole == hn::Zero(d);
-    const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
-    const V share =
-        hn::IfThenElse(flat, hn::Set(d, 0.5), hn::Min(hp, hq) / hn::IfThenElse(flat, one, whole));
-    const auto put = [&](int number, V value) {
-      hn::StoreU(chosen(value), d, scratch_.crossings.end(e, number) + at);
+    const bool flat = whole == 0;
+    const double share = flat ? 0.5 : std::min(hp, hq) / whole;
+    // An edge that goes down enters the other solid.
+    const bool down = (heights.positive[s][k] >> n & 1) != 0;
+    const int e = down == (s == 0) ? 1 : 0;
+    const auto put = [&](int number, double value) {
+      scratch_.crossings.end(e, number)[at] = value;
     };
-    const auto coordinate = [&](int k, V at_p, V at_q) {
-      const V near = hn::IfThenElse(turned, at_q, at_p), far = hn::IfThenElse(turned, at_p, at_q);
-      put(Crossings::kFrom + k, near);
-      put(Crossings::kOffset + k, share * (far - near));
-    };
-    coordinate(0, p.x, q.x);
-    coordinate(1, p.y, q.y);
-    coordinate(2, p.z, q.z);
-    put(Crossings::kT, hn::IfThenElse(turned, one - share, share));
-    put(Crossings::kTError,
-        hn::IfThenElse(
-            flat, one,
-            // Which of two places comes first is asked with B moved aside.
-            two * (from.error + two * from.shift) / hn::IfThenElse(flat, one, whole) +
-                hn::Set(d, 1e-15)));
-    put(Crossings::kHeightError, from.error);
-    put(Crossings::kEdge, hn::IfThenElse(turned, from.edge, from.edge + hn::Set(d, 8.0)));
+    const int near = turned ? next : k, far = turned ? k : next;
+    for (int c = 0; c < 3; ++c) {
+      put(Crossings::kFrom + c, corner[near][c][n]);
+      put(Crossings::kOffset + c, share * (corner[far][c][n] - corner[near][c][n]));
+    }
+    put(Crossings::kT, turned ? 1 - share : share);
+    // Which of two places comes first is asked with B moved aside.
+    put(Crossings::kTError, flat ? 1 : 2 * (error + 2 * heights.shift[s][n]) / whole + 1e-15);
+    put(Crossings::kHeightError, error);
+    put(Crossings::kEdge, 3 * s + k + (turned ? 0 : 8));
   }
 
   const CrossingSearch& search_;

@@ -44,7 +44,7 @@ struct alignas(64) PlacedTriangles {
 struct alignas(64) PlacedPlanes {
   double at[3][kWidth];      ///< their first corners
   double normal[3][kWidth];  ///< product of two sides
-  double size[3][kWidth];    ///< the same of absolute values
+  double size[kWidth];       ///< no sum of the absolute products in it is larger
   double longest[kWidth];    ///< no coordinate of these sides is larger
   /// The block's vertices lie between these heights over the plane of `widest`, times the length of
   /// its normal.
@@ -73,16 +73,6 @@ struct alignas(64) TrianglePairs {
   double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
-};
-
-/// Eight of them whose corners lie on both sides of each other's planes.
-struct alignas(64) StraddlingPairs : TrianglePairs {
-  /// [side][corner] of A's corners over B's plane, of B's over A's, times twice its area.
-  alignas(64) double height[2][3][8] = {};
-  double error[2][3][8] = {};             ///< of it
-  double shift[2][8] = {};                ///< what moving B aside adds to the heights of a side
-  std::uint32_t positive[2][3] = {};      ///< a bit a pair: with B moved aside
-  std::uint32_t settled = 0;              ///< no such sign changes if points move by the room
 };
 
 /// A pair of nodes that waits.
@@ -134,7 +124,7 @@ struct CrossedBlock {
 /// start and leave it at the end.
 class Crossings {
  public:
-  /// Eight are written at once, so that up to seven more are touched.
+  /// Eight are read at once.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
       : room_((most + 15) / 8 * 8),
         numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
@@ -293,7 +283,6 @@ struct ExactScratch {
         placed_a(hooked<PlacedMesh>(hooks)),
         placed_b(hooked<PlacedMesh>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
-        straddling(hooked<StraddlingPairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
         gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
         crossings(most_crossings, hooks),
@@ -349,7 +338,6 @@ struct ExactScratch {
   Hooked<PlacedMesh> placed_a, placed_b;
   std::uint64_t hash_a = 0;  ///< of the asset that `placed_a` is of
   Hooked<TrianglePairs> pairs;
-  Hooked<StraddlingPairs> straddling;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
   Crossings crossings;

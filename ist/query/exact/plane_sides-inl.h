@@ -16,30 +16,51 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// A bit a vertex that lies above or below.
-struct PlaneSides {
-  std::uint32_t above = 0, below = 0;
-};
-
 /// What a vertex is above or below by: what doubles round; or so much that it stays there wherever
 /// points move by the room, or B by what the search reaches.
 enum class Margin { rounding, room, reach };
 
-/// A plane whose points are seen from one of them.
+/// Which of a block's triangles have all corners among some of its vertices, a bit each.
+HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const MeshBlock& block) {
+#if HWY_TARGET == HWY_SCALAR
+  std::uint32_t out = 0;
+  for (std::uint32_t t = 0; t < kWidth; ++t)
+    out |= (vertices >> block.corner[0][t] & vertices >> block.corner[1][t] &
+            vertices >> block.corner[2][t] & 1)
+           << t;
+  return out;
+#else
+  const hn::FixedTag<std::uint8_t, kWidth> d;
+  alignas(16) static constexpr std::uint8_t kByte[kWidth] = {0, 0, 0, 0, 0, 0, 0, 0,
+                                                             1, 1, 1, 1, 1, 1, 1, 1};
+  alignas(16) static constexpr std::uint8_t kBit[kWidth] = {1, 2, 4, 8, 16, 32, 64, 128,
+                                                            1, 2, 4, 8, 16, 32, 64, 128};
+  const auto both = hn::BitCast(d, hn::Set(hn::Repartition<std::uint16_t, decltype(d)>(),
+                                           static_cast<std::uint16_t>(vertices)));
+  const auto bits = hn::Load(d, kBit);
+  const auto in =
+      hn::VecFromMask(d, (hn::TableLookupBytes(both, hn::Load(d, kByte)) & bits) == bits);
+  const auto at = [&](int c) { return hn::TableLookupBytes(in, hn::LoadU(d, block.corner[c])); };
+  std::uint8_t out[8] = {};
+  hn::StoreMaskBits(d, hn::MaskFromVec(at(0) & (at(1) & at(2))), out);
+  return out[0] | static_cast<std::uint32_t>(out[1]) << 8;
+#endif
+}
+
+/// The plane of a triangle, and what lies along it.
 struct SeenPlane {
-  Vec3 at, normal, size;
+  Vec3 at, normal;
 
   SeenPlane(const PlacedPlanes& planes, std::uint32_t t)
-      : at(one(planes.at, t)), normal(one(planes.normal, t)), size(one(planes.size, t)) {}
+      : at(one(planes.at, t)), normal(one(planes.normal, t)) {}
 
-  /// Vertices l … of a block: heights, times the length of the normal, and what these may be off by.
-  HWY_INLINE V height(const PlacedVertices& vertices, std::size_t l, V& error, Vec3& r) const {
+  /// Of vertices l … of a block, times the length of the normal.
+  HWY_INLINE V heights(const PlacedVertices& vertices, std::size_t l) const {
     const D d;
-    r = Vec3{hn::Load(d, vertices.at[0] + l), hn::Load(d, vertices.at[1] + l),
-             hn::Load(d, vertices.at[2] + l)} -
-        at;
-    error = hn::Set(d, exact::kFilter) * absolute_dot(r, size);
-    return dot(r, normal);
+    return dot(Vec3{hn::Load(d, vertices.at[0] + l), hn::Load(d, vertices.at[1] + l),
+                    hn::Load(d, vertices.at[2] + l)} -
+                   at,
+               normal);
   }
 
  private:
@@ -49,29 +70,32 @@ struct SeenPlane {
   }
 };
 
+/// Vertices that lie above or below, a bit each.
+struct PlaneSides {
+  std::uint32_t above = 0, below = 0;
+};
+
 /// Of vertices of the other solid, seen from the plane of triangle t of a block; above and below what
-/// lies between `low` and `high`. `aside`: what they move by.
+/// lies between `low` and `high`. `aside`: what they move by. `apart`: no coordinates of both blocks
+/// differ by more.
 HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlanes& planes,
                                std::uint32_t t, double low, double high,
-                               const exact::Point& aside, Margin margin, double by) {
+                               const exact::Point& aside, double apart, Margin margin, double by) {
   const D d;
+  const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
+  const double shift = dot(aside, n), longest = planes.longest[t] + by;
+  double beyond = 1.1 * exact::kFilter * planes.size[t] * apart;
+  if (margin == Margin::reach)
+    beyond += by * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z));
+  else if (margin == Margin::room)  // six products of three numbers
+    beyond += 6 * by * longest * (2 * apart + longest);
   const SeenPlane plane(planes, t);
-  const Vec3 moved = {hn::Set(d, aside.x), hn::Set(d, aside.y), hn::Set(d, aside.z)};
-  const V shift = dot(moved, plane.normal);
-  V least = hn::Set(d, exact::kFilter) * absolute_dot(moved, plane.size);
-  if (margin == Margin::reach) least = least + hn::Set(d, by) * length_bound(plane.normal);
-  const V bottom = (hn::Set(d, low) - shift) - least, top = (hn::Set(d, high) - shift) + least;
-  const V longest = hn::Set(d, planes.longest[t] + by), two = hn::Set(d, 2.0);
-  const V moves = hn::Set(d, 6 * by) * longest;
+  const V top = hn::Set(d, (high - shift) + beyond), bottom = hn::Set(d, (low - shift) - beyond);
   PlaneSides out;
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-    V error;
-    Vec3 r;
-    const V height = plane.height(vertices, l, error, r);
-    // Six products of three numbers.
-    if (margin == Margin::room) error = error + moves * (two * largest(r) + longest);
-    out.above |= mask_bits(d, height - error > top) << l;
-    out.below |= mask_bits(d, height + error < bottom) << l;
+    const V height = plane.heights(vertices, l);
+    out.above |= mask_bits(d, height > top) << l;
+    out.below |= mask_bits(d, height < bottom) << l;
   }
   return out;
 }
@@ -101,6 +125,7 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     const Vec3 normal = {ax - bx, ay - by, az - bz};
     const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                        hn::Abs(az) + hn::Abs(bz)};
+    hn::Store((size.x + size.y) + size.z, d, out.size + l);
     const auto store = [&](const Vec3& x, double (&to)[3][kWidth]) {
       hn::Store(x.x, d, to[0] + l);
       hn::Store(x.y, d, to[1] + l);
@@ -108,20 +133,17 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     };
     store(p[0], out.at);
     store(normal, out.normal);
-    store(size, out.size);
     hn::Store(hn::Max(largest(u), largest(v)), d, out.longest + l);
     hn::Store(length_bound(normal), d, length + l);
   }
   out.widest =
       static_cast<std::uint32_t>(std::max_element(length, length + block.triangles) - length);
   const SeenPlane plane(out, out.widest);
-  V low = hn::Set(d, HUGE_VAL), high = hn::Set(d, -HUGE_VAL);
+  V low = hn::Zero(d), high = hn::Zero(d);
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-    V error;
-    Vec3 r;
-    const V height = plane.height(vertices, l, error, r);
-    low = hn::Min(low, height - error);
-    high = hn::Max(high, height + error);
+    const V height = plane.heights(vertices, l);
+    low = hn::Min(low, height);
+    high = hn::Max(high, height);
   }
   out.low = hn::GetLane(hn::MinOfLanes(d, low));
   out.high = hn::GetLane(hn::MaxOfLanes(d, high));
