@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
@@ -28,6 +29,7 @@ class TriangleSearch {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
+    scratch_.pairs->asks = 0;
   }
 
   CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
@@ -71,7 +73,8 @@ class TriangleSearch {
     for (std::uint32_t n = 0; n < kept.count && found_.complete; ++n) {
       const std::uint64_t pair = scratch_.kept.pair(kept, n);
       const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
-      add_pair(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth));
+      add_pair(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth),
+               !are_near(a / kWidth, b / kWidth));
     }
   }
 
@@ -137,7 +140,7 @@ class TriangleSearch {
       for (; lanes != 0; lanes &= lanes - 1)
         add_pair(kWidth * number_a + i, *now.vertices[0],
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 *now.vertices[1]);
+                 *now.vertices[1], !now.near);
     }
   }
 
@@ -147,9 +150,9 @@ class TriangleSearch {
    public:
     Meeting(TriangleSearch& all, std::uint32_t a, std::uint32_t b)
         : vertices{&all.placed_.vertices(false, a), &all.placed_.vertices(true, b)},
+          near(all.are_near(a, b)),
           all_(all),
           number_{a, b} {
-      const bool near = has(all.scratch_.a.near, a) && has(all.scratch_.b.near, b);
       margin_ = all.keep_ != nullptr ? Margin::reach : near ? Margin::rounding : Margin::room;
       by_ = all.keep_ != nullptr ? double{all.reach_} : double{all.search_.room};
       const PlacedTriangles &of_a = all.placed_.triangles(false, a),
@@ -161,6 +164,7 @@ class TriangleSearch {
     }
 
     const PlacedVertices* const vertices[2];
+    const bool near;  ///< both are marked
 
     /// Whether the planes of A's or B's block lie beside the other block as a whole.
     bool beside(bool of_b) {
@@ -211,10 +215,16 @@ class TriangleSearch {
     std::uint32_t known_ = 0;
   };
 
+  bool are_near(std::uint32_t block_a, std::uint32_t block_b) const {
+    return has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b);
+  }
+
+  /// `asks`: its blocks are not both marked as near.
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
-                std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t n = pairs.count;
+    pairs.asks |= static_cast<std::uint32_t>(asks) << n;
     const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
                           const PlacedVertices& from) {
       const MeshBlock& block = mesh.blocks[triangle / kWidth];
@@ -254,16 +264,22 @@ class TriangleSearch {
     }
   };
 
-  HWY_INLINE void find_heights(const TrianglePairs& pairs, Heights& out) const {
+  /// `kAsks`: whether it matters what is settled.
+  template <bool kAsks>
+  HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
+                               Heights& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
     const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
                         hn::Set(d, search_.aside.z)};
-    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
+      HWY_UNROLL(2)
       for (int s = 0; s < 2; ++s)
+        HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      HWY_UNROLL(2)
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
         const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
@@ -275,13 +291,12 @@ class TriangleSearch {
         const V along = dot(aside, normal), shift = side == 1 ? along : hn::Neg(along);
         const V shift_error = filter * absolute_dot(aside, size);
         hn::Store(hn::Abs(along), d, out.shift[side] + l);
-        const V longest = hn::Max(largest(u), largest(v)) + room;
+        const V longest = kAsks ? hn::Max(largest(u), largest(v)) + room : room;
+        HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) {
           const Vec3 r = corner[side][c] - plane[0];
           const V value = dot(r, normal), error = filter * absolute_dot(r, size);
           const V moved = value + shift, away = hn::Abs(moved), sure = error + shift_error;
-          // What the room moves: six products of three numbers.
-          const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
           hn::Store(value, d, out.value[side][c] + l);
           // Where moving aside decides, the plane may lie on the other side of the corner.
           const V height = hn::Abs(value);
@@ -289,7 +304,11 @@ class TriangleSearch {
                     out.error[side][c] + l);
           out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
           out.certain[side][c] |= mask_bits(d, away > sure) << l;
-          out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
+          if constexpr (kAsks) {
+            // What the room moves: six products of three numbers.
+            const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
+            out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
+          }
         }
       }
     }
@@ -329,24 +348,35 @@ class TriangleSearch {
     }
   }
 
-  /// Tests what has been gathered by the planes of both triangles.
   void test_pairs() {
+    if (scratch_.pairs->asks != 0)
+      test_pairs<true>();
+    else
+      test_pairs<false>();
+  }
+
+  /// Tests what has been gathered, by the planes of both triangles and by edges.
+  template <bool kAsks>
+  HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = pairs.count, all = (1u << count) - 1;
+    pairs.count = 0;
+    const std::uint32_t asks = std::exchange(pairs.asks, 0);
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     Heights heights;
-    find_heights(pairs, heights);
-    pairs.count = 0;
+    find_heights<kAsks>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
          left &= left - 1)
       find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
     const std::uint32_t apart = heights.apart(heights.certain);
-    std::uint32_t unsettled = all & apart & ~heights.apart(heights.settled);
-    if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count);
-    for (std::uint32_t left = unsettled; left != 0; left &= left - 1)
-      note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
-    if ((all & ~apart) != 0) test_edges(pairs, heights, all & ~apart);
+    if constexpr (kAsks) {
+      std::uint32_t unsettled = asks & all & apart & ~heights.apart(heights.settled);
+      if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count);
+      for (; unsettled != 0; unsettled &= unsettled - 1)
+        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(unsettled)));
+    }
+    if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
   }
 
   /// Pairs that are further apart than is near along the plane of one of them, as those in one plane
@@ -403,6 +433,7 @@ class TriangleSearch {
     }
   };
 
+  template <bool kAsks>
   HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
                                   WaysRound& out) const {
     const D d;
@@ -410,45 +441,59 @@ class TriangleSearch {
     const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
                         hn::Set(d, search_.aside.z)};
-    const V by_aside = largest(aside);
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3], edge_b[3];
-      V size_b[3];
+      HWY_UNROLL(2)
       for (int s = 0; s < 2; ++s)
+        HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      // No coordinate of the way from a corner of A's to one of B's is larger.
+      V apart = room, size_b[3];
+      HWY_UNROLL(3)
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
         size_b[j] = largest(edge_b[j]) + room;
+        apart = hn::Max(apart, largest(corner[1][j] - corner[0][0]));
       }
+      apart = apart + hn::Max(largest(corner[0][1] - corner[0][0]),
+                              largest(corner[0][2] - corner[0][0])) + room;
+      const V error = filter * apart;
+      HWY_UNROLL(3)
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        const V size_a = largest(edge_a) + room;
+        const V size_a = largest(edge_a) + room, error_a = error * size_a;
+        HWY_UNROLL(3)
         for (int j = 0; j < 3; ++j) {
-          const Vec3 r = corner[1][j] - corner[0][i], normal = cross(edge_a, edge_b[j]);
-          const V value = dot(r, normal) + dot(aside, normal), size = largest(r) + by_aside;
-          const V error = filter * size_a * size * size_b[j];
-          const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
+          // Moved aside: the ninth rounding.
+          const Vec3 r = (corner[1][j] - corner[0][i]) + aside;
+          const V value = dot(r, cross(edge_a, edge_b[j])), away = hn::Abs(value);
           out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
-          out.certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
-          out.settled[i][j] |= mask_bits(d, hn::Abs(value) > error + moved) << l;
+          out.certain[i][j] |= mask_bits(d, away > error_a * size_b[j]) << l;
+          if constexpr (kAsks) {
+            const V moved = six_rooms * (size_a * size_b[j] + apart * (size_a + size_b[j]));
+            out.settled[i][j] |= mask_bits(d, away > error_a * size_b[j] + moved) << l;
+          }
         }
       }
     }
   }
 
   /// Tests by edges the pairs that planes left.
-  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights,
-                             std::uint32_t all) {
+  template <bool kAsks>
+  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights, std::uint32_t all,
+                             std::uint32_t asks) {
     WaysRound round;
-    find_ways_round(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
+    find_ways_round<kAsks>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
     for (int s = 0; s < 2; ++s)
       for (int k = 0; k < 3; ++k)
         parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
-    const std::uint32_t settled = each(heights.settled[0]) & each(heights.settled[1]) &
-                                  round.decided(parts, round.settled);
-    for (std::uint32_t left = all & ~settled; left != 0; left &= left - 1)
-      note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+    if constexpr (kAsks) {
+      const std::uint32_t settled = each(heights.settled[0]) & each(heights.settled[1]) &
+                                    round.decided(parts, round.settled);
+      for (std::uint32_t left = asks & all & ~settled; left != 0; left &= left - 1)
+        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+    }
     for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
          left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
@@ -486,7 +531,7 @@ class TriangleSearch {
   HWY_NOINLINE void note_near(const TrianglePairs& pairs, std::uint32_t n) {
     const std::uint32_t block_a = pairs.triangle[0][n] / kWidth,
                         block_b = pairs.triangle[1][n] / kWidth;
-    if (has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b)) return;
+    if (are_near(block_a, block_b)) return;
     const ExactCorners corners(pairs, n);
     if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
     set(scratch_.a.near, block_a);
@@ -500,6 +545,7 @@ class TriangleSearch {
     const TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = pairs.count;
     scratch_.pairs->count = 0;
+    scratch_.pairs->asks = 0;
     gathered_ += count;
     std::uint32_t apart = 0;
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {

@@ -73,6 +73,7 @@ struct alignas(64) TrianglePairs {
   double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
+  std::uint32_t asks = 0;  ///< a bit a pair: its blocks may have to be marked as near
 };
 
 /// A pair of nodes that waits.
