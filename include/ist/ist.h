@@ -408,7 +408,10 @@ typedef struct ist_penetration_t {
   double centroid[3];             /* [u] of the overlap, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
   double rotation_gradient[3];    /* [u³/rad] dV/d(rotation vector of B about B's origin), world */
+  double contact_area;      /* [u²] IST_EXACT, touching: of the faces that lie on each other */
+  double contact_normal[3]; /* unit, from A to B, world: their mean; zero if there is none */
   uint32_t node_visits, sphere_pairs; /* with IST_EXACT: crossing triangles */
+  uint32_t touching; /* IST_EXACT: 1 if they meet and the volume is 0; else 0 */
 } ist_penetration_t;
 
 /* Separation: between the surfaces if both assets keep a mesh, else between the inner spheres. All

@@ -113,6 +113,11 @@ struct PlacedSolid {
 };
 
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
+///
+/// With Measure::exact the volume has a kink where faces are flush or copies lie in place. There the
+/// gradients are those towards one side, the same for (A, B) and (B, A): where B moves away from A
+/// along the line of the middles of their bounding boxes, and somewhat across. Where both middles
+/// are one point, the side is fixed in A's frame.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
   /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished
@@ -126,11 +131,21 @@ struct Penetration {
   Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  /// [u²] Measure::exact, where the solids touch: of the faces that lie on each other. 0 where they
+  /// touch in points and edges alone.
+  double contact_area = 0;
+  /// Unit, from A to B, world: the mean normal of these faces. Zero without faces, and where their
+  /// normals cancel, as around a pin in its hole.
+  Eigen::Vector3d contact_normal = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
   /// Non-empty lenses summed, spheres tested against triangles of a surface, and spheres that lie
   /// wholly in the other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
+  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
+  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
+  /// Spheres cannot tell: false.
+  bool touching = false;
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner

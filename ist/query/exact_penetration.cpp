@@ -51,6 +51,12 @@ Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
   if (answer.volume > 0) answer.centroid = sums.centroid;
   answer.translation_gradient = sums.force;
   answer.rotation_gradient = sums.torque;
+  answer.touching = found.contact.touching;
+  answer.contact_area = found.contact.area * (pose.unit_a * pose.unit_a);
+  // Normals that cancel leave what areas round.
+  const Eigen::Vector3d normal = vector(found.contact.normal);
+  if (normal.norm() > 1e-9 * found.contact.area)
+    answer.contact_normal = pose.rotation() * normal.normalized();
   answer.node_visits = found.visits;
   answer.sphere_pairs = found.crossings;
   return answer;

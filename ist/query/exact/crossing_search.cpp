@@ -38,8 +38,8 @@ class TriangleSearch {
     found_.crossings = first;
     std::uint32_t n = next;
     for (; n < count && found_.complete; ++n) {
-      // Two blocks add at most 256, and as many may wait.
-      if (keep_ == nullptr && found_.crossings + 2 * 256 > scratch_.most_crossings) break;
+      // Two blocks add at most 256, and seven more wait.
+      if (keep_ == nullptr && n > next && found_.crossings + 264 > scratch_.most_crossings) break;
       // Where many more are near than cross, keeping them would not pay. Two blocks add at most
       // 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
@@ -61,7 +61,75 @@ class TriangleSearch {
     return finish();
   }
 
+  SurfaceContact contact(std::uint32_t count, const KeptPairs* kept) {
+    look_ahead(search_.near);
+    SurfaceContact out;
+    visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
+                                std::uint32_t lanes) {
+      Meeting now(*this, number_a, number_b);
+      for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
+        const exact::Point normal = now.normal(false, i);
+        if (dot(normal, now.normal(true, j)) >= 0) continue;
+        const Corners a = corners(false, number_a, i), b = corners(true, number_b, j);
+        const double area = exact::common_area(a.of, normal, b.of);
+        if (!(area > 0)) continue;
+        out.area += area;
+        out.normal = out.normal + (area / std::sqrt(dot(normal, normal))) * normal;
+      }
+      return false;
+    });
+    out.touching = out.area > 0;
+    if (!out.touching)  // in a point or an edge, if at all
+      visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
+                                  std::uint32_t lanes) {
+        for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
+          out.touching = exact::come_within(
+              search_.touch, corners(false, number_a, i).of,
+              corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
+        return out.touching;
+      });
+    return out;
+  }
+
  private:
+  struct Corners {
+    exact::Point of[3];
+  };
+  Corners corners(bool of_b, std::uint32_t number, std::uint32_t t) {
+    const MeshBlock& block = (of_b ? b_ : a_).blocks[number];
+    const PlacedVertices& vertices = placed_.vertices(of_b, number);
+    Corners out;
+    for (int c = 0; c < 3; ++c) {
+      const std::uint32_t v = block.corner[c][t];
+      out.of[c] = {vertices.at[0][v], vertices.at[1][v], vertices.at[2][v]};
+    }
+    return out;
+  }
+
+  /// visit(A's block, its triangle, B's block, some of its triangles): until it returns true, of
+  /// blocks that are marked as near, or of pairs that are kept, those whose boxes meet.
+  template <class Visit>
+  void visit_near(std::uint32_t count, const KeptPairs* kept, const Visit& visit) {
+    for (std::uint32_t n = 0; n < (kept != nullptr ? kept->count : count); ++n) {
+      const std::uint64_t pair = kept != nullptr ? scratch_.kept.pair(*kept, n) : scratch_.keys[n];
+      const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
+      if (kept != nullptr) {
+        if (are_near(a / kWidth, b / kWidth) &&
+            visit(a / kWidth, a % kWidth, b / kWidth, 1u << b % kWidth))
+          return;
+        continue;
+      }
+      if (!are_near(a, b)) continue;
+      const PlacedTriangles &of_a = placed_.triangles(false, a), &of_b = placed_.triangles(true, b);
+      for (std::uint32_t i = 0; i < a_.blocks[a].triangles; ++i) {
+        const OneBox box(of_a.low, of_a.high, i, reach_);
+        const std::uint32_t lanes = meeting(of_b.low, of_b.high, box.low, box.high);
+        if (lanes != 0 && visit(a, i, b, lanes)) return;
+      }
+    }
+  }
+
   void look_ahead(float reach) {
     reach_ = reach;
     slack_ = 2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + reach * 2;
@@ -189,6 +257,20 @@ class TriangleSearch {
         lanes &= ~((columns_[j] >> i & 1) << j);
       }
       return lanes;
+    }
+
+    /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch.
+    std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
+      const PlacedPlanes& planes = planes_of(false);
+      const exact::Point n = normal(false, i);
+      const double far = all_.search_.touch * std::sqrt(dot(n, n));
+      const PlaneSides off = sides_of(*vertices[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
+                                      Margin::rounding, 0);
+      return lanes & triangles_of(~(off.above | off.below), all_.b_.blocks[number_[1]]);
+    }
+    exact::Point normal(bool of_b, std::uint32_t t) {
+      const PlacedPlanes& planes = planes_of(of_b);
+      return {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
     }
 
    private:
@@ -662,6 +744,11 @@ CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
   return TriangleSearch(search, scratch).run(kept);
 }
 
+SurfaceContact search_contact(const CrossingSearch& search, std::uint32_t count,
+                              const KeptPairs* kept, ExactScratch& scratch) {
+  return TriangleSearch(search, scratch).contact(count, kept);
+}
+
 const PlacedVertices& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
                                 ExactScratch& scratch) {
   return PlacedMeshes(search, scratch).vertices(of_b, number);
@@ -675,6 +762,7 @@ namespace ist {
 
 HWY_EXPORT(search_triangles);
 HWY_EXPORT(search_kept);
+HWY_EXPORT(search_contact);
 HWY_EXPORT(place_one);
 
 CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
@@ -686,6 +774,11 @@ CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_kept)(search, kept, scratch);
+}
+
+SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
+                            const KeptPairs* kept, ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_contact)(search, count, kept, scratch);
 }
 
 const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

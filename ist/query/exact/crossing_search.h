@@ -19,6 +19,7 @@ struct CrossingSearch {
   float near = 0;                ///< pairs that come as near are found, ≥ room
   float reach = 0;               ///< and those that may, for what is kept: ≥ near
   std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit
+  double touch = 0;              ///< what comes as near touches: poses and vertices round by this
 };
 
 /// Pairs of blocks of both meshes whose boxes come within `reach`.
@@ -33,6 +34,13 @@ struct CrossingsFound {
   std::uint32_t next = 0;       ///< the pair of blocks to go on from: `count` at the end
   bool complete = true;    ///< no limit or room was short
   bool consistent = true;  ///< signs agree with each other
+};
+
+/// How the surfaces of two solids touch that have no volume in common.
+struct SurfaceContact {
+  bool touching = false;        ///< points of both are within CrossingSearch::touch of each other
+  double area = 0;              ///< of the faces that lie on each other, back to back
+  exact::Point normal = {};     ///< ∫ n dA over them, n out of A
 };
 
 /// Finds the pairs of blocks.
@@ -50,6 +58,11 @@ CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
 /// The same crossings, of pairs of triangles that are kept.
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept;
+
+/// Of the pairs of blocks (ExactScratch::keys), or those of triangles that are kept, that are marked
+/// as near: how they touch, B where it is.
+SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
+                            const KeptPairs* kept, ExactScratch& scratch) noexcept;
 
 /// The vertices of a block in A's unit frame, B's rounded once after the motion. They stay until
 /// others are placed.

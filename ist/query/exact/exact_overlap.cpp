@@ -41,13 +41,16 @@ void ExactQuery::move_aside() noexcept {
     return length > 0 ? 1 / length * x : Point{0, 0, 0};
   };
   constexpr Point kAcross = {0.267, 0.534, 0.802};
-  const Point centre = unit({a_from_b_.t[0], a_from_b_.t[1], a_from_b_.t[2]});
+  const Point middle = {a_from_b_.t[0], a_from_b_.t[1], a_from_b_.t[2]}, centre = unit(middle);
   const Point turned = 1 / a_from_b_.scale * map_vector(a_from_b_, kAcross);
   const Point both = kAcross + turned;
   const Point across = (dot(centre, both) < 0 ? -1.0 : 1.0) * both + cross(kAcross, turned);
   constexpr double kAside = 0x1p-45;  // of both sizes
   const double far = kAside * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
   search_.aside = far * unit(centre + 0.4 * unit(across));
+  search_.touch = sides_[0].moved + sides_[1].moved +
+                  4 * kHalfUnit * (sides_[0].mesh.extent() +
+                                   a_from_b_.scale * sides_[1].mesh.extent() + length_bound(middle));
   sides_[1].moved += far;
 }
 
@@ -459,6 +462,11 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
                4 * kHalfUnit * std::abs(out_.sums.volume());
   out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound
   out_.complete = out_.consistent;
+  // Less than what sums round is nothing: then the surfaces touch, or do not.
+  if (std::abs(out_.sums.volume()) <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+    out_.contact = find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
+    if (out_.contact.touching) out_.sums.six_volumes = {};
+  }
   return out_;
 }
 

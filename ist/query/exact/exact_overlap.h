@@ -19,6 +19,7 @@ struct ExactOverlap {
   ExactSums sums;            ///< the gradients are those by a motion of B
   double error = 0;          ///< the true volume is within it of the sums'
   exact::Point origin = {};  ///< of the sums
+  SurfaceContact contact;    ///< where the sums' volume is nothing
   std::uint32_t visits = 0, crossings = 0;
   /// No limit or room was short, and it is consistent; else nothing above is of use.
   bool complete = true;
