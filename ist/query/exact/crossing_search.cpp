@@ -64,21 +64,32 @@ class TriangleSearch {
   SurfaceContact contact(std::uint32_t count, const KeptPairs* kept) {
     look_ahead(search_.near);
     SurfaceContact out;
+    TrianglePairs& pairs = *scratch_.pairs;
+    const auto add_areas = [&] {
+      const std::uint32_t far = far_in_planes(pairs, pairs.count, 0);
+      for (std::uint32_t left = ((1u << pairs.count) - 1) & ~far; left != 0; left &= left - 1) {
+        const ExactCorners corners(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+        const exact::Point(&a)[3] = corners.of[0];
+        const exact::Point normal = cross(a[1] - a[0], a[2] - a[0]);
+        const double area = exact::common_area(a, normal, corners.of[1]);
+        if (!(area > 0)) continue;
+        out.area += area;
+        out.normal = out.normal + (area / std::sqrt(dot(normal, normal))) * normal;
+      }
+      pairs.count = 0;
+    };
     visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
                                 std::uint32_t lanes) {
       Meeting now(*this, number_a, number_b);
       for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
         const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
-        const exact::Point normal = now.normal(false, i);
-        if (dot(normal, now.normal(true, j)) >= 0) continue;
-        const Corners a = corners(false, number_a, i), b = corners(true, number_b, j);
-        const double area = exact::common_area(a.of, normal, b.of);
-        if (!(area > 0)) continue;
-        out.area += area;
-        out.normal = out.normal + (area / std::sqrt(dot(normal, normal))) * normal;
+        if (dot(now.normal(false, i), now.normal(true, j)) >= 0) continue;
+        put_pair(kWidth * number_a + i, *now.vertices[0], kWidth * number_b + j, *now.vertices[1]);
+        if (pairs.count == 8) add_areas();
       }
       return false;
     });
+    add_areas();
     out.touching = out.area > 0;
     if (!out.touching)  // in a point or an edge, if at all
       visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
@@ -305,8 +316,15 @@ class TriangleSearch {
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
                 std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
     TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t n = pairs.count;
-    pairs.asks |= static_cast<std::uint32_t>(asks) << n;
+    pairs.asks |= static_cast<std::uint32_t>(asks) << pairs.count;
+    put_pair(triangle_a, vertices_a, triangle_b, vertices_b);
+    if (pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
+  }
+
+  void put_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t n = pairs.count++;
     const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
                           const PlacedVertices& from) {
       const MeshBlock& block = mesh.blocks[triangle / kWidth];
@@ -318,7 +336,6 @@ class TriangleSearch {
     };
     take(0, a_, triangle_a, vertices_a);
     take(1, b_, triangle_b, vertices_b);
-    if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
   }
 
   static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
@@ -454,19 +471,20 @@ class TriangleSearch {
     const std::uint32_t apart = heights.apart(heights.certain);
     if constexpr (kAsks) {
       std::uint32_t unsettled = asks & all & apart & ~heights.apart(heights.settled);
-      if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count);
+      if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count, double{search_.near});
       for (; unsettled != 0; unsettled &= unsettled - 1)
         note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(unsettled)));
     }
     if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
   }
 
-  /// Pairs that are further apart than is near along the plane of one of them, as those in one plane
+  /// Pairs that are further apart than `reach` along the plane of one of them, as those in one plane
   /// may be.
-  HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count) const {
+  HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count,
+                                           double reach) const {
     const D d;
     std::uint32_t out = 0;
-    const V least = hn::Set(d, double{search_.near} * double{search_.near} * (1 + 1e-6));
+    const V least = hn::Set(d, reach * reach * (1 + 1e-6));
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
@@ -529,31 +547,27 @@ class TriangleSearch {
       for (int s = 0; s < 2; ++s)
         HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      // No coordinate of the way from a corner of A's to one of B's is larger.
-      V apart = room, size_b[3];
+      V size_b[3];
       HWY_UNROLL(3)
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
         size_b[j] = largest(edge_b[j]) + room;
-        apart = hn::Max(apart, largest(corner[1][j] - corner[0][0]));
       }
-      apart = apart + hn::Max(largest(corner[0][1] - corner[0][0]),
-                              largest(corner[0][2] - corner[0][0])) + room;
-      const V error = filter * apart;
       HWY_UNROLL(3)
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        const V size_a = largest(edge_a) + room, error_a = error * size_a;
+        const V size_a = largest(edge_a) + room, error_a = filter * size_a;
         HWY_UNROLL(3)
         for (int j = 0; j < 3; ++j) {
           // Moved aside: the ninth rounding.
           const Vec3 r = (corner[1][j] - corner[0][i]) + aside;
           const V value = dot(r, cross(edge_a, edge_b[j])), away = hn::Abs(value);
+          const V size = largest(r), error = error_a * size_b[j] * size;
           out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
-          out.certain[i][j] |= mask_bits(d, away > error_a * size_b[j]) << l;
+          out.certain[i][j] |= mask_bits(d, away > error) << l;
           if constexpr (kAsks) {
-            const V moved = six_rooms * (size_a * size_b[j] + apart * (size_a + size_b[j]));
-            out.settled[i][j] |= mask_bits(d, away > error_a * size_b[j] + moved) << l;
+            const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
+            out.settled[i][j] |= mask_bits(d, away > error + moved) << l;
           }
         }
       }
