@@ -180,7 +180,7 @@ struct MemoryHooks {
 class Workspace {
  public:
   /// `capacity`: count of node pairs that may wait at once; workspace_capacity() returns what two
-  /// solids need. It reserves 7.5 MB and 115 bytes per pair of address space (128 MB by default);
+  /// solids need. It reserves 8.2 MB and 173 bytes per pair of address space (189 MB by default);
   /// pages are touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
@@ -207,9 +207,10 @@ class Workspace {
 /// worst poses: at least 4,096, and 169,140 for two cubes of 64,000 spheres. The call allocates,
 /// and takes some 0.3 s for 16,000 spheres.
 ///
-/// It does not cover Measure::exact and time_of_impact(). A capacity c lets the exact measure find
-/// c / 16 + 128 crossing pairs of triangles, and c / 4 + 512 pairs that touch or nearly do:
-/// coincident copies need most. The mesh must have no more than c blocks of 16 triangles.
+/// It does not cover Measure::exact and time_of_impact(). A capacity c lets penetration() by the
+/// exact measure open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh that
+/// cross the other: copies in place need most. Patches and outlines hold all crossings at once,
+/// c / 16 + 128. The mesh must have no more than c blocks.
 ///
 /// Throws Error for an empty asset, a scale out of range, or two fields.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);

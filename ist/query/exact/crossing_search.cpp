@@ -448,7 +448,7 @@ class TriangleSearch {
   }
 
   void test_pairs() {
-    if (scratch_.pairs->asks != 0)
+    if (scratch_.pairs->asks != 0 || !found_.settled)
       test_pairs<true>();
     else
       test_pairs<false>();
@@ -584,9 +584,10 @@ class TriangleSearch {
     for (int s = 0; s < 2; ++s)
       for (int k = 0; k < 3; ++k)
         parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
+    std::uint32_t settled = 0;
     if constexpr (kAsks) {
-      const std::uint32_t settled = each(heights.settled[0]) & each(heights.settled[1]) &
-                                    round.decided(parts, round.settled);
+      settled = each(heights.settled[0]) & each(heights.settled[1]) &
+                round.decided(parts, round.settled);
       for (std::uint32_t left = asks & all & ~settled; left != 0; left &= left - 1)
         note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
     }
@@ -603,6 +604,7 @@ class TriangleSearch {
         once |= bits & all;
       }
     found_.consistent &= once == twice && more == 0;
+    found_.settled |= (twice & settled) != 0;
     if (twice != 0) add_crossings(pairs, heights, pierced, twice);
   }
 

@@ -32,6 +32,7 @@ struct BlockPairs {
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
   std::uint32_t next = 0;       ///< the pair of blocks to go on from: `count` at the end
+  bool settled = false;    ///< triangles cross wherever points move by the room
   bool complete = true;    ///< no limit or room was short
   bool consistent = true;  ///< signs agree with each other
 };

@@ -428,6 +428,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
     for (std::uint32_t i = left; i < found.crossings; ++i) out_.complete &= add_crossing(i);
     out_.crossings += found.crossings - left;
+    out_.settled |= found.settled;
     const bool ends = serves_ || found.next == block_pairs_;
     const std::uint32_t sums_end = ends ? found.crossings : found.crossings / 8 * 8;
     for (std::uint32_t i = 0; i < sums_end; i += 8) {
@@ -462,10 +463,17 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
                4 * kHalfUnit * std::abs(out_.sums.volume());
   out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound
   out_.complete = out_.consistent;
-  // Less than what sums round is nothing: then the surfaces touch, or do not.
-  if (std::abs(out_.sums.volume()) <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
-    out_.contact = find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
-    if (out_.contact.touching) out_.sums.six_volumes = {};
+  // What sums round may be nothing, where no triangles cross for certain. It is if it is no thicker
+  // than what poses and vertices round, over the faces that lie on each other or push.
+  const double volume = std::abs(out_.sums.volume());
+  if (!out_.settled && volume <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+    const SurfaceContact contact =
+        find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
+    if (contact.touching &&
+        volume <= 8 * search_.touch * (contact.area + length_bound(out_.sums.force))) {
+      out_.contact = contact;
+      out_.sums.six_volumes = {};
+    }
   }
   return out_;
 }
