@@ -116,8 +116,8 @@ struct PlacedSolid {
 ///
 /// With Measure::exact the volume has a kink where faces are flush or copies lie in place. There the
 /// gradients are those towards one side, the same for (A, B) and (B, A): where B moves away from A
-/// along the line of the middles of their bounding boxes, and somewhat across. Where both middles
-/// are one point, the side is fixed in A's frame.
+/// along the line of the middles of their bounding boxes, and somewhat across. Of copies of one
+/// asset about one middle it is a side that is fixed in A's frame.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
   /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished

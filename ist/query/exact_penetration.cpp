@@ -162,7 +162,15 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (found.complete) return whole_answer(found, pose);
+  if (found.complete) {
+    Penetration answer = whole_answer(found, pose);
+    // What the interval allows for is no part of the smaller solid.
+    const double most = std::min(volume_of(a), volume_of(b));
+    answer.volume = std::min(answer.volume, most);
+    answer.volume_max = std::min(answer.volume_max, most);
+    answer.volume_min = std::min(answer.volume_min, most);
+    return answer;
+  }
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
