@@ -113,6 +113,11 @@ struct PlacedSolid {
 };
 
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
+///
+/// With Measure::exact the volume has a kink where faces are flush or copies lie in place. There the
+/// gradients are those towards one side, the same for (A, B) and (B, A): where B moves away from A
+/// along the line of the middles of their bounding boxes, and somewhat across. Of copies of one
+/// asset about one middle it is a side that is fixed in A's frame.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
   /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished
@@ -126,11 +131,21 @@ struct Penetration {
   Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
   /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
   Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  /// [u²] Measure::exact, where the solids touch: of the faces that lie on each other. 0 where they
+  /// touch in points and edges alone.
+  double contact_area = 0;
+  /// Unit, from A to B, world: the mean normal of these faces. Zero without faces, and where their
+  /// normals cancel, as around a pin in its hole.
+  Eigen::Vector3d contact_normal = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
   /// Non-empty lenses summed, spheres tested against triangles of a surface, and spheres that lie
   /// wholly in the other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
+  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
+  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
+  /// Spheres cannot tell: false.
+  bool touching = false;
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
@@ -165,7 +180,7 @@ struct MemoryHooks {
 class Workspace {
  public:
   /// `capacity`: count of node pairs that may wait at once; workspace_capacity() returns what two
-  /// solids need. It reserves 7.5 MB and 115 bytes per pair of address space (128 MB by default);
+  /// solids need. It reserves 8.2 MB and 173 bytes per pair of address space (189 MB by default);
   /// pages are touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
@@ -192,9 +207,10 @@ class Workspace {
 /// worst poses: at least 4,096, and 169,140 for two cubes of 64,000 spheres. The call allocates,
 /// and takes some 0.3 s for 16,000 spheres.
 ///
-/// It does not cover Measure::exact and time_of_impact(). A capacity c lets the exact measure find
-/// c / 16 + 128 crossing pairs of triangles, and c / 4 + 512 pairs that touch or nearly do:
-/// coincident copies need most. The mesh must have no more than c blocks of 16 triangles.
+/// It does not cover Measure::exact and time_of_impact(). A capacity c lets penetration() by the
+/// exact measure open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh that
+/// cross the other: copies in place need most. Patches and outlines hold all crossings at once,
+/// c / 16 + 128. The mesh must have no more than c blocks.
 ///
 /// Throws Error for an empty asset, a scale out of range, or two fields.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);

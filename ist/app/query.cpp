@@ -208,7 +208,10 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   }
   warn_of_misfit(a.view(), b.view(), rows, options);
   std::vector<Answer> answers = answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
-  for (Answer& one : answers) one.surfaces = a.view().has_mesh() && b.view().has_mesh();
+  for (Answer& one : answers) {
+    one.surfaces = a.view().has_mesh() && b.view().has_mesh();
+    one.exact = measure == Measure::exact && one.result.penetration.status == QueryStatus::ok;
+  }
   return answers;
 }
 

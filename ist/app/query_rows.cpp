@@ -249,6 +249,16 @@ std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparati
   return out;
 }
 
+/// Those behind `time_us`: how the solids touch, which spheres cannot know.
+std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
+  const Penetration& p = answer.result.penetration;
+  const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };
+  std::vector<std::pair<std::string, double>> out = {{"contact_area", known(p.contact_area)}};
+  for (int k = 0; k < 3; ++k)
+    out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
+  return out;
+}
+
 /// In quotes where it would be more than one field.
 std::string csv_field(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
@@ -270,13 +280,21 @@ std::uint64_t Answer::sphere_pairs() const {
 std::string answers_csv(std::span<const Answer> answers) {
   std::string out = "id";
   for (const auto& [name, none] : numbers({})) (out += ',') += name;
-  out += ",status,node_visits,sphere_pairs,time_us\n";
+  out += ",status,node_visits,sphere_pairs,time_us,touching";
+  for (const auto& [name, none] : contact_numbers({})) (out += ',') += name;
+  out += '\n';
   for (const Answer& answer : answers) {
     out += csv_field(answer.row.id);
     for (const auto& [name, value] : numbers(answer.result))
       fmt::format_to(std::back_inserter(out), ",{:.17g}", value);
-    fmt::format_to(std::back_inserter(out), ",{},{},{},{:.17g}\n", name_of(answer.status()),
-                   answer.node_visits(), answer.sphere_pairs(), answer.time_us);
+    fmt::format_to(std::back_inserter(out), ",{},{},{},{:.17g},{}", name_of(answer.status()),
+                   answer.node_visits(), answer.sphere_pairs(), answer.time_us,
+                   !answer.exact                         ? "nan"
+                   : answer.result.penetration.touching ? "1"
+                                                        : "0");
+    for (const auto& [name, value] : contact_numbers(answer))
+      fmt::format_to(std::back_inserter(out), ",{:.17g}", value);
+    out += '\n';
   }
   return out;
 }
@@ -290,6 +308,9 @@ std::string answers_json(std::span<const Answer> answers) {
     entry["node_visits"] = answer.node_visits();
     entry["sphere_pairs"] = answer.sphere_pairs();
     entry["time_us"] = answer.time_us;
+    entry["touching"] = nullptr;
+    if (answer.exact) entry["touching"] = answer.result.penetration.touching;
+    for (const auto& [name, value] : contact_numbers(answer)) entry[name] = value;
     list.push_back(std::move(entry));
   }
   return json_text(list) + "\n";
@@ -313,6 +334,12 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
                  : "a limit stopped the exact query, and an asset has no spheres");
     line("bounds", fmt::format("{} … {} u³", p.volume_min, p.volume_max),
          "contain the true volume");
+    if (p.touching && p.contact_area > 0) {
+      line("touching", fmt::format("{:.6g} u²", p.contact_area), "faces that lie on each other");
+      line("normal", short_vector(p.contact_normal), "their mean, from A to B; zero: they cancel");
+    } else if (p.touching) {
+      line("touching", "yes", "in points or edges");
+    }
   } else {
     line("volume", fmt::format("{:.6g} u³", p.volume),
          settings.measure == Measure::inner ? "of the overlap, by inner spheres: a lower bound"

@@ -39,6 +39,7 @@ struct Answer {
   PenetrationAndSeparation result;
   double time_us = 0;     ///< [µs] wall time of this one query
   bool surfaces = false;  ///< the distance is that of surfaces, else of inner spheres
+  bool exact = false;     ///< the measure is: it knows what touches
 
   /// Surfaces alone have no spheres to be apart.
   bool has_distance() const { return result.separation.status != QueryStatus::not_held; }

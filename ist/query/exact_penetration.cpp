@@ -51,6 +51,12 @@ Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
   if (answer.volume > 0) answer.centroid = sums.centroid;
   answer.translation_gradient = sums.force;
   answer.rotation_gradient = sums.torque;
+  answer.touching = found.contact.touching;
+  answer.contact_area = found.contact.area * (pose.unit_a * pose.unit_a);
+  // Normals that cancel leave what areas round.
+  const Eigen::Vector3d normal = vector(found.contact.normal);
+  if (normal.norm() > 1e-9 * found.contact.area)
+    answer.contact_normal = pose.rotation() * normal.normalized();
   answer.node_visits = found.visits;
   answer.sphere_pairs = found.crossings;
   return answer;
@@ -156,7 +162,15 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (found.complete) return whole_answer(found, pose);
+  if (found.complete) {
+    Penetration answer = whole_answer(found, pose);
+    // What the interval allows for is no part of the smaller solid.
+    const double most = std::min(volume_of(a), volume_of(b));
+    answer.volume = std::min(answer.volume, most);
+    answer.volume_max = std::min(answer.volume_max, most);
+    answer.volume_min = std::min(answer.volume_min, most);
+    return answer;
+  }
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
@@ -179,7 +193,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
   ExactScratch& scratch = workspace.impl()->exact;
   auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (!found.complete) {
+  if (!found.complete || !query.holds_crossings()) {
     const auto by_spheres = [&] {
       ContactSettings others = settings;
       others.measure = Measure::matched;

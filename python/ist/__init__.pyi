@@ -266,6 +266,9 @@ class Penetration:
     pose_gradient_a: Final[NDArray[np.float64]]  # (n, 7) dV/d(pose of A)
     scale_gradient: Final[_Column | None]  # (n,) [u³] dV/d(scale of B)
     scale_gradient_a: Final[_Column | None]  # (n,) [u³] dV/d(scale of A)
+    touching: Final[NDArray[np.bool_] | bool]  # (n,) exact: they meet and the volume is 0
+    contact_area: Final[_Column]  # (n,) [u²] of faces that lie on each other
+    contact_normal: Final[NDArray[np.float64]]  # (n, 3) from A to B
     status: Final[_Count]  # (n,) QueryStatus
     node_visits: Final[_Count]  # (n,)
     sphere_pairs: Final[_Count]  # (n,)

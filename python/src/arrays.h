@@ -103,7 +103,8 @@ struct Column {
   static Column taken(const py::handle& given) {
     Column column;
     if (given.is_none()) return column;
-    constexpr char type[] = {std::is_integral_v<T> ? 'u' : 'f', '0' + sizeof(T), '\0'};
+    constexpr char kind = std::is_same_v<T, bool> ? 'b' : std::is_integral_v<T> ? 'u' : 'f';
+    constexpr char type[] = {kind, '0' + sizeof(T), '\0'};
     const auto array = py::cast<Array<T>>(
         py::module_::import_("numpy").attr("asarray")(given, type, py::arg("order") = "C"));
     Shape rows = shape_of(array);

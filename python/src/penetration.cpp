@@ -150,6 +150,14 @@ void add_class(py::module_& module) {
              "(n,) [u³] dV/d(B's scale), by the difference of two queries; None if not requested.");
   add_column(type, "scale_gradient_a", &Penetrations::scale_gradient_a,
              "(n,) [u³] the same for A's scale.");
+  add_column(type, "touching", &Penetrations::touching,
+             "(n,) bool: with measure='exact' the solids meet in points, edges or faces and the "
+             "volume is 0. Spheres cannot tell: False.");
+  add_column(type, "contact_area", &Penetrations::contact_area,
+             "(n,) [u²] where they touch: of the faces that lie on each other.");
+  add_column(type, "contact_normal", &Penetrations::contact_normal,
+             "(n, 3) unit, from A to B, world: the mean normal of these faces; zero without faces "
+             "and where their normals cancel.");
   add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,

@@ -41,7 +41,10 @@ struct Penetrations {
   Column<double> volume{rows}, volume_min{rows}, volume_max{rows};
   Column<double, 3> centroid{rows}, force{rows}, torque{rows};
   Column<double, 7> pose_gradient{rows}, pose_gradient_a{rows};
+  Column<double> contact_area{rows};
+  Column<double, 3> contact_normal{rows};
   Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
+  Column<bool> touching{rows};
   Column<double> scale_gradient{}, scale_gradient_a{};  ///< without an array where nobody asked
 
   /// What was answered for row i, and how it grows with both poses.

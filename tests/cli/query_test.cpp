@@ -12,7 +12,8 @@ using ist::testing::Outcome;
 
 constexpr const char* kHeader =
     "id,volume,volume_min,volume_max,cx,cy,cz,dVdtx,dVdty,dVdtz,dVdrx,dVdry,dVdrz,distance,"
-    "distance_min,distance_max,status,node_visits,sphere_pairs,time_us";
+    "distance_min,distance_max,status,node_visits,sphere_pairs,time_us,touching,contact_area,"
+    "contact_nx,contact_ny,contact_nz";
 
 // Columns of kHeader.
 enum Column {
@@ -28,7 +29,10 @@ enum Column {
   status,
   node_visits,
   sphere_pairs,
-  time_us
+  time_us,
+  touching,
+  contact_area,
+  contact_nz = 23
 };
 
 class QueryCommand : public CommandLine {
@@ -50,7 +54,7 @@ class QueryCommand : public CommandLine {
     std::vector<std::string> arguments = {"cube.ist", "cube.ist", "--csv", "--pose", pose};
     arguments.insert(arguments.end(), more.begin(), more.end());
     const std::vector<std::string> all = rows(arguments);
-    return all.size() == 1 ? numbers_of(all.front()) : std::vector<double>(20);
+    return all.size() == 1 ? numbers_of(all.front()) : std::vector<double>(24);
   }
   void expect_exit(int code, std::vector<std::string> arguments, const std::string& message) {
     arguments.insert(arguments.begin(), "query");
@@ -247,6 +251,30 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   for (const char* words : {"34.74096031393", "of the true overlap", "bounds",
                             "contain the true volume", "-71.734", "triangle pairs"})
     EXPECT_NE(text.out.find(words), std::string::npos) << words << "\n" << text.out;
+}
+
+TEST_F(ExactQueryCommand, TellsHowSolidsTouch) {
+  const auto ask = [&](const std::string& pose, const std::string& measure) {
+    return nlohmann::ordered_json::parse(
+        ist({"query", "cube.ist", "cube.ist", "--pose", pose, "--measure", measure, "--json"})
+            .out)[0];
+  };
+  const nlohmann::ordered_json flush = ask("1,0,0,0,0.5,0,1", "exact");
+  EXPECT_EQ(flush.at("volume"), 0);
+  EXPECT_EQ(flush.at("touching"), true);
+  EXPECT_NEAR(flush.at("contact_area").get<double>(), 0.5, 1e-12);
+  EXPECT_NEAR(flush.at("contact_nz").get<double>(), 1, 1e-12);
+  const nlohmann::ordered_json edge = ask("1,0,0,0,1,0,1", "exact");
+  EXPECT_EQ(edge.at("touching"), true);
+  EXPECT_EQ(edge.at("contact_area"), 0);
+  for (const char* pose : {"1,0,0,0,0.5,0,1.000000001", "1,0,0,0,0.5,0,0.999999999"})
+    EXPECT_EQ(ask(pose, "exact").at("touching"), false) << pose;
+  EXPECT_EQ(ask("1,0,0,0,0.5,0,1", "matched").at("touching"), nullptr);
+
+  EXPECT_EQ(row("1,0,0,0,0.5,0,1", {"--measure", "exact"})[contact_nz], 1);
+  const Outcome text =
+      ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,0.5,0,1", "--measure", "exact"});
+  EXPECT_NE(text.out.find("touching   0.5 u²"), std::string::npos) << text.out;
 }
 
 TEST_F(ExactQueryCommand, TellsTheDistanceOfSurfaces) {

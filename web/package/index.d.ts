@@ -271,6 +271,12 @@ export interface Penetration {
   force: Float64Array;
   /** [u³/rad] about B's origin: −dV/d(rotation vector of B). */
   torque: Float64Array;
+  /** With `exact`: they meet in points, edges or faces, and the volume is 0. Else false. */
+  touching: boolean;
+  /** [u²] where they touch: of the faces that lie on each other. */
+  contactArea: number;
+  /** Unit, from A to B: the mean normal of these faces; zero if there is none. */
+  contactNormal: Float64Array;
   /** Node pairs opened. */
   nodeVisits: number;
   /** Lenses and parts of spheres that were summed; with `exact`: crossing triangles. */

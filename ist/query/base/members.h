@@ -22,6 +22,8 @@ IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
   IST_MEMBER(centroid);
   IST_MEMBER(translation_gradient);
   IST_MEMBER(rotation_gradient);
+  IST_MEMBER(contact_area);
+  IST_MEMBER(contact_normal);
   IST_MEMBER(distance);
   IST_MEMBER(distance_min);
   IST_MEMBER(distance_max);
@@ -46,6 +48,7 @@ IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
   IST_MEMBER(status);
   IST_MEMBER(node_visits);
   IST_MEMBER(sphere_pairs);
+  IST_MEMBER(touching);
   IST_MEMBER(surface_pairs);
 #undef IST_MEMBER
 }

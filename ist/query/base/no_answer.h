@@ -44,6 +44,8 @@ Answer no_answer(QueryStatus why) noexcept {
     result.time = result.distance_min = result.distance_max = kNone;
     result.point_a = result.point_b = result.normal = none;
     return result;
+  } else if constexpr (std::is_same_v<Answer, Penetration>) {
+    return {kNone, kNone, kNone, none, none, none, kNone, none, why};
   } else {
     return {kNone, kNone, kNone, none, none, none, why};
   }

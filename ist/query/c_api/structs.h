@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <type_traits>
 
 #include <ist/field.h>
@@ -70,11 +71,15 @@ inline ist_status_t status_of(ImpactStatus status) noexcept {
                                                     : IST_OK;
 }
 
-/// Copies an answer from C++ to C or back.
+/// Copies an answer from C++ to C or back. What lies between a struct's numbers is 0, so that its
+/// bytes can be compared.
 template <class From, class To>
 requires requires(From from, To to) { from.status, to.status; }
 void write(const From& from, To& to) noexcept {
-  if constexpr (requires { to.size; }) to.size = sizeof to;
+  if constexpr (requires { to.size; }) {
+    std::memset(&to, 0, sizeof to);
+    to.size = sizeof to;
+  }
   static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
   if constexpr (requires { to.kind; })
     to.kind = status_of(from.status) == IST_OK ? static_cast<ist_impact_kind_t>(from.status) : 0;

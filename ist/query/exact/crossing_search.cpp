@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/exact/nearest_points.h"
 #include "query/exact/placed_mesh-inl.h"
+#include "query/exact/plane_sides-inl.h"
 #include "query/exact/points-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -26,11 +29,17 @@ class TriangleSearch {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
+    scratch_.pairs->asks = 0;
   }
 
-  CrossingsFound run(std::uint32_t count, KeptPairs* keep) {
+  CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
+                     KeptPairs* keep) {
     keep_ = keep;
-    for (std::uint32_t n = 0; n < count && found_.complete; ++n) {
+    found_.crossings = first;
+    std::uint32_t n = next;
+    for (; n < count && found_.complete; ++n) {
+      // Two blocks add at most 256, and seven more wait.
+      if (keep_ == nullptr && n > next && found_.crossings + 264 > scratch_.most_crossings) break;
       // Where many more are near than cross, keeping them would not pay. Two blocks add at most
       // 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
@@ -43,6 +52,7 @@ class TriangleSearch {
            static_cast<std::uint32_t>(scratch_.keys[n]));
     }
     if (keep_ != nullptr) test_kept(*keep);
+    found_.next = n;
     return finish();
   }
 
@@ -51,7 +61,86 @@ class TriangleSearch {
     return finish();
   }
 
+  SurfaceContact contact(std::uint32_t count, const KeptPairs* kept) {
+    look_ahead(search_.near);
+    SurfaceContact out;
+    TrianglePairs& pairs = *scratch_.pairs;
+    const auto add_areas = [&] {
+      const std::uint32_t far = far_in_planes(pairs, pairs.count, 0);
+      for (std::uint32_t left = ((1u << pairs.count) - 1) & ~far; left != 0; left &= left - 1) {
+        const ExactCorners corners(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+        const exact::Point(&a)[3] = corners.of[0];
+        const exact::Point normal = cross(a[1] - a[0], a[2] - a[0]);
+        const double area = exact::common_area(a, normal, corners.of[1]);
+        if (!(area > 0)) continue;
+        out.area += area;
+        out.normal = out.normal + (area / std::sqrt(dot(normal, normal))) * normal;
+      }
+      pairs.count = 0;
+    };
+    visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
+                                std::uint32_t lanes) {
+      Meeting now(*this, number_a, number_b);
+      for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
+        if (dot(now.normal(false, i), now.normal(true, j)) >= 0) continue;
+        put_pair(kWidth * number_a + i, *now.vertices[0], kWidth * number_b + j, *now.vertices[1]);
+        if (pairs.count == 8) add_areas();
+      }
+      return false;
+    });
+    add_areas();
+    out.touching = out.area > 0;
+    if (!out.touching)  // in a point or an edge, if at all
+      visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
+                                  std::uint32_t lanes) {
+        for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
+          out.touching = exact::come_within(
+              search_.touch, corners(false, number_a, i).of,
+              corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
+        return out.touching;
+      });
+    return out;
+  }
+
  private:
+  struct Corners {
+    exact::Point of[3];
+  };
+  Corners corners(bool of_b, std::uint32_t number, std::uint32_t t) {
+    const MeshBlock& block = (of_b ? b_ : a_).blocks[number];
+    const PlacedVertices& vertices = placed_.vertices(of_b, number);
+    Corners out;
+    for (int c = 0; c < 3; ++c) {
+      const std::uint32_t v = block.corner[c][t];
+      out.of[c] = {vertices.at[0][v], vertices.at[1][v], vertices.at[2][v]};
+    }
+    return out;
+  }
+
+  /// visit(A's block, its triangle, B's block, some of its triangles): until it returns true, of
+  /// blocks that are marked as near, or of pairs that are kept, those whose boxes meet.
+  template <class Visit>
+  void visit_near(std::uint32_t count, const KeptPairs* kept, const Visit& visit) {
+    for (std::uint32_t n = 0; n < (kept != nullptr ? kept->count : count); ++n) {
+      const std::uint64_t pair = kept != nullptr ? scratch_.kept.pair(*kept, n) : scratch_.keys[n];
+      const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
+      if (kept != nullptr) {
+        if (are_near(a / kWidth, b / kWidth) &&
+            visit(a / kWidth, a % kWidth, b / kWidth, 1u << b % kWidth))
+          return;
+        continue;
+      }
+      if (!are_near(a, b)) continue;
+      const PlacedTriangles &of_a = placed_.triangles(false, a), &of_b = placed_.triangles(true, b);
+      for (std::uint32_t i = 0; i < a_.blocks[a].triangles; ++i) {
+        const OneBox box(of_a.low, of_a.high, i, reach_);
+        const std::uint32_t lanes = meeting(of_b.low, of_b.high, box.low, box.high);
+        if (lanes != 0 && visit(a, i, b, lanes)) return;
+      }
+    }
+  }
+
   void look_ahead(float reach) {
     reach_ = reach;
     slack_ = 2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + reach * 2;
@@ -63,7 +152,8 @@ class TriangleSearch {
     for (std::uint32_t n = 0; n < kept.count && found_.complete; ++n) {
       const std::uint64_t pair = scratch_.kept.pair(kept, n);
       const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
-      add_pair(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth));
+      add_pair(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth),
+               !are_near(a / kWidth, b / kWidth));
     }
   }
 
@@ -93,44 +183,6 @@ class TriangleSearch {
     return bits;
   }
 
-  /// Lanes whose three heights do not all lie clear on one side of a plane.
-  static HWY_INLINE hn::Mask<F> straddle(const hn::Vec<F> (&height)[3], hn::Vec<F> over) {
-    return hn::And(hn::Min(height[0], hn::Min(height[1], height[2])) <= over,
-                   hn::Max(height[0], hn::Max(height[1], height[2])) >= hn::Neg(over));
-  }
-
-  /// Which of B's triangles have boxes that meet that of A's triangle i, reach through its plane
-  /// and have it reach through theirs.
-  HWY_INLINE std::uint32_t crossable(const PlacedTriangles& a, std::uint32_t i,
-                                     const PlacedTriangles& b, std::uint32_t lanes) const {
-    const OneBox box(a.low, a.high, i, reach_);
-    lanes &= meeting(b.low, b.high, box.low, box.high);
-    if (lanes == 0) return 0;
-    const F d;
-    // Coordinates are floats, and points of both blocks that matter are no further apart than this.
-    const float blur = 1e-6f * (a.reach + b.reach) + reach_, size = a.size + b.size;
-    const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
-    std::uint32_t bits = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
-      const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
-                          hn::Load(d, b.slack + l) * hn::Set(d, size);
-      hn::Vec<F> of_b[3], of_a[3];
-      for (int c = 0; c < 3; ++c) {
-        of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
-                    hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
-                   hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
-                  hn::Set(d, a.offset[i]);
-        of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
-                    hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
-                   hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
-                  hn::Load(d, b.offset + l);
-      }
-      bits |= mask_bits(d, hn::And(straddle(of_b, over_a), straddle(of_a, over_b))) << l;
-    }
-    return lanes & bits;
-  }
-
   /// Tests the triangles of two blocks by boxes and planes.
   void meet(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedTriangles& a = placed_.triangles(false, number_a);
@@ -152,21 +204,127 @@ class TriangleSearch {
     const std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
-    const PlacedVertices& vertices_a = placed_.vertices(false, number_a);
-    const PlacedVertices& vertices_b = placed_.vertices(true, number_b);
+    Meeting now(*this, number_a, number_b);
+    const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
+      return high[lane] - low[lane] <= 2 * slack_;
+    };
+    if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now.beside(false)) ||
+        (thin(box_b.slab_low, box_b.slab_high, lane_b) && now.beside(true)))
+      return;
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
-      for (std::uint32_t lanes = crossable(a, i, b, in_a); lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, vertices_a,
+      const OneBox box(a.low, a.high, i, reach_);
+      std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
+      if (lanes != 0) lanes = now.straddling(i, lanes);
+      for (; lanes != 0; lanes &= lanes - 1)
+        add_pair(kWidth * number_a + i, *now.vertices[0],
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 vertices_b);
+                 *now.vertices[1], !now.near);
     }
   }
 
+  /// Two blocks whose triangles are tested by the planes of either side, in double. Where a sign is
+  /// not settled, a plane does not keep them apart unless both blocks are marked as near anyway.
+  class Meeting {
+   public:
+    Meeting(TriangleSearch& all, std::uint32_t a, std::uint32_t b)
+        : vertices{&all.placed_.vertices(false, a), &all.placed_.vertices(true, b)},
+          near(all.are_near(a, b)),
+          all_(all),
+          number_{a, b} {
+      margin_ = all.keep_ != nullptr ? Margin::reach : near ? Margin::rounding : Margin::room;
+      by_ = all.keep_ != nullptr ? double{all.reach_} : double{all.search_.room};
+      const PlacedTriangles &of_a = all.placed_.triangles(false, a),
+                            &of_b = all.placed_.triangles(true, b);
+      for (int k = 0; k < 3; ++k)
+        apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
+                                      std::min(of_a.all_low[k], of_b.all_low[k]));
+      apart_ += all.search_.room;
+    }
+
+    const PlacedVertices* const vertices[2];
+    const bool near;  ///< both are marked
+
+    /// Whether the planes of A's or B's block lie beside the other block as a whole.
+    bool beside(bool of_b) {
+      // Its own heights are off by as much as the other's.
+      const PlacedPlanes& planes = planes_of(of_b);
+      const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
+      const PlaneSides found = sides(of_b, planes.widest, planes.low - off, planes.high + off);
+      constexpr std::uint32_t kAll = (1u << kWidth) - 1;
+      return found.above == kAll || found.below == kAll;
+    }
+
+    /// Which of `lanes` of B no plane keeps apart from A's triangle i.
+    std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
+      const MeshBlock &a = all_.a_.blocks[number_[0]], &b = all_.b_.blocks[number_[1]];
+      lanes &= ~kept_apart(sides(false, i, 0, 0), b);
+      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
+        if ((known_ >> j & 1) == 0) {
+          known_ |= 1u << j;
+          columns_[j] = kept_apart(sides(true, j, 0, 0), a);
+        }
+        lanes &= ~((columns_[j] >> i & 1) << j);
+      }
+      return lanes;
+    }
+
+    /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch.
+    std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
+      const PlacedPlanes& planes = planes_of(false);
+      const exact::Point n = normal(false, i);
+      const double far = all_.search_.touch * std::sqrt(dot(n, n));
+      const PlaneSides off = sides_of(*vertices[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
+                                      Margin::rounding, 0);
+      return lanes & triangles_of(~(off.above | off.below), all_.b_.blocks[number_[1]]);
+    }
+    exact::Point normal(bool of_b, std::uint32_t t) {
+      const PlacedPlanes& planes = planes_of(of_b);
+      return {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
+    }
+
+   private:
+    const PlacedPlanes& planes_of(bool of_b) {
+      return of_b ? placed_planes(all_.b_, number_[1], &all_.search_.a_from_b,
+                                  *all_.scratch_.placed_b)
+                  : placed_planes(all_.a_, number_[0], nullptr, *all_.scratch_.placed_a);
+    }
+    /// Of the other block's vertices.
+    PlaneSides sides(bool of_b, std::uint32_t t, double low, double high) {
+      return sides_of(*vertices[of_b ? 0 : 1], planes_of(of_b), t, low, high,
+                      (of_b ? -1.0 : 1.0) * all_.search_.aside, double{apart_}, margin_, by_);
+    }
+    static std::uint32_t kept_apart(const PlaneSides& sides, const MeshBlock& block) {
+      return triangles_of(sides.above, block) | triangles_of(sides.below, block);
+    }
+
+    TriangleSearch& all_;
+    std::uint32_t number_[2];
+    Margin margin_;
+    double by_;
+    float apart_ = 0;               ///< no coordinates of both blocks differ by more
+    std::uint32_t columns_[kWidth];  ///< A's triangles that B's plane keeps apart, a bit each
+    std::uint32_t known_ = 0;
+  };
+
+  bool are_near(std::uint32_t block_a, std::uint32_t block_b) const {
+    return has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b);
+  }
+
+  /// `asks`: its blocks are not both marked as near.
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
+    TrianglePairs& pairs = *scratch_.pairs;
+    pairs.asks |= static_cast<std::uint32_t>(asks) << pairs.count;
+    put_pair(triangle_a, vertices_a, triangle_b, vertices_b);
+    if (pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
+  }
+
+  void put_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
                 std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
     TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t n = pairs.count;
+    const std::uint32_t n = pairs.count++;
     const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
                           const PlacedVertices& from) {
       const MeshBlock& block = mesh.blocks[triangle / kWidth];
@@ -178,7 +336,6 @@ class TriangleSearch {
     };
     take(0, a_, triangle_a, vertices_a);
     take(1, b_, triangle_b, vertices_b);
-    if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
   }
 
   static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
@@ -187,32 +344,41 @@ class TriangleSearch {
             hn::Load(d, pairs.corner[side][c][2] + l)};
   }
 
-  /// What signs say of eight pairs, a bit each.
-  struct alignas(64) Signs {
-    double height[2][3][8], error[2][3][8];  ///< of A's corners over B's plane, of B's over A's
-    std::uint32_t positive[2][3] = {};       ///< such a height
-    std::uint32_t pierced[6] = {};           ///< edge: A's three, B's three
-    std::uint32_t apart = 0;                 ///< likewise by a plane
-    std::uint32_t sure = 0;                  ///< no sign is unclear
-  };
-
   static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
-  static std::uint32_t alike(std::uint32_t x, std::uint32_t y, std::uint32_t z) {
-    return (x & y & z) | ~(x | y | z);
+  static std::uint32_t alike(const std::uint32_t (&bits)[3]) {
+    return each(bits) | ~(bits[0] | bits[1] | bits[2]);
   }
 
-  /// In double. A sign is clear if it stays wherever points move by `move`.
-  HWY_INLINE void find_signs(const TrianglePairs& pairs, std::uint32_t count, double move,
-                             Signs& out) const {
+  /// Heights of eight pairs, and what their signs say: a bit each.
+  struct alignas(64) Heights {
+    double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
+    double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
+    std::uint32_t positive[2][3] = {};      ///< with B moved aside
+    std::uint32_t certain[2][3] = {};       ///< in double
+    std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
+
+    /// Pairs that a plane keeps apart.
+    std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
+      return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
+    }
+  };
+
+  /// `kAsks`: whether it matters what is settled.
+  template <bool kAsks>
+  HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
+                               Heights& out) const {
     const D d;
-    std::uint32_t certain[2][3] = {};
-    std::uint32_t round_positive[3][3] = {}, round_certain[3][3] = {};  // [A's edge][B's edge]
+    const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
+    const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
+    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
+                        hn::Set(d, search_.aside.z)};
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
+      HWY_UNROLL(2)
       for (int s = 0; s < 2; ++s)
+        HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const V room = hn::Set(d, move);
-      const V filter = hn::Set(d, exact::kFilter), two = hn::Set(d, 2.0), six = hn::Set(d, 6.0);
+      HWY_UNROLL(2)
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
         const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
@@ -221,100 +387,253 @@ class TriangleSearch {
         const Vec3 normal = {ax - bx, ay - by, az - bz};
         const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                            hn::Abs(az) + hn::Abs(bz)};
-        const V longest = hn::Max(largest(u), largest(v)) + room;
+        const V along = dot(aside, normal), shift = side == 1 ? along : hn::Neg(along);
+        const V shift_error = filter * absolute_dot(aside, size);
+        hn::Store(hn::Abs(along), d, out.shift[side] + l);
+        const V longest = kAsks ? hn::Max(largest(u), largest(v)) + room : room;
+        HWY_UNROLL(3)
         for (int c = 0; c < 3; ++c) {
           const Vec3 r = corner[side][c] - plane[0];
-          const V value = dot(r, normal);
-          const V error =
-              filter * ((hn::Abs(r.x) * size.x + hn::Abs(r.y) * size.y) + hn::Abs(r.z) * size.z);
-          // What the room moves: six products of three numbers.
-          const V moved = six * room * longest * (two * largest(r) + longest);
-          hn::Store(value, d, out.height[side][c] + l);
-          hn::Store(error, d, out.error[side][c] + l);
-          out.positive[side][c] |= mask_bits(d, value > hn::Zero(d)) << l;
-          certain[side][c] |= mask_bits(d, hn::Abs(value) > error + moved) << l;
+          const V value = dot(r, normal), error = filter * absolute_dot(r, size);
+          const V moved = value + shift, away = hn::Abs(moved), sure = error + shift_error;
+          hn::Store(value, d, out.value[side][c] + l);
+          // Where moving aside decides, the plane may lie on the other side of the corner.
+          const V height = hn::Abs(value);
+          hn::Store(error + hn::IfThenElseZero(height <= hn::Abs(shift), height), d,
+                    out.error[side][c] + l);
+          out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
+          out.certain[side][c] |= mask_bits(d, away > sure) << l;
+          if constexpr (kAsks) {
+            // What the room moves: six products of three numbers.
+            const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
+            out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
+          }
         }
       }
-      Vec3 edge_b[3];
+    }
+  }
+
+  struct ExactCorners {
+    exact::Point of[2][3];
+
+    ExactCorners(const TrianglePairs& pairs, std::uint32_t n) {
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c)
+          of[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n], pairs.corner[s][c][2][n]};
+    }
+  };
+
+  static void put(std::uint32_t& bits, std::uint32_t n, bool bit) {
+    bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
+  }
+
+  /// Of pair n, where doubles leave a sign unclear.
+  HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
+                                         Heights& out) const {
+    const ExactCorners corners(pairs, n);
+    for (int s = 1; s >= 0; --s) {
+      for (int c = 0; c < 3; ++c) {
+        if (out.certain[s][c] >> n & 1) continue;
+        const exact::Determinant height =
+            s == 1 ? exact::height_over_a(corners.of[0], corners.of[1][c], search_.aside)
+                   : exact::height_over_b(corners.of[1], corners.of[0][c], search_.aside);
+        out.value[s][c][n] = height.value;
+        out.error[s][c][n] =
+            height.error + (height.value * height.sign < 0 ? std::abs(height.value) : 0);
+        put(out.positive[s][c], n, height.sign > 0);
+        put(out.certain[s][c], n, true);
+      }
+      if ((out.apart(out.certain) >> n & 1) != 0) return;
+    }
+  }
+
+  void test_pairs() {
+    if (scratch_.pairs->asks != 0 || !found_.settled)
+      test_pairs<true>();
+    else
+      test_pairs<false>();
+  }
+
+  /// Tests what has been gathered, by the planes of both triangles and by edges.
+  template <bool kAsks>
+  HWY_NOINLINE void test_pairs() {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
+    pairs.count = 0;
+    const std::uint32_t asks = std::exchange(pairs.asks, 0);
+    if (count == 0 || !found_.complete) return;  // two blocks go on to their end
+    Heights heights;
+    find_heights<kAsks>(pairs, count, heights);
+    const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
+    for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
+         left &= left - 1)
+      find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
+    const std::uint32_t apart = heights.apart(heights.certain);
+    if constexpr (kAsks) {
+      std::uint32_t unsettled = asks & all & apart & ~heights.apart(heights.settled);
+      if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count, double{search_.near});
+      for (; unsettled != 0; unsettled &= unsettled - 1)
+        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(unsettled)));
+    }
+    if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
+  }
+
+  /// Pairs that are further apart than `reach` along the plane of one of them, as those in one plane
+  /// may be.
+  HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count,
+                                           double reach) const {
+    const D d;
+    std::uint32_t out = 0;
+    const V least = hn::Set(d, reach * reach * (1 + 1e-6));
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      for (int s = 0; s < 2; ++s) {
+        const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
+        for (int k = 0; k < 3; ++k) {
+          const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
+          const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
+                             dot(out_of, corner[1 - s][2] - p));
+          out |= mask_bits(d, gap * hn::Abs(gap) > least * dot(out_of, out_of)) << l;
+        }
+      }
+    }
+    return out;
+  }
+
+  /// Which way round A's edges go about B's: a bit a pair.
+  struct WaysRound {
+    std::uint32_t positive[3][3] = {};  ///< [A's edge][B's edge]
+    std::uint32_t certain[3][3] = {}, settled[3][3] = {};
+
+    /// Pairs of which an edge, that goes through the other's plane (`parts`: A's, B's), may go
+    /// through the triangle as far as `known` tells.
+    void may_pierce(const std::uint32_t (&parts)[2][3], const std::uint32_t (&known)[3][3],
+                    std::uint32_t (&out)[2][3]) const {
+      for (int k = 0; k < 3; ++k)
+        for (int s = 0; s < 2; ++s) {
+          std::uint32_t plus = 0, minus = 0;
+          for (int j = 0; j < 3; ++j) {
+            const int a = s == 0 ? k : j, b = s == 0 ? j : k;
+            plus |= known[a][b] & positive[a][b];
+            minus |= known[a][b] & ~positive[a][b];
+          }
+          out[s][k] = parts[s][k] & ~(plus & minus);
+        }
+    }
+    /// Whether all signs that matter are known.
+    std::uint32_t decided(const std::uint32_t (&parts)[2][3],
+                          const std::uint32_t (&known)[3][3]) const {
+      std::uint32_t asked[2][3], out = ~0u;
+      may_pierce(parts, known, asked);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) out &= ~(asked[0][i] | asked[1][j]) | known[i][j];
+      return out;
+    }
+  };
+
+  template <bool kAsks>
+  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
+                                  WaysRound& out) const {
+    const D d;
+    const V room = hn::Set(d, double{search_.room});
+    const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
+    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
+                        hn::Set(d, search_.aside.z)};
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3], edge_b[3];
+      HWY_UNROLL(2)
+      for (int s = 0; s < 2; ++s)
+        HWY_UNROLL(3)
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       V size_b[3];
+      HWY_UNROLL(3)
       for (int j = 0; j < 3; ++j) {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
         size_b[j] = largest(edge_b[j]) + room;
       }
+      HWY_UNROLL(3)
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        const V size_a = largest(edge_a) + room;
-        const V error_a = six * filter * size_a, moved_a = six * room * size_a;
+        const V size_a = largest(edge_a) + room, error_a = filter * size_a;
+        HWY_UNROLL(3)
         for (int j = 0; j < 3; ++j) {
-          const Vec3 r = corner[1][j] - corner[0][i];
-          const V value = dot(r, cross(edge_a, edge_b[j])), size = largest(r);
-          const V error = error_a * size * size_b[j] + moved_a * size_b[j] +
-                          six * room * size * (size_a + size_b[j]);
-          round_positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
-          round_certain[i][j] |= mask_bits(d, hn::Abs(value) > error) << l;
+          // Moved aside: the ninth rounding.
+          const Vec3 r = (corner[1][j] - corner[0][i]) + aside;
+          const V value = dot(r, cross(edge_a, edge_b[j])), away = hn::Abs(value);
+          const V size = largest(r), error = error_a * size_b[j] * size;
+          out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
+          out.certain[i][j] |= mask_bits(d, away > error) << l;
+          if constexpr (kAsks) {
+            const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
+            out.settled[i][j] |= mask_bits(d, away > error + moved) << l;
+          }
         }
       }
     }
-    out.sure = each(certain[0]) & each(certain[1]);
-    for (int s = 0; s < 2; ++s)
-      out.apart |=
-          each(certain[s]) & alike(out.positive[s][0], out.positive[s][1], out.positive[s][2]);
-    for (int i = 0; i < 3; ++i) out.sure &= each(round_certain[i]);
-    for (int k = 0; k < 3; ++k) {
-      const auto parts = [&](int s) { return out.positive[s][k] ^ out.positive[s][(k + 1) % 3]; };
-      out.pierced[k] =
-          parts(0) & alike(round_positive[k][0], round_positive[k][1], round_positive[k][2]);
-      out.pierced[3 + k] =
-          parts(1) & alike(round_positive[0][k], round_positive[1][k], round_positive[2][k]);
-    }
   }
 
-  /// Of pair n, where doubles leave a sign unclear.
-  static void find_exactly(const TrianglePairs& pairs, std::uint32_t n, Signs& out) {
-    exact::Point corner[2][3];
+  /// Tests by edges the pairs that planes left.
+  template <bool kAsks>
+  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights, std::uint32_t all,
+                             std::uint32_t asks) {
+    WaysRound round;
+    find_ways_round<kAsks>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
+    std::uint32_t parts[2][3], pierced[2][3];
     for (int s = 0; s < 2; ++s)
-      for (int c = 0; c < 3; ++c)
-        corner[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n],
-                        pairs.corner[s][c][2][n]};
-    const exact::TriangleSigns signs = exact::cross_exactly(corner[0], corner[1]);
-    const auto put = [&](std::uint32_t& bits, bool bit) {
-      bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
-    };
-    for (int k = 0; k < 6; ++k) put(out.pierced[k], (signs.pierced >> k & 1) != 0);
-    if (signs.pierced == 0) return;
-    for (int s = 0; s < 2; ++s)
-      for (int c = 0; c < 3; ++c) {
-        out.height[s][c][n] = signs.height[s][c].value;
-        out.error[s][c][n] = signs.height[s][c].error;
-        put(out.positive[s][c], signs.height[s][c].sign > 0);
+      for (int k = 0; k < 3; ++k)
+        parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
+    std::uint32_t settled = 0;
+    if constexpr (kAsks) {
+      settled = each(heights.settled[0]) & each(heights.settled[1]) &
+                round.decided(parts, round.settled);
+      for (std::uint32_t left = asks & all & ~settled; left != 0; left &= left - 1)
+        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+    }
+    for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
+         left &= left - 1)
+      find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
+    round.may_pierce(parts, round.certain, pierced);
+    // Two edges pierce where triangles cross, none else.
+    std::uint32_t once = 0, twice = 0, more = 0;
+    for (const auto& of_side : pierced)
+      for (const std::uint32_t bits : of_side) {
+        more |= twice & bits & all;
+        twice |= once & bits & all;
+        once |= bits & all;
+      }
+    found_.consistent &= once == twice && more == 0;
+    found_.settled |= (twice & settled) != 0;
+    if (twice != 0) add_crossings(pairs, heights, pierced, twice);
+  }
+
+  HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
+                                       const std::uint32_t (&parts)[2][3], std::uint32_t n,
+                                       WaysRound& out) const {
+    const ExactCorners corners(pairs, n);
+    const exact::Point(&a)[3] = corners.of[0], (&b)[3] = corners.of[1];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        if (((parts[0][i] | parts[1][j]) >> n & 1) == 0 || (out.certain[i][j] >> n & 1) != 0)
+          continue;
+        const int sign =
+            exact::way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], search_.aside).sign;
+        put(out.positive[i][j], n, sign > 0);
+        put(out.certain[i][j], n, true);
       }
   }
 
-  /// Tests what has been gathered.
-  void test_pairs() {
-    const TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
-    scratch_.pairs->count = 0;
-    if (count == 0 || !found_.complete) return;  // two blocks go on to their end
-    Signs signs;
-    find_signs(pairs, count, search_.room, signs);
-    for (std::uint32_t left = all & ~signs.apart & ~signs.sure; left != 0; left &= left - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      find_exactly(pairs, n, signs);
-      scratch_.other_keys[found_.unsure++] =
-          std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
-      found_.complete &= found_.unsure + 8 < scratch_.most_pairs();
-    }
-    // Two edges pierce where triangles cross, none else.
-    std::uint32_t once = 0, twice = 0, more = 0;
-    for (const std::uint32_t pierced : signs.pierced) {
-      const std::uint32_t bits = pierced & all & ~signs.apart;
-      more |= twice & bits;
-      twice |= once & bits;
-      once |= bits;
-    }
-    found_.consistent &= once == twice && more == 0;
-    if (twice != 0) add_crossings(pairs, signs, twice);
+  /// A pair whose signs might be others if points moved by the room marks its blocks, if it is as
+  /// near: the same ones whichever search found it.
+  HWY_NOINLINE void note_near(const TrianglePairs& pairs, std::uint32_t n) {
+    const std::uint32_t block_a = pairs.triangle[0][n] / kWidth,
+                        block_b = pairs.triangle[1][n] / kWidth;
+    if (are_near(block_a, block_b)) return;
+    const ExactCorners corners(pairs, n);
+    if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
+    set(scratch_.a.near, block_a);
+    set(scratch_.b.near, block_b);
   }
 
   /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps
@@ -324,6 +643,7 @@ class TriangleSearch {
     const TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = pairs.count;
     scratch_.pairs->count = 0;
+    scratch_.pairs->asks = 0;
     gathered_ += count;
     std::uint32_t apart = 0;
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
@@ -363,99 +683,59 @@ class TriangleSearch {
     }
   }
 
-  /// Where an edge, from p to q, goes through the other triangle.
-  struct Piercing {
-    Vec3 p, q;
-    V height_p, height_q, error, edge;
-  };
-
-  void add_crossings(const TrianglePairs& pairs, const Signs& signs, std::uint32_t crossing) {
-    const auto added = static_cast<std::uint32_t>(std::popcount(crossing));
-    if (found_.crossings + added > scratch_.most_crossings) {
+  void add_crossings(const TrianglePairs& pairs, const Heights& heights,
+                     const std::uint32_t (&pierced)[2][3], std::uint32_t crossing) {
+    if (found_.crossings + static_cast<std::uint32_t>(std::popcount(crossing)) >
+        scratch_.most_crossings) {
       found_.complete = false;
       return;
     }
-    Crossings& out = scratch_.crossings;
-    std::uint32_t at = found_.crossings;
-    found_.crossings += added;
-    for (std::uint32_t left = crossing, i = at; left != 0; left &= left - 1, ++i) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
-      out.triangle(0, i) = pairs.triangle[0][n];
-      out.triangle(1, i) = pairs.triangle[1][n];
-    }
-    const D d;
-    const std::uint32_t lanes = (1u << hn::Lanes(d)) - 1;
-    for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
-      const std::uint32_t here = crossing >> l & lanes;
-      if (here == 0) continue;
-      const Compressor<D> chosen(d, mask_of_bits(d, here));
-      Piercing end[2];
-      for (Piercing& e : end) {
-        const V zero = hn::Zero(d);
-        e = {{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero};
+    for (; crossing != 0; crossing &= crossing - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
+      const std::uint32_t at = found_.crossings++;
+      for (int s = 0; s < 2; ++s) {
+        scratch_.crossings.triangle(s, at) = pairs.triangle[s][n];
+        set((s == 0 ? scratch_.a : scratch_.b).near, pairs.triangle[s][n] / kWidth);
+        for (int k = 0; k < 3; ++k)
+          if (pierced[s][k] >> n & 1) add_end(pairs, heights, n, s, k, at);
       }
-      for (int edge = 0; edge < 6; ++edge) {
-        const int s = edge / 3, k = edge % 3, next = (k + 1) % 3;
-        if ((signs.pierced[edge] & crossing) == 0) continue;
-        const Vec3 p = corner_of(pairs, s, k, l), q = corner_of(pairs, s, next, l);
-        const V hp = hn::Load(d, signs.height[s][k] + l),
-                hq = hn::Load(d, signs.height[s][next] + l);
-        const V error = hn::Load(d, signs.error[s][k] + l) + hn::Load(d, signs.error[s][next] + l);
-        // An edge that goes down enters the other solid.
-        const std::uint32_t down = signs.positive[s][k], ends = s == 0 ? down : ~down;
-        for (int e = 0; e < 2; ++e) {
-          const auto take =
-              mask_of_bits(d, signs.pierced[edge] >> l & (e == 1 ? ends : ~ends) >> l & lanes);
-          const auto put = [&](V& to, V from) { to = hn::IfThenElse(take, from, to); };
-          put(end[e].p.x, p.x);
-          put(end[e].p.y, p.y);
-          put(end[e].p.z, p.z);
-          put(end[e].q.x, q.x);
-          put(end[e].q.y, q.y);
-          put(end[e].q.z, q.z);
-          put(end[e].height_p, hp);
-          put(end[e].height_q, hq);
-          put(end[e].error, error);
-          put(end[e].edge, hn::Set(d, static_cast<double>(edge)));
-        }
-      }
-      for (int e = 0; e < 2; ++e) add_end(end[e], chosen, e, at);
-      at += static_cast<std::uint32_t>(chosen.count());
     }
   }
 
-  void add_end(const Piercing& from, const Compressor<D>& chosen, int e, std::uint32_t at) {
-    const D d;
-    const V hp = hn::Abs(from.height_p), hq = hn::Abs(from.height_q), whole = hp + hq;
+  /// Where edge k of a side of pair n goes through the other triangle.
+  void add_end(const TrianglePairs& pairs, const Heights& heights, std::uint32_t n, int s, int k,
+               std::uint32_t at) {
+    const int next = (k + 1) % 3;
+    const double hp = std::abs(heights.value[s][k][n]), hq = std::abs(heights.value[s][next][n]);
+    const double whole = hp + hq, error = heights.error[s][k][n] + heights.error[s][next][n];
+    const auto& corner = pairs.corner[s];
+    const auto before = [&] {
+      for (int c = 0; c < 3; ++c)
+        if (corner[k][c][n] != corner[next][c][n]) return corner[next][c][n] < corner[k][c][n];
+      return false;
+    };
     // From the nearer end, and between two as near from the first in space, so that both triangles
     // at an edge do alike.
-    const Vec3 &p = from.p, &q = from.q;
-    const auto before =
-        hn::Or(q.x < p.x, hn::And(q.x == p.x, hn::Or(q.y < p.y, hn::And(q.y == p.y, q.z < p.z))));
-    const auto turned = hn::Or(hq < hp, hn::And(hq == hp, before));
+    const bool turned = hq < hp || (hq == hp && before());
     // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
-    const auto flat = whole == hn::Zero(d);
-    const V one = hn::Set(d, 1.0);
-    const V share =
-        hn::IfThenElse(flat, hn::Set(d, 0.5), hn::Min(hp, hq) / hn::IfThenElse(flat, one, whole));
-    const auto put = [&](int number, V value) {
-      hn::StoreU(chosen(value), d, scratch_.crossings.end(e, number) + at);
+    const bool flat = whole == 0;
+    const double share = flat ? 0.5 : std::min(hp, hq) / whole;
+    // An edge that goes down enters the other solid.
+    const bool down = (heights.positive[s][k] >> n & 1) != 0;
+    const int e = down == (s == 0) ? 1 : 0;
+    const auto put = [&](int number, double value) {
+      scratch_.crossings.end(e, number)[at] = value;
     };
-    const auto coordinate = [&](int k, V at_p, V at_q) {
-      const V near = hn::IfThenElse(turned, at_q, at_p), far = hn::IfThenElse(turned, at_p, at_q);
-      put(Crossings::kFrom + k, near);
-      put(Crossings::kOffset + k, share * (far - near));
-    };
-    coordinate(0, p.x, q.x);
-    coordinate(1, p.y, q.y);
-    coordinate(2, p.z, q.z);
-    put(Crossings::kT, hn::IfThenElse(turned, one - share, share));
-    put(Crossings::kTError,
-        hn::IfThenElse(
-            flat, one,
-            (from.error + from.error) / hn::IfThenElse(flat, one, whole) + hn::Set(d, 1e-15)));
-    put(Crossings::kHeightError, from.error);
-    put(Crossings::kEdge, hn::IfThenElse(turned, from.edge, from.edge + hn::Set(d, 8.0)));
+    const int near = turned ? next : k, far = turned ? k : next;
+    for (int c = 0; c < 3; ++c) {
+      put(Crossings::kFrom + c, corner[near][c][n]);
+      put(Crossings::kOffset + c, share * (corner[far][c][n] - corner[near][c][n]));
+    }
+    put(Crossings::kT, turned ? 1 - share : share);
+    // Which of two places comes first is asked with B moved aside.
+    put(Crossings::kTError, flat ? 1 : 2 * (error + 2 * heights.shift[s][n]) / whole + 1e-15);
+    put(Crossings::kHeightError, error);
+    put(Crossings::kEdge, 3 * s + k + (turned ? 0 : 8));
   }
 
   const CrossingSearch& search_;
@@ -469,14 +749,20 @@ class TriangleSearch {
   CrossingsFound found_;
 };
 
-CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
+CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t first,
+                                std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                                 ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).run(count, keep);
+  return TriangleSearch(search, scratch).run(first, next, count, keep);
 }
 
 CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
                            ExactScratch& scratch) {
   return TriangleSearch(search, scratch).run(kept);
+}
+
+SurfaceContact search_contact(const CrossingSearch& search, std::uint32_t count,
+                              const KeptPairs* kept, ExactScratch& scratch) {
+  return TriangleSearch(search, scratch).contact(count, kept);
 }
 
 const PlacedVertices& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
@@ -492,16 +778,23 @@ namespace ist {
 
 HWY_EXPORT(search_triangles);
 HWY_EXPORT(search_kept);
+HWY_EXPORT(search_contact);
 HWY_EXPORT(place_one);
 
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t count, KeptPairs* keep,
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
+                              std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, count, keep, scratch);
+  return HWY_DYNAMIC_DISPATCH(search_triangles)(search, first, next, count, keep, scratch);
 }
 
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_kept)(search, kept, scratch);
+}
+
+SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
+                            const KeptPairs* kept, ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_contact)(search, count, kept, scratch);
 }
 
 const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

@@ -15,10 +15,6 @@ namespace {
 using exact::kHalfUnit;
 using exact::Point;
 
-void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) {
-  bits[i / 64] |= std::uint64_t{1} << i % 64;
-}
-
 double length_bound(const Point& p) { return (std::abs(p.x) + std::abs(p.y)) + std::abs(p.z); }
 
 Point map_vector(const Similarity& map, const Point& x) {
@@ -32,6 +28,34 @@ Point map_vector(const Similarity& map, const Point& x) {
 /// Triangles that are so near count as near, whichever search found them: far more than rounding.
 double ExactQuery::nearness() const noexcept {
   return 1e-7 * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
+}
+
+/// Signs are those of B moved by far more than what rounds the meshes' places, and by far less than
+/// what the interval allows for anyway: then faces that are flush, and copies in place, have clear
+/// signs. It goes away from A's middle, since flush parts separate so, and somewhat across, since no
+/// direction of a part is like it. What A and B see of each other is opposite if they change places:
+/// the first and the last term are, and the sign of the other is by the middles, or where these do
+/// not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
+void ExactQuery::move_aside() noexcept {
+  const auto unit = [](const Point& x) {
+    const double length = std::sqrt(dot(x, x));
+    return length > 0 ? 1 / length * x : Point{0, 0, 0};
+  };
+  constexpr Point kAcross = {0.267, 0.534, 0.802};
+  const Point middle = {a_from_b_.t[0], a_from_b_.t[1], a_from_b_.t[2]}, centre = unit(middle);
+  const Point turned = 1 / a_from_b_.scale * map_vector(a_from_b_, kAcross);
+  const Point both = kAcross + turned;
+  const double along = dot(centre, both);
+  const bool first = std::abs(along) > 1e-9 ? along > 0
+                                            : sides_[0].mesh.hash <= sides_[1].mesh.hash;
+  const Point across = (first ? 1.0 : -1.0) * both + cross(kAcross, turned);
+  constexpr double kAside = 0x1p-47;  // of both sizes
+  const double far = kAside * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
+  search_.aside = far * unit(centre + 0.4 * unit(across));
+  search_.touch = sides_[0].moved + sides_[1].moved +
+                  4 * kHalfUnit * (sides_[0].mesh.extent() +
+                                   a_from_b_.scale * sides_[1].mesh.extent() + length_bound(middle));
+  sides_[1].moved += far;
 }
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
@@ -207,7 +231,7 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
 bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept {
   const MeshTree& other = sides_[own.is_b ? 0 : 1].mesh;
   const MeshOfPair solid = own.is_b ? MeshOfPair{other} : MeshOfPair{other, &a_from_b_, &b_from_a_};
-  return ist::is_inside(solid, place(own, vertex));
+  return ist::is_inside(solid, place(own, vertex), search_.aside);
 }
 
 /// Marks the blocks that lie inside as a whole: from those whose edges are pierced on, and whole
@@ -330,49 +354,12 @@ void ExactQuery::add_layer(const Side& own, double area, double width) noexcept 
   layers_ += own.moved * area + 32 * (own.moved * own.moved) * width;
 }
 
-/// Whether two triangles that do not cross come as near: the same answer whichever search found
-/// them.
-bool ExactQuery::is_near(std::uint32_t a, std::uint32_t b, double distance) const noexcept {
-  const auto flat = [&](const Side& own, std::uint32_t triangle) {
-    const MeshBlock& block = own.mesh.blocks[triangle / kWidth];
-    const auto corner = [&](int k) {
-      return place(own, block.vertex[block.corner[k][triangle % kWidth]]);
-    };
-    return exact::FlatTriangle(corner(0), corner(1), corner(2));
-  };
-  const exact::FlatTriangle of_a = flat(sides_[0], a), of_b = flat(sides_[1], b);
-  exact::Heights over_a, over_b;
-  for (int k = 0; k < 3; ++k) {
-    over_a[k] = dot(of_a.normal, of_b.corner[k] - of_a.corner[0]);
-    over_b[k] = dot(of_b.normal, of_a.corner[k] - of_b.corner[0]);
-  }
-  exact::NearestPair best;
-  best.squared = distance * distance;
-  take_nearest(of_a, of_b, over_a, over_b, best);
-  return best.squared < distance * distance;
-}
-
-/// Blocks that cross the other solid, or would if their surface moved by the room.
-void ExactQuery::mark_near(std::uint32_t unsure) noexcept {
-  const double distance = search_.room + nearness();
-  for (std::uint32_t i = 0; i < unsure; ++i) {
-    const auto a = static_cast<std::uint32_t>(scratch_.other_keys[i] >> 32),
-               b = static_cast<std::uint32_t>(scratch_.other_keys[i]);
-    if ((has(sides_[0].marks.crossed, a / kWidth) && has(sides_[1].marks.crossed, b / kWidth)) ||
-        !is_near(a, b, distance))
-      continue;
-    set(sides_[0].marks.near, a / kWidth);
-    set(sides_[1].marks.near, b / kWidth);
-  }
-}
-
 /// Blocks at the surface of the other solid: rounding and deviations there change the volume.
 void ExactQuery::bound_near(const Side& own) noexcept {
   const std::uint32_t blocks = own.mesh.level[0].count;
   const double scale = own.is_b ? a_from_b_.scale : 1;
   for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-    for (std::uint64_t left = own.marks.near[w] | own.marks.crossed[w]; left != 0;
-         left &= left - 1) {
+    for (std::uint64_t left = own.marks.near[w]; left != 0; left &= left - 1) {
       const std::uint32_t b = 64 * w + static_cast<std::uint32_t>(std::countr_zero(left));
       const std::uint32_t i = b / kWidth, lane = b % kWidth;
       const BoxBlock& box = own.mesh.level[1].boxes[i];
@@ -383,39 +370,48 @@ void ExactQuery::bound_near(const Side& own) noexcept {
     }
 }
 
-/// All triangles that cross, in the order of the meshes.
-CrossingsFound ExactQuery::search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
+/// Finds the pairs of blocks, or what is kept of them, for find_more().
+bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
   const double room = 2 * (sides_[0].moved + sides_[1].moved);
   const MeshTree &a = sides_[0].mesh, &b = sides_[1].mesh;
   search_.room = static_cast<float>(room * (1 + 1e-6));
-  search_.max_visits = max_visits;
-  scratch_.forget(a.hash);
-  KeptPairs* kept = nullptr;
-  CrossingsFound found = {.complete = false};
-  if (pair_id != 0 && max_visits == 0) {
-    kept = &scratch_.kept.of(pair_id, a, b, a_from_b_);
-    if (scratch_.kept.serves(*kept, b, a_from_b_, room)) {
-      found = find_kept_crossings(search_, *kept, scratch_);
-      kept->crossings = found.crossings;
-      return found;
-    }
-    scratch_.kept.begin(*kept, a, b, room);
-  }
-  const bool keeps = kept != nullptr && kept->margin > 0;
   search_.near = static_cast<float>((room + nearness()) * (1 + 1e-6));
   search_.reach = search_.near;
-  if (keeps) search_.reach += static_cast<float>(kept->margin * (1 + 1e-6));
+  search_.max_visits = max_visits;
+  scratch_.forget(a.hash);
+  if (pair_id != 0 && max_visits == 0) {
+    kept_ = &scratch_.kept.of(pair_id, a, b, a_from_b_);
+    if (scratch_.kept.serves(*kept_, b, a_from_b_, room)) {
+      serves_ = true;
+      return true;
+    }
+    scratch_.kept.begin(*kept_, a, b, room);
+    search_.reach += static_cast<float>(kept_->margin * (1 + 1e-6));
+  }
   const BlockPairs pairs = find_block_pairs(search_, scratch_);
   out_.visits = pairs.visits;
-  if (pairs.complete) {
-    sort_pairs(pairs.count);
-    found = find_crossings(search_, pairs.count, keeps ? kept : nullptr, scratch_);
+  block_pairs_ = pairs.count;
+  if (pairs.complete) sort_pairs(pairs.count);
+  return pairs.complete;
+}
+
+/// Triangles that cross, in the order of the meshes: those for which there is room, behind the
+/// `first` that are left of the ones before.
+CrossingsFound ExactQuery::find_more(std::uint32_t first, std::uint32_t next) noexcept {
+  CrossingsFound found = {.complete = false};
+  if (serves_) {
+    found = find_kept_crossings(search_, *kept_, scratch_);
+    if (found.complete) return found;
+    serves_ = false;  // there is no room for all at once
+    kept_->margin = 0;
+    if (!begin_search(0, 0)) return found;
   }
-  if (kept != nullptr) {
-    kept->crossings = found.crossings;
-    if (!found.complete) kept->margin = 0;
+  if (kept_ != nullptr && kept_->margin > 0) {
+    found = find_crossings(search_, first, next, block_pairs_, kept_, scratch_);
+    if (found.complete) return found;
+    kept_->margin = 0;
   }
-  return found;
+  return find_crossings(search_, first, next, block_pairs_, nullptr, scratch_);
 }
 
 ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
@@ -425,23 +421,36 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       return out_;
     }
   clear_marks();
-  const CrossingsFound found = search(max_visits, pair_id);
-  out_.crossings = found.crossings;
-  out_.consistent = found.consistent;
-  out_.complete = found.complete && found.consistent;
-  if (!out_.complete) return out_;
-  if (found.crossings > 0) out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
-  for (std::uint32_t i = 0; i < found.crossings; ++i)
-    if (!add_crossing(i)) {
-      out_.complete = false;
-      return out_;
+  out_.complete = begin_search(max_visits, pair_id);
+  std::uint32_t left = 0, next = 0;
+  while (out_.complete) {
+    const CrossingsFound found = find_more(left, next);
+    out_.consistent = found.consistent;
+    out_.complete = found.complete && found.consistent;
+    if (!out_.complete) break;
+    if (out_.crossings == 0 && found.crossings > 0)
+      out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
+    for (std::uint32_t i = left; i < found.crossings; ++i) out_.complete &= add_crossing(i);
+    out_.crossings += found.crossings - left;
+    out_.settled |= found.settled;
+    const bool ends = serves_ || found.next == block_pairs_;
+    const std::uint32_t sums_end = ends ? found.crossings : found.crossings / 8 * 8;
+    for (std::uint32_t i = 0; i < sums_end; i += 8) {
+      ExactTerms terms;
+      crossing_terms(scratch_.crossings, i, out_.origin, terms);
+      slots_.add_crossings(terms);
     }
-  mark_near(found.unsure);
-  for (std::uint32_t i = 0; i < found.crossings; i += 8) {
-    ExactTerms terms;
-    crossing_terms(scratch_.crossings, i, out_.origin, terms);
-    slots_.add_crossings(terms);
+    if (ends) break;
+    whole_ = false;
+    left = found.crossings - sums_end;
+    scratch_.crossings.move_to_front(sums_end, left);
+    next = found.next;
   }
+  if (kept_ != nullptr) {
+    kept_->crossings = out_.crossings;
+    if (!out_.complete || !whole_) kept_->margin = 0;
+  }
+  if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
     // In the order of the mesh, whichever was found first.
@@ -458,6 +467,18 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
                4 * kHalfUnit * std::abs(out_.sums.volume());
   out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound
   out_.complete = out_.consistent;
+  // What sums round may be nothing, where no triangles cross for certain. It is if it is no thicker
+  // than what poses and vertices round, over the faces that lie on each other or push.
+  const double volume = std::abs(out_.sums.volume());
+  if (!out_.settled && volume <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+    const SurfaceContact contact =
+        find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
+    if (contact.touching &&
+        volume <= 8 * search_.touch * (contact.area + length_bound(out_.sums.force))) {
+      out_.contact = contact;
+      out_.sums.six_volumes = {};
+    }
+  }
   return out_;
 }
 

@@ -19,7 +19,9 @@ struct ExactOverlap {
   ExactSums sums;            ///< the gradients are those by a motion of B
   double error = 0;          ///< the true volume is within it of the sums'
   exact::Point origin = {};  ///< of the sums
+  SurfaceContact contact;    ///< where the sums' volume is nothing
   std::uint32_t visits = 0, crossings = 0;
+  bool settled = false;  ///< some of them cross wherever points move by what is rounded
   /// No limit or room was short, and it is consistent; else nothing above is of use.
   bool complete = true;
   bool consistent = true;  ///< signs agree with each other, as exact ones do
@@ -36,11 +38,15 @@ class ExactQuery {
       : sides_{{a, scratch.a, false, moved_a}, {b, scratch.b, true, moved_b}},
         a_from_b_(a_from_b),
         b_from_a_(b_from_a),
-        scratch_(scratch) {}
+        scratch_(scratch) {
+    move_aside();
+  }
 
   /// `max_visits`: 0: no limit. `pair_id`: of the caller's pair, whose calls are steps of one
   /// motion; 0: of none.
   ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0) noexcept;
+  /// Whether ExactScratch holds all crossings that it found, as parts of the overlap need.
+  bool holds_crossings() const noexcept { return whole_; }
 
  protected:
   struct Side {
@@ -118,8 +124,10 @@ class ExactQuery {
   ExactOverlap out_;
 
  private:
+  void move_aside() noexcept;
   void clear_marks() noexcept;
-  CrossingsFound search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept;
+  bool begin_search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept;
+  CrossingsFound find_more(std::uint32_t first, std::uint32_t next) noexcept;
   void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
   bool add_crossing(std::uint32_t i) noexcept;
@@ -130,12 +138,13 @@ class ExactQuery {
   void find_insides(Side& side) noexcept;
   void sum_crossed_block(const Side& side, const CrossedBlock& crossed) noexcept;
   double nearness() const noexcept;
-  bool is_near(std::uint32_t a, std::uint32_t b, double distance) const noexcept;
-  void mark_near(std::uint32_t unsure) noexcept;
   void bound_near(const Side& side) noexcept;
   void add_layer(const Side& side, double area, double width) noexcept;
 
   CrossingSearch search_ = {&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_};
+  KeptPairs* kept_ = nullptr;       ///< of the caller's pair
+  bool serves_ = false, whole_ = true;
+  std::uint32_t block_pairs_ = 0;
   SlotSums slots_;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
   double layers_ = 0;    ///< what surfaces may miss by having moved

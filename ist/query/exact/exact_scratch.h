@@ -40,13 +40,27 @@ struct alignas(64) PlacedTriangles {
   float reach;  ///< no coordinate is larger
 };
 
+/// The planes of a block's triangles in A's unit frame.
+struct alignas(64) PlacedPlanes {
+  double at[3][kWidth];      ///< their first corners
+  double normal[3][kWidth];  ///< product of two sides
+  double size[kWidth];       ///< no sum of the absolute products in it is larger
+  double longest[kWidth];    ///< no coordinate of these sides is larger
+  /// The block's vertices lie between these heights over the plane of `widest`, times the length of
+  /// its normal.
+  double low, high;
+  std::uint32_t widest;  ///< the largest triangle
+};
+
 /// What recent queries placed of a mesh.
 struct PlacedMesh {
   PlacedCache<PlacedBoxes, 256> boxes;
   PlacedCache<PlacedVertices, 256> vertices;
   PlacedCache<PlacedTriangles, 256> triangles;
+  PlacedCache<PlacedPlanes, 256> planes;
 
   void forget() noexcept {
+    planes.forget();
     boxes.forget();
     vertices.forget();
     triangles.forget();
@@ -57,8 +71,9 @@ struct PlacedMesh {
 struct alignas(64) TrianglePairs {
   /// [A, B][corner][axis]; finite in lanes without a pair, which are computed too.
   double corner[2][3][3][8] = {};
-  std::uint32_t triangle[2][8];
+  std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
+  std::uint32_t asks = 0;  ///< a bit a pair: its blocks may have to be marked as near
 };
 
 /// A pair of nodes that waits.
@@ -110,7 +125,7 @@ struct CrossedBlock {
 /// start and leave it at the end.
 class Crossings {
  public:
-  /// Eight are written at once, so that up to seven more are touched.
+  /// Eight are read at once.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
       : room_((most + 15) / 8 * 8),
         numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
@@ -143,6 +158,13 @@ class Crossings {
   std::uint32_t& triangle(int side, std::uint32_t i) noexcept { return triangle_[2 * i + side]; }
   std::uint32_t triangle(int side, std::uint32_t i) const noexcept {
     return triangle_[2 * i + side];
+  }
+
+  /// Crossings from `from` on, fewer than eight, become the first.
+  void move_to_front(std::uint32_t from, std::uint32_t count) noexcept {
+    for (int number = 0; number < kNumbers; ++number)
+      std::copy_n(at(number) + from, count, at(number));
+    std::copy_n(triangle_.get() + 2 * std::size_t{from}, 2 * std::size_t{count}, triangle_.get());
   }
 
   /// Zeros in crossings [from, to): they add nothing to a sum.
@@ -184,6 +206,9 @@ class Crossings {
 /// One bit a block, or a shell.
 inline bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
   return bits[i / 64] >> i % 64 & 1;
+}
+inline void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
+  bits[i / 64] |= std::uint64_t{1} << i % 64;
 }
 
 /// What a query knows of the blocks of one solid.
@@ -254,7 +279,7 @@ struct CurveExtent {
 struct ExactScratch {
   ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
       : most_blocks(static_cast<std::uint32_t>(std::min<std::size_t>(capacity, 1u << 24))),
-        most_crossed(most_blocks / 256 + 8),
+        most_crossed(most_blocks / 64 + 8),
         most_crossings(most_blocks / 16 + 128),
         placed_a(hooked<PlacedMesh>(hooks)),
         placed_b(hooked<PlacedMesh>(hooks)),
@@ -301,7 +326,7 @@ struct ExactScratch {
   }
 
   /// Pairs of blocks, or of triangles, that are kept for later.
-  std::uint32_t most_pairs() const noexcept { return 4 * most_crossings; }
+  std::uint32_t most_pairs() const noexcept { return 16 * most_crossings; }
 
   /// Crossings, vertices of crossed blocks and blocks of both solids.
   std::size_t elements() const noexcept {

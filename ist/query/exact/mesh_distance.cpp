@@ -366,7 +366,7 @@ class GapSearch {
     for (int k = 0; k < 3; ++k) over_b[k] = dot(b.normal, a.corner[k] - b.corner[0]);
     if (beyond(over_b, b.squared_normal)) return;
     ++out_.tests;
-    if (boxes_gap == 0 && exact::cross_exactly(a.corner, b.corner).pierced != 0) {
+    if (boxes_gap == 0 && exact::cross_exactly(a.corner, b.corner)) {
       out_.overlap = true;
       return;
     }

@@ -103,7 +103,7 @@ class Way {
       if (beside || first - 4e-15 > std::min(1.0, best.t) || last < -4e-15) continue;
       Point corners[3];
       corners_of(mesh, block, t, corners);
-      if (exact::enters(p_, q_, corners, true) == 0) continue;
+      if (exact::enters(p_, q_, corners, true, {0, 0, 0}) == 0) continue;
       const Point normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
       const double climbed = dot(normal, corners[0] - p_), climb = dot(normal, q_ - p_);
       // Where it hardly climbs the corners tell better.
@@ -124,14 +124,16 @@ class Way {
 
 }  // namespace
 
-bool is_inside(const MeshOfPair& solid, const Point& p) noexcept {
+bool is_inside(const MeshOfPair& solid, const Point& p, const Point& aside) noexcept {
   const MeshTree& mesh = solid.mesh;
   const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
   const double at[3] = {start.x, start.y, start.z};
-  double pad = 0;  // of what mapping there and back rounds
+  // What mapping there and back rounds, and what B is moved aside.
+  double pad = 0;
   for (int k = 0; k < 3; ++k)
     pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;
-  pad = 1e-12 * pad;
+  pad = 1e-12 * pad + 2 * (solid.is_b() ? solid.from_a->scale : 1.0) *
+                          (std::abs(aside.x) + std::abs(aside.y) + std::abs(aside.z));
   float low[3], high[3];
   int axis = 0;
   double shortest = HUGE_VAL, end = 0;
@@ -165,7 +167,7 @@ bool is_inside(const MeshOfPair& solid, const Point& p) noexcept {
         const Point corners[3] = {solid.place(block.vertex[block.corner[0][t]]),
                                   solid.place(block.vertex[block.corner[1][t]]),
                                   solid.place(block.vertex[block.corner[2][t]])};
-        entered += exact::enters(p, q, corners, !solid.is_b());
+        entered += exact::enters(p, q, corners, !solid.is_b(), aside);
       }
       continue;
     }

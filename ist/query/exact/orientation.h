@@ -3,15 +3,16 @@
 #include "numerics/vec3.h"
 #include "query/exact/expansion.h"
 
-// Exact signs of determinants of four points, of which some belong to B. A tie is broken as if B
-// were moved by an infinitesimal (ε, ε², ε³): then no vertex lies in a plane and no edge meets an
-// edge, whatever the pose, and all signs agree with each other as those of one geometry do.
+// Exact signs of determinants of four points, of which some belong to B. Signs are those of B moved
+// aside by a given tiny vector, and a tie is broken as if B were moved further by an infinitesimal
+// (ε, ε², ε³): then no vertex lies in a plane and no edge meets an edge, whatever the pose, and all
+// signs agree with each other as those of one geometry do. Values are those of B where it is.
 
 namespace ist::exact {
 
 using Point = Vec3;
 
-/// A rounded determinant and how far it may be off; its sign once it is certain.
+/// A rounded determinant of B where it is, how far it may be off, and its sign with B moved aside.
 struct Determinant {
   double value;
   double error;  ///< 0: `value` is the nearest double, or nearly
@@ -21,6 +22,10 @@ struct Determinant {
 /// Rounded r · (u × v) of rounded differences is off by at most this times r · (u × v) of absolute
 /// values: eight roundings of each product, and some room.
 inline constexpr double kFilter = 1e-15;
+
+IST_HD inline double absolute_dot(const Point& x, const Point& size) {
+  return (std::abs(x.x) * size.x + std::abs(x.y) * size.y) + std::abs(x.z) * size.z;
+}
 
 /// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
 IST_HD inline int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
@@ -44,16 +49,11 @@ IST_HD inline int sign_of_tie(const Point& u1, const Point& u0, const Point& v1,
   return sign != 0 ? moved * sign : 1;
 }
 
-/// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with the infinitesimal (`moved` = 1),
-/// or r0 does (−1); the others' differences stay.
+/// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with B (`moved` = 1), or r0 does (−1);
+/// the others' differences stay.
 IST_HD inline Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
                                             const Point& u0, const Point& v1, const Point& v0,
-                                            int moved) {
-  // All in a plane across an axis: how aligned parts lie.
-  if ((r1.x == r0.x && u1.x == u0.x && v1.x == v0.x) ||
-      (r1.y == r0.y && u1.y == u0.y && v1.y == v0.y) ||
-      (r1.z == r0.z && u1.z == u0.z && v1.z == v0.z))
-    return {0, 0, sign_of_tie(u1, u0, v1, v0, moved)};
+                                            int moved, const Point& aside) {
   const Expansion<2> ux = difference(u1.x, u0.x), uy = difference(u1.y, u0.y),
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
@@ -63,39 +63,43 @@ IST_HD inline Determinant exact_determinant(const Point& r1, const Point& r0, co
   const Expansion<16> z = minor(ux, vy, uy, vx);
   const auto det = sum(sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y))),
                        product(z, difference(r1.z, r0.z)));
-  const int sign = det.sign();
+  const auto shift = sum(sum(scaled(x, aside.x), scaled(y, aside.y)), scaled(z, aside.z));
+  const int sign = sum(det, shift, moved).sign();
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
 /// The same, in doubles where these are certain.
 IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
-                                      const Point& u0, const Point& v1, const Point& v0,
-                                      int moved) {
+                                      const Point& u0, const Point& v1, const Point& v0, int moved,
+                                      const Point& aside) {
   const Point r = r1 - r0, u = u1 - u0, v = v1 - v0;
   const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                bz = u.y * v.x;
-  const double value = (r.x * (ax - bx) + r.y * (ay - by)) + r.z * (az - bz);
-  const double error = kFilter * ((std::abs(r.x) * (std::abs(ax) + std::abs(bx)) +
-                                   std::abs(r.y) * (std::abs(ay) + std::abs(by))) +
-                                  std::abs(r.z) * (std::abs(az) + std::abs(bz)));
-  if (std::abs(value) > error) return {value, error, value > 0 ? 1 : -1};
-  return exact_determinant(r1, r0, u1, u0, v1, v0, moved);
+  const Point n = {ax - bx, ay - by, az - bz};
+  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by),
+                      std::abs(az) + std::abs(bz)};
+  const double value = dot(r, n), shift = moved * dot(aside, n);
+  const double error = kFilter * absolute_dot(r, size);
+  const double signed_value = value + shift;
+  if (std::abs(signed_value) > error + kFilter * absolute_dot(aside, size))
+    return {value, error, signed_value > 0 ? 1 : -1};
+  return exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
-IST_HD inline Determinant height_over_a(const Point (&a)[3], const Point& b) {
-  return determinant(b, a[0], a[1], a[0], a[2], a[0], 1);
+IST_HD inline Determinant height_over_a(const Point (&a)[3], const Point& b, const Point& aside) {
+  return determinant(b, a[0], a[1], a[0], a[2], a[0], 1, aside);
 }
 
 /// How far A's point lies above triangle B's plane.
-IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a) {
-  return determinant(a, b[0], b[1], b[0], b[2], b[0], -1);
+IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, const Point& aside) {
+  return determinant(a, b[0], b[1], b[0], b[2], b[0], -1, aside);
 }
 
 /// Which way round A's edge p → q goes about B's edge r → s.
-IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r,
-                                    const Point& s) {
-  return determinant(r, p, q, p, s, r, 1);
+IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s,
+                                    const Point& aside) {
+  return determinant(r, p, q, p, s, r, 1, aside);
 }
 
 }  // namespace ist::exact

@@ -28,6 +28,9 @@ HWY_INLINE Vec3 operator-(const Vec3& a, const Vec3& b) {
 }
 HWY_INLINE Vec3 operator*(V s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
 HWY_INLINE V dot(const Vec3& a, const Vec3& b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
+HWY_INLINE V absolute_dot(const Vec3& a, const Vec3& size) {
+  return (hn::Abs(a.x) * size.x + hn::Abs(a.y) * size.y) + hn::Abs(a.z) * size.z;
+}
 HWY_INLINE Vec3 cross(const Vec3& a, const Vec3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }

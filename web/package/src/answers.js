@@ -20,7 +20,7 @@ export const codeOf = (status) => status === 'budget-exhausted' ? 1 :
 
 // Vectors of answers: after how many numbers each begins; < 0: it lies there with the other sign.
 // Other numbers are named one by one: through such a table each would make garbage.
-const kPenetration = {centroid: 3, force: -6, torque: -9};
+const kPenetration = {centroid: 3, force: -6, torque: -9, contactNormal: 13};
 const kPatch = {centroid: 1, normal: 4, force: 10, torque: 13, point: 16};
 const kGap = {pointA: 3, pointB: 6, normal: 9};
 export const kMotion = {velocity: 0, angularVelocity: 3, about: 6};
@@ -51,12 +51,14 @@ export const newPenetration = () => ({
   volumeMin: 0,
   volumeMax: 0,
   ...newVectors(kPenetration),
+  touching: false,
+  contactArea: 0,
   nodeVisits: 0,
   spherePairs: 0,
 });
 
 /** Bytes of an ist_penetration_t. */
-export const kPenetrationBytes = 112;
+export const kPenetrationBytes = 152;
 
 /** `place`: bytes from the start of memory. */
 export function readPenetration(place, status, out) {
@@ -65,8 +67,10 @@ export function readPenetration(place, status, out) {
   out.volume = numbers[at];
   out.volumeMin = numbers[at + 1];
   out.volumeMax = numbers[at + 2];
-  out.nodeVisits = integers[2 * at + 24];
-  out.spherePairs = integers[2 * at + 25];
+  out.contactArea = numbers[at + 12];
+  out.nodeVisits = integers[2 * at + 32];
+  out.spherePairs = integers[2 * at + 33];
+  out.touching = integers[2 * at + 34] !== 0;
   return readVectors(kPenetration, at, out);
 }
 
@@ -77,8 +81,10 @@ export function writePenetration(place, answer) {
   numbers[at] = answer.volume;
   numbers[at + 1] = answer.volumeMin;
   numbers[at + 2] = answer.volumeMax;
-  integers[2 * at + 24] = answer.nodeVisits;
-  integers[2 * at + 25] = answer.spherePairs;
+  numbers[at + 12] = answer.contactArea;
+  integers[2 * at + 32] = answer.nodeVisits;
+  integers[2 * at + 33] = answer.spherePairs;
+  integers[2 * at + 34] = answer.touching ? 1 : 0;
   writeVectors(kPenetration, at, answer);
 }
 

@@ -1,0 +1,156 @@
+// On which sides of a triangle's plane the vertices of a block lie: included once a target.
+
+#if defined(IST_QUERY_PLANE_SIDES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_QUERY_PLANE_SIDES_INL_H_
+#undef IST_QUERY_PLANE_SIDES_INL_H_
+#else
+#define IST_QUERY_PLANE_SIDES_INL_H_
+#endif
+
+#include <algorithm>
+#include <cmath>
+
+#include "query/exact/crossing_search.h"
+#include "query/exact/points-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// What a vertex is above or below by: what doubles round; or so much that it stays there wherever
+/// points move by the room, or B by what the search reaches.
+enum class Margin { rounding, room, reach };
+
+/// Which of a block's triangles have all corners among some of its vertices, a bit each.
+HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const MeshBlock& block) {
+#if HWY_TARGET == HWY_SCALAR
+  std::uint32_t out = 0;
+  for (std::uint32_t t = 0; t < kWidth; ++t)
+    out |= (vertices >> block.corner[0][t] & vertices >> block.corner[1][t] &
+            vertices >> block.corner[2][t] & 1)
+           << t;
+  return out;
+#else
+  const hn::FixedTag<std::uint8_t, kWidth> d;
+  alignas(16) static constexpr std::uint8_t kByte[kWidth] = {0, 0, 0, 0, 0, 0, 0, 0,
+                                                             1, 1, 1, 1, 1, 1, 1, 1};
+  alignas(16) static constexpr std::uint8_t kBit[kWidth] = {1, 2, 4, 8, 16, 32, 64, 128,
+                                                            1, 2, 4, 8, 16, 32, 64, 128};
+  const auto both = hn::BitCast(d, hn::Set(hn::Repartition<std::uint16_t, decltype(d)>(),
+                                           static_cast<std::uint16_t>(vertices)));
+  const auto bits = hn::Load(d, kBit);
+  const auto in =
+      hn::VecFromMask(d, (hn::TableLookupBytes(both, hn::Load(d, kByte)) & bits) == bits);
+  const auto at = [&](int c) { return hn::TableLookupBytes(in, hn::LoadU(d, block.corner[c])); };
+  std::uint8_t out[8] = {};
+  hn::StoreMaskBits(d, hn::MaskFromVec(at(0) & (at(1) & at(2))), out);
+  return out[0] | static_cast<std::uint32_t>(out[1]) << 8;
+#endif
+}
+
+/// The plane of a triangle, and what lies along it.
+struct SeenPlane {
+  Vec3 at, normal;
+
+  SeenPlane(const PlacedPlanes& planes, std::uint32_t t)
+      : at(one(planes.at, t)), normal(one(planes.normal, t)) {}
+
+  /// Of vertices l … of a block, times the length of the normal.
+  HWY_INLINE V heights(const PlacedVertices& vertices, std::size_t l) const {
+    const D d;
+    return dot(Vec3{hn::Load(d, vertices.at[0] + l), hn::Load(d, vertices.at[1] + l),
+                    hn::Load(d, vertices.at[2] + l)} -
+                   at,
+               normal);
+  }
+
+ private:
+  static Vec3 one(const double (&from)[3][kWidth], std::uint32_t t) {
+    const D d;
+    return {hn::Set(d, from[0][t]), hn::Set(d, from[1][t]), hn::Set(d, from[2][t])};
+  }
+};
+
+/// Vertices that lie above or below, a bit each.
+struct PlaneSides {
+  std::uint32_t above = 0, below = 0;
+};
+
+/// Of vertices of the other solid, seen from the plane of triangle t of a block; above and below what
+/// lies between `low` and `high`. `aside`: what they move by. `apart`: no coordinates of both blocks
+/// differ by more.
+HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlanes& planes,
+                               std::uint32_t t, double low, double high,
+                               const exact::Point& aside, double apart, Margin margin, double by) {
+  const D d;
+  const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
+  const double shift = dot(aside, n), longest = planes.longest[t] + by;
+  double beyond = 1.1 * exact::kFilter * planes.size[t] * apart;
+  if (margin == Margin::reach)
+    beyond += by * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z));
+  else if (margin == Margin::room)  // six products of three numbers
+    beyond += 6 * by * longest * (2 * apart + longest);
+  const SeenPlane plane(planes, t);
+  const V top = hn::Set(d, (high - shift) + beyond), bottom = hn::Set(d, (low - shift) - beyond);
+  PlaneSides out;
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    const V height = plane.heights(vertices, l);
+    out.above |= mask_bits(d, height > top) << l;
+    out.below |= mask_bits(d, height < bottom) << l;
+  }
+  return out;
+}
+
+/// The planes of a block.
+inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t number,
+                                         const Similarity* map, PlacedMesh& kept) {
+  const auto [out, held] = kept.planes.find(number);
+  if (held) return out;
+  const MeshBlock& block = tree.blocks[number];
+  const PlacedVertices& vertices = placed_vertices(tree, number, map, kept);
+  const D d;
+  alignas(64) double corner[3][3][kWidth];
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k)
+      for (std::uint32_t t = 0; t < kWidth; ++t)
+        corner[c][k][t] = vertices.at[k][block.corner[c][t]];
+  alignas(64) double length[kWidth];
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    Vec3 p[3];
+    for (int c = 0; c < 3; ++c)
+      p[c] = {hn::Load(d, corner[c][0] + l), hn::Load(d, corner[c][1] + l),
+              hn::Load(d, corner[c][2] + l)};
+    const Vec3 u = p[1] - p[0], v = p[2] - p[0];
+    const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
+            bz = u.y * v.x;
+    const Vec3 normal = {ax - bx, ay - by, az - bz};
+    const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
+                       hn::Abs(az) + hn::Abs(bz)};
+    hn::Store((size.x + size.y) + size.z, d, out.size + l);
+    const auto store = [&](const Vec3& x, double (&to)[3][kWidth]) {
+      hn::Store(x.x, d, to[0] + l);
+      hn::Store(x.y, d, to[1] + l);
+      hn::Store(x.z, d, to[2] + l);
+    };
+    store(p[0], out.at);
+    store(normal, out.normal);
+    hn::Store(hn::Max(largest(u), largest(v)), d, out.longest + l);
+    hn::Store(length_bound(normal), d, length + l);
+  }
+  out.widest =
+      static_cast<std::uint32_t>(std::max_element(length, length + block.triangles) - length);
+  const SeenPlane plane(out, out.widest);
+  V low = hn::Zero(d), high = hn::Zero(d);
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    const V height = plane.heights(vertices, l);
+    low = hn::Min(low, height);
+    high = hn::Max(high, height);
+  }
+  out.low = hn::GetLane(hn::MinOfLanes(d, low));
+  out.high = hn::GetLane(hn::MaxOfLanes(d, high));
+  return out;
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
