@@ -326,7 +326,7 @@ int main(int argc, char** argv) {
       Row row;
       for (int k = 0; k < 4; ++k) row.pose.q[k] = mate[2][k];
       for (int k = 0; k < 3; ++k)
-        row.pose.t[k] = mate[3][k].get<double>() + moved * mate[4][k].get<double>();
+        row.pose.t[k] = mate[3][k].get<double>() - moved * mate[4][k].get<double>();
       scene.rows.push_back(row);
     }
     from_scratch(report, scene, {}, 3);

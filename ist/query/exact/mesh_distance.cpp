@@ -1,6 +1,7 @@
 #include "query/exact/mesh_distance.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -17,15 +18,23 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// The nearest two triangles so far; of equally near ones those of the lowest numbers.
+/// The nearest two triangles so far; of those that are as near, to rounding, the ones of the lowest
+/// numbers.
 struct NearestTriangles {
+  double rounding;                            ///< of a distance
+  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to there all is as near as the least
   double squared = HUGE_VAL;
   std::uint64_t pair = KeptPairs::kNone;  ///< A's << 32 | B's
   exact::Point on_a = {}, between = {};   ///< from there to B's
 
   void take(const PairGaps& gaps, std::uint32_t n, std::uint64_t name) {
-    if (!(gaps.squared[n] < squared || (gaps.squared[n] == squared && name < pair))) return;
-    squared = gaps.squared[n];
+    const double found = gaps.squared[n];
+    if (found < least) {
+      least = found;
+      alike = (std::sqrt(least) + rounding) * (std::sqrt(least) + rounding);
+    }
+    if (!(found <= alike) || (squared <= alike && pair < name)) return;
+    squared = found;
     pair = name;
     on_a = {gaps.on_a[0][n], gaps.on_a[1][n], gaps.on_a[2][n]};
     between = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
@@ -54,7 +63,8 @@ class MeshGapSearch {
         single_a_(asked.a_from_b, blur_),
         single_b_(asked.b_from_a, blur_ / scale_),
         double_a_(asked.a_from_b, blur_),
-        double_b_(asked.b_from_a, blur_ / scale_) {
+        double_b_(asked.b_from_a, blur_ / scale_),
+        best_{4e-15 * reach_} {
     look_along(asked.toward);
     scratch.forget(a_.hash);
     scratch.pairs->count = 0;
@@ -147,18 +157,18 @@ class MeshGapSearch {
     return least;
   }
 
-  bool done() const { return out_.overlap || out_.stopped || best_.squared <= enough(); }
+  bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
   double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
 
   /// `least`: no pair that waits is nearer.
   void finish(double least) {
     out_.overlap = out_.overlap || holds(false) || holds(true);
-    out_.farther = !out_.overlap && !out_.stopped && best_.squared > most_ * most_;
+    out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
     if (out_.overlap || out_.farther) return;
     out_.a = best_.on_a;
     out_.b = best_.on_a + best_.between;
-    out_.distance = std::sqrt(best_.squared);
-    if (!out_.stopped) least = best_.squared;
+    out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
+    if (!out_.stopped) least = best_.least;
     out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(least) - slack_);
   }
 
@@ -232,6 +242,8 @@ class MeshGapSearch {
   /// The triangles of two blocks that may be near enough.
   void measure(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
+    if (cannot_answer(of_a, of_b, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
+      return;
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
     const auto take = [&](std::uint32_t i, std::uint32_t lanes) {
@@ -253,6 +265,27 @@ class MeshGapSearch {
       take(i, culls.lanes(i, limit_) & all_b);
     }
     measure_added();
+  }
+
+  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
+  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
+  bool cannot_answer(const PlacedVertices& of_a, const PlacedVertices& of_b,
+                     std::uint64_t first) const {
+    const double distance = std::sqrt(best_.least);
+    if (keep_ != nullptr || !(best_.pair < first) || distance < 4 * best_.rounding) return false;
+    const D d;
+    const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
+    const auto along = [&](const PlacedVertices& of, std::size_t l) {
+      return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
+             z * hn::Load(d, of.at[2] + l);
+    };
+    V last = along(of_a, 0), next = along(of_b, 0);
+    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
+      last = hn::Max(last, along(of_a, l));
+      next = hn::Min(next, along(of_b, l));
+    }
+    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last)) >=
+           distance - 0.5 * best_.rounding;
   }
 
   /// Two triangles.
@@ -289,9 +322,9 @@ class MeshGapSearch {
     PairGaps gaps;
     std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
     for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1)
-      out_.overlap = cross(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
+      out_.overlap = crosses(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
     if (out_.overlap) return;
-    const double before = best_.squared;
+    const double before = best_.least;
     std::uint32_t beyond = 0;
     for (std::uint32_t n = 0; n < count; ++n) {
       const std::uint64_t name = std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
@@ -300,10 +333,16 @@ class MeshGapSearch {
       beyond += gaps.squared[n] > before && gaps.squared[n] <= squared_limit_;
     }
     if (keep_ != nullptr && (beyond_ += beyond) > kMostBeyond) give_up();
-    if (!(best_.squared < before)) return;
-    const double distance = std::sqrt(best_.squared);
+    if (!(best_.least < before)) return;
+    const double distance = std::sqrt(best_.least);
     limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kAlike) * distance));
-    if (distance > 0) look_along((1 / distance) * best_.between);
+    if (distance > 0) {
+      look_along((1 / distance) * best_.between);
+      level_ = toward_;
+      for (std::uint32_t n = 0; n < count; ++n)
+        if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
+          for (int side = 0; side < 2; ++side) take_level(corners(pairs, side, n));
+    }
   }
 
   /// Two blocks, which the next steps look at again.
@@ -319,13 +358,27 @@ class MeshGapSearch {
     limit_to(nearest_limit_);
   }
 
-  static bool cross(const TrianglePairs& pairs, std::uint32_t n) {
-    exact::Point corner[2][3];
-    for (int s = 0; s < 2; ++s)
-      for (int c = 0; c < 3; ++c)
-        corner[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n],
-                        pairs.corner[s][c][2][n]};
-    return exact::cross_exactly(corner[0], corner[1]).pierced != 0;
+  using Corners = std::array<exact::Point, 3>;
+  static Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
+    Corners at;
+    for (int c = 0; c < 3; ++c)
+      at[c] = {pairs.corner[side][c][0][n], pairs.corner[side][c][1][n],
+               pairs.corner[side][c][2][n]};
+    return at;
+  }
+
+  static bool crosses(const TrianglePairs& pairs, std::uint32_t n) {
+    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
+    return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]}).pierced != 0;
+  }
+
+  /// The way between level faces is their normal: a short way has few digits of it.
+  void take_level(const Corners& t) {
+    const exact::Point n = cross(t[1] - t[0], t[2] - t[0]);
+    const double length = std::sqrt(dot(n, n)), along = dot(n, toward_);
+    constexpr double kLevel = 1 - 1e-10;
+    if (length > 0 && std::abs(along) > kLevel * length)
+      level_ = ((along > 0 ? 1 : -1) / length) * n;
   }
 
   const GapQuestion& asked_;
@@ -346,7 +399,7 @@ class MeshGapSearch {
   NearestTriangles best_;
   double least_here_ = HUGE_VAL;  ///< squared, of two blocks
   std::uint32_t beyond_ = 0;      ///< pairs that were measured only to be kept
-  exact::Point toward_;
+  exact::Point toward_, level_ = {0, 0, 0};
   KeptPairs* keep_ = nullptr;
   MeshGap out_;
 };
