@@ -1,6 +1,6 @@
 # Libraries that ist is measured and checked against: FCL and Bullet's double-precision build
 # (tests/oracle, benchmarks). Each is optional; a missing one is named when CMake runs.
-#   ist_peer_fcl, ist_peer_bullet, ist_peer_manifold, ist_peer_cgal: interface targets, there only
+#   ist_peer_fcl, ist_peer_coal, ist_peer_bullet, ist_peer_manifold, ist_peer_cgal: interface targets, there only
 #   when the library was found.
 include_guard(GLOBAL)
 
@@ -11,6 +11,19 @@ if(fcl_FOUND)
   target_link_libraries(ist_peer_fcl INTERFACE fcl ccd Eigen3::Eigen)
 else()
   message(STATUS "FCL not found (libfcl-dev): no comparison with it")
+endif()
+
+# `./dev setup --bench` installs it there.
+set(coal_prefix ${PROJECT_SOURCE_DIR}/build-coal/cmeel.prefix)
+if(EXISTS ${coal_prefix}/lib/libcoal.so)
+  add_library(ist_peer_coal INTERFACE)
+  target_include_directories(ist_peer_coal SYSTEM INTERFACE ${coal_prefix}/include)
+  target_link_libraries(ist_peer_coal INTERFACE ${coal_prefix}/lib/libcoal.so
+    ${coal_prefix}/lib/libboost_serialization.so Eigen3::Eigen)
+  target_link_options(ist_peer_coal INTERFACE -Wl,-rpath,${coal_prefix}/lib
+    -Wl,-rpath-link,${coal_prefix}/lib)
+else()
+  message(STATUS "Coal not found (./dev setup --bench): no comparison with it")
 endif()
 
 include(${CMAKE_CURRENT_LIST_DIR}/ist_find_bullet.cmake)

@@ -75,12 +75,12 @@ class Session {
     const ist::PlacedTree a{object_, {}}, b{probe_, pose_of(proxy_.pose()), scale_};
     ist::PenetrationSettings settings;
     if (exact_) settings.measure = ist::Measure::exact;
-    settings.pair_id = 1;  // a loop: triangles that are near are kept from tick to tick
+    settings.pair_id = 1;  // a loop: what is near is kept from tick to tick
     deadline_.limit(settings);
     const double start = now_us();
     ist::PenetrationAndSeparation answer{ist::penetration(a, b, settings, scratch_), {}};
     deadline_.record(answer.penetration, now_us() - start);
-    if (motion_.feels()) answer.separation = ist::separation(a, b, {}, scratch_);
+    if (motion_.feels()) answer.separation = ist::separation(a, b, {.pair_id = 1}, scratch_);
     return answer;
   }
 

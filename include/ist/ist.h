@@ -392,6 +392,10 @@ typedef struct ist_separation_settings {
   uint32_t size;
   uint32_t max_visits;
   uint32_t inner_spheres; /* not 0: use them even if both assets keep a mesh */
+  uint32_t pair_id;       /* as above: between surfaces the nearest triangles are kept */
+  /* [u] Of solids that are farther apart, certified, distance and distance_min are max_distance,
+   * distance_max is infinite, points and normal are NaN, and the status is IST_OK. 0: no limit. */
+  double max_distance;
 } ist_separation_settings_t;
 
 /* --- Answers ---------------------------------------------------------------------------------- */
@@ -510,6 +514,10 @@ enum { IST_OVERLAP_NO = 0, IST_OVERLAP_YES = 1, IST_OVERLAP_UNKNOWN = 2 };
 /* Takes a fraction of the time of a penetration. On an error, and for invalid input: unknown. */
 ist_status_t ist_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                          ist_overlapping_t* answer);
+/* Whether they come within `margin` [u] ≥ 0 of each other: by the surfaces if both assets keep a
+ * mesh. A negative margin, or NaN: IST_INVALID_INPUT. */
+ist_status_t ist_overlap_within(const ist_placed_t* a, const ist_placed_t* b, double margin,
+                                ist_workspace_t* workspace, ist_overlapping_t* answer);
 
 /* PairFit: whether the sizes of two assets suit each other, independent of their poses. */
 typedef struct ist_pair_fit {
@@ -788,6 +796,13 @@ ist_status_t ist_penetration_batch(const ist_pair_t* pairs, size_t count,
                                    ist_workspace_t* workspaces, size_t workers,
                                    ist_penetration_t* answers, size_t answer_size,
                                    const ist_parallel_t* parallel);
+
+/* The same for distances: `answer_size` is sizeof(ist_separation_t). */
+ist_status_t ist_separation_batch(const ist_pair_t* pairs, size_t count,
+                                  const ist_separation_settings_t* settings,
+                                  ist_workspace_t* workspaces, size_t workers,
+                                  ist_separation_t* answers, size_t answer_size,
+                                  const ist_parallel_t* parallel);
 
 /* patches[i] and wholes[i] are what ist_contact_patches(pairs[i]) writes; wholes[i] has its status,
  * errors included.

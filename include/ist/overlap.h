@@ -21,4 +21,13 @@ enum class Overlapping : std::uint32_t {
 /// a field, it is certain as far as the field's distances are: see each field. Two fields: unknown.
 Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept;
 
+/// Whether two placed solids come within `margin` [u] ≥ 0 of each other. Yes and no are certain.
+///
+/// If both assets keep a mesh, `unknown` is left only where the distance is the margin to rounding
+/// and the meshes' errors. Otherwise inner spheres and their covers decide, as above. Takes about
+/// as long as overlap() unless the distance is near the margin. A margin that is negative, or NaN:
+/// unknown.
+Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
+                    Workspace& workspace) noexcept;
+
 }  // namespace ist

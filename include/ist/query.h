@@ -74,6 +74,16 @@ using ContactSettings = PenetrationSettings;
 struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
   bool inner_spheres = false;    ///< use the inner spheres even if both assets keep a mesh
+
+  /// [u] Of solids that are farther apart than this the answer says no more: distance and
+  /// distance_min are max_distance, distance_max is infinite, points and normal are NaN, the status
+  /// is ok. That is certified, and takes little more than an overlap().
+  double max_distance = 0;
+
+  /// As PenetrationSettings::pair_id, for distances of surfaces: the nearest triangles are kept,
+  /// and bound the next distance. It changes no bit of an answer except node_visits and
+  /// sphere_pairs. One pair of solids may have the same id in both settings.
+  std::uint32_t pair_id = 0;
 };
 
 /// Limits of both halves of query().
@@ -149,7 +159,8 @@ struct Penetration {
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
-/// spheres, or inner spheres and a field. All zero once these overlap.
+/// spheres, or inner spheres and a field. All zero once these overlap. Of solids that are farther
+/// than SeparationSettings::max_distance see there.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
@@ -257,7 +268,7 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 /// asset's inner spheres, certified as far as the field's distances are: see each field.
 ///
 /// If the gap is nearly constant over a large area, as between the threads of a nut and a bolt, a
-/// query takes milliseconds: in a loop, set max_visits or use the inner spheres.
+/// query takes many times longer: in a loop, set pair_id, and max_distance to what matters.
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
                       const SeparationSettings& settings, Workspace& workspace) noexcept;
 
@@ -390,6 +401,12 @@ struct ParallelFor {
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
+
+/// answers[i] = separation(pairs[i]), bit for bit, for i < answers.size(). Workspaces, pool and
+/// limits as for penetration_batch(): without a workspace every interval is unbounded.
+void separation_batch(std::span<const PlacedPair> pairs, const SeparationSettings& settings,
+                      std::span<Workspace> workspaces, std::span<Separation> answers,
+                      const ParallelFor& parallel = {}) noexcept;
 
 /// answers[i] = contact_patches(pairs[i]), bit for bit, for i < answers.size().
 ///

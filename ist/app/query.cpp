@@ -293,6 +293,10 @@ void add_query(CLI::App& app) {
       true);
   add_whole(command, "--max-visits", options->max_visits,
             "Limit of node pairs, for penetration and for separation; 0 = no limit");
+  add_number(
+      command, "--max-distance", options->settings.separation.max_distance, {.least = 0},
+      "Largest distance that matters, in u; 0 = no limit. If the solids are certainly farther "
+      "apart, distance and distance_min are this number and distance_max is inf");
   add_whole<std::size_t>(command, "--repeat", options->repeat,
                          "Number of rounds over all rows; time_us is the minimum of a row", 1);
   CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");

@@ -362,8 +362,11 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
          "on B about its origin: −dV/d(rotation of B)");
   }
   if (answer.has_distance()) {
-    line("distance", fmt::format("{:.5g} u", s.distance),
-         answer.surfaces ? "between the surfaces" : "between the inner spheres");
+    const bool farther = std::isinf(s.distance_max);
+    line("distance", fmt::format("{}{:.5g} u", farther ? "> " : "", s.distance),
+         farther           ? "farther than --max-distance"
+         : answer.surfaces ? "between the surfaces"
+                           : "between the inner spheres");
     line("interval", fmt::format("{:.5g} … {:.5g} u", s.distance_min, s.distance_max),
          "contains the distance of the solids, certified");
   }

@@ -67,7 +67,9 @@ Separation find_separation(const PlacedField& a, const PlacedTree& b,
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
   const auto search = [&](auto& shape) {
-    return GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
+    const Separation gap = GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
+    const bool farther = settings.max_distance > 0 && gap.distance_min > settings.max_distance;
+    return farther ? farther_than(settings.max_distance) : gap;
   };
   if (const MeshField* const mesh = mesh_of(a)) {
     MeshShape shape(*mesh);

@@ -2,6 +2,7 @@
 
 #include <ist/overlap.h>
 #include <ist/time_of_impact.h>
+#include <cmath>
 #include <utility>
 
 #include "query/base/batch.h"
@@ -32,6 +33,21 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, const Answer& none, 
 
 const Pose& pose_of(const PlacedSolid& solid) noexcept {
   return std::visit([](const auto& placed) -> const Pose& { return placed.pose; }, solid.placed);
+}
+
+/// answers[i] = ask(pairs[i], workspace), or `unknown` where there is no workspace.
+template <class Answer, class Ask>
+void answer_each(std::span<const PlacedPair> pairs, std::span<Workspace> workspaces,
+                 std::span<Answer> answers, const Answer& unknown, const ParallelFor& parallel,
+                 const Ask& ask) noexcept {
+  const std::size_t count = std::min(pairs.size(), answers.size());
+  if (workspaces.empty()) {
+    std::fill_n(answers.begin(), count, unknown);
+    return;
+  }
+  answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
+    answers[i] = ask(pairs[i], workspaces[worker]);
+  });
 }
 
 /// Witnesses of a separation or an impact.
@@ -65,8 +81,15 @@ Separation separation(const PlacedSolid& a, const PlacedSolid& b,
 
 PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept {
-  return {penetration(a, b, settings.penetration, workspace),
-          separation(a, b, settings.separation, workspace)};
+  PenetrationAndSeparation both{penetration(a, b, settings.penetration, workspace), {}};
+  // A certified overlap leaves no gap to look for.
+  const Measure measure = settings.penetration.measure;
+  const bool certified = measure == Measure::inner ||
+                         (measure == Measure::exact && !settings.separation.inner_spheres);
+  if (!certified || both.penetration.status != QueryStatus::ok ||
+      !(both.penetration.volume_min > 0))
+    both.separation = separation(a, b, settings.separation, workspace);
+  return both;
 }
 
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
@@ -90,6 +113,20 @@ Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& works
       [](Overlapping) {});
 }
 
+Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
+                    Workspace& workspace) noexcept {
+  if (!(margin >= 0)) return Overlapping::unknown;
+  const SeparationSettings settings{.max_distance = margin};
+  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
+  const Separation gap = tree_a != nullptr && tree_b != nullptr
+                             ? find_separation(*tree_a, *tree_b, settings, workspace, margin)
+                             : separation(a, b, settings, workspace);
+  if (gap.distance_max <= margin) return Overlapping::yes;
+  return gap.distance_min > margin || std::isinf(gap.distance_max) ? Overlapping::no
+                                                                   : Overlapping::unknown;
+}
+
 TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
   const bool turned = std::holds_alternative<PlacedField>(b.placed);
@@ -105,14 +142,19 @@ TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Mo
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel) noexcept {
-  const std::size_t count = std::min(pairs.size(), answers.size());
-  if (workspaces.empty()) {
-    std::fill_n(answers.begin(), count, unknown_penetration());
-    return;
-  }
-  answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
-    answers[i] = penetration(pairs[i].a, pairs[i].b, settings, workspaces[worker]);
-  });
+  answer_each(pairs, workspaces, answers, unknown_penetration(), parallel,
+              [&](const PlacedPair& pair, Workspace& workspace) {
+                return penetration(pair.a, pair.b, settings, workspace);
+              });
+}
+
+void separation_batch(std::span<const PlacedPair> pairs, const SeparationSettings& settings,
+                      std::span<Workspace> workspaces, std::span<Separation> answers,
+                      const ParallelFor& parallel) noexcept {
+  answer_each(pairs, workspaces, answers, unknown_separation(), parallel,
+              [&](const PlacedPair& pair, Workspace& workspace) {
+                return separation(pair.a, pair.b, settings, workspace);
+              });
 }
 
 void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSettings& settings,

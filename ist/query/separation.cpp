@@ -24,11 +24,12 @@ namespace {
 constexpr double kLargestScale = 1e30;
 
 /// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
-/// spheres and that of their cover balls. All in A's unit frame.
+/// spheres and, if asked, that of their cover balls; what is beyond the limit is not looked at. All
+/// in A's unit frame.
 class GapDescent {
  public:
   GapDescent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
-             const SeparationSettings& settings, Workspace::Impl& scratch)
+             std::uint32_t most_visits, double limit, bool covers, Workspace::Impl& scratch)
       : a_(a),
         b_(b),
         a_side_(a, b, pose.a_from_b),
@@ -36,11 +37,14 @@ class GapDescent {
         scale_(pose.a_from_b.scale),
         precision_(precision_for_gap(a.root(), b.root(), pose.a_from_b)),
         stack_(scratch.waiting.get()),
-        budget_(visit_limit(settings.max_visits)) {}
+        budget_(most_visits),
+        gap_(limit),
+        cover_(covers ? limit : 0) {}
 
   void run() {
     measure(a_.sphere(0, 0), b_.sphere(0, 0));
-    gap_ = exact_gap_;
+    if (root_gap() > gap_) return;
+    gap_ = std::min(gap_, exact_gap_);
     push({0, 0, 0, 0, a_.top, b_.top});
     while (size_ > 0 && !overlap_) {
       const WaitingPair pair = stack_[size_ - 1];
@@ -74,8 +78,23 @@ class GapDescent {
   double radius_b() const { return radius_b_; }
 
  private:
+  /// Of all that counts; in double.
+  double root_gap() const {
+    double moved[3];
+    a_side_.x_from_y->apply(b_.root().centre, moved);
+    const double* const c = a_.root().centre;
+    const double between =
+        (Eigen::Vector3d(moved[0], moved[1], moved[2]) - Eigen::Vector3d(c[0], c[1], c[2])).norm();
+    return between - (cover_ > 0 ? a_.root().reach() + scale_ * b_.root().reach()
+                                 : a_.root().r + scale_ * b_.root().r);
+  }
+
   bool wanted(double gap, double cover) const {
     return gap < gap_ || (cover_ > 0 && cover < cover_);
+  }
+
+  double cover_limit() const {
+    return cover_ > 0 ? cover_ : -std::numeric_limits<double>::infinity();
   }
 
   void push(const WaitingPair& pair) { stack_[size_++] = pair; }
@@ -85,17 +104,20 @@ class GapDescent {
         pair.level_b == 0 || (pair.level_a > 0 && a_.ball(pair.level_a, pair.a).r >=
                                                       scale_ * b_.ball(pair.level_b, pair.b).r);
     const double factor = open_a ? 1 : scale_;
-    const double cover_limit = cover_ > 0 ? cover_ : -std::numeric_limits<double>::infinity();
     ChildGaps gaps;
     if (open_a) {
-      child_gaps(a_side_, pair.level_a, pair.a, pair.level_b, pair.b, gap_, cover_limit, precision_,
-                 gaps);
+      child_gaps(a_side_, pair.level_a, pair.a, pair.level_b, pair.b, gap_, cover_limit(),
+                 precision_, gaps);
     } else {
       child_gaps(b_side_, pair.level_b, pair.b, pair.level_a, pair.a, gap_ / scale_,
-                 cover_limit / scale_, precision_, gaps);
+                 cover_limit() / scale_, precision_, gaps);
     }
     const std::uint32_t below = open_a ? a_.level[pair.level_a - 1].count - kWidth * pair.a
                                        : b_.level[pair.level_b - 1].count - kWidth * pair.b;
+    const BallBlock& opened =
+        open_a ? a_.level[pair.level_a].blocks[pair.a] : b_.level[pair.level_b].blocks[pair.b];
+    const double still = open_a ? scale_ * b_.ball(pair.level_b, pair.b).r
+                                : a_.ball(pair.level_a, pair.a).r / scale_;
     const std::size_t first = size_;
     // Unused lanes are left out by number: among objects far enough apart no radius would do it.
     const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
@@ -114,18 +136,21 @@ class GapDescent {
         child.b = kWidth * pair.b + lane;
         --child.level_b;
       }
-      // The nearest on top, by insertion: sixteen at most.
+      // The nearest on top, by insertion: sixteen at most. Of balls that meet the one that shares
+      // most for its size is most likely to hold spheres that do.
+      const double sizes = factor * (double{opened.r[lane]} + still);
+      child.order = gap < 0 ? gap / sizes : gap;
       std::size_t place = size_++;
-      for (; place > first && stack_[place - 1].gap < gap; --place)
+      for (; place > first && stack_[place - 1].order < child.order; --place)
         stack_[place] = stack_[place - 1];
       stack_[place] = child;
     }
   }
 
   void open_leaves(const WaitingPair& pair) {
-    const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, gap_, cover_, precision_);
+    const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, gap_, cover_limit(), precision_);
     pairs_ += kWidth * kWidth;
-    cover_ = std::min(cover_, leaf.cover);
+    if (cover_ > 0) cover_ = std::min(cover_, leaf.cover);
     if (leaf.gap >= gap_) return;
     gap_ = leaf.gap;
     measure(a_.sphere(pair.a, leaf.lane_x), b_.sphere(pair.b, leaf.lane_y));
@@ -155,8 +180,8 @@ class GapDescent {
   WaitingPair* const stack_;
   std::size_t size_ = 0;
   Budget budget_;
-  double gap_ = std::numeric_limits<double>::infinity();  ///< least so far, as the kernel has it
-  double cover_ = std::numeric_limits<double>::infinity();
+  double gap_;    ///< least so far, as the kernel has it, or the limit
+  double cover_;  ///< 0: not asked, or met
   double exact_gap_ = std::numeric_limits<double>::infinity();
   Eigen::Vector3d centre_a_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d centre_b_ = Eigen::Vector3d::Zero();
@@ -167,54 +192,137 @@ class GapDescent {
 };
 
 /// Between the surfaces that both assets keep.
-Separation surface_separation(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
-                              const SeparationSettings& settings, ExactScratch& scratch) noexcept {
-  const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
-  Budget budget(visit_limit(settings.max_visits));
-  const MeshGap found = mesh_gap(mesh_a, mesh_b, pose.a_from_b, pose.b_from_a, budget, scratch);
-  Separation result;
-  result.node_visits = budget.visits();
-  result.sphere_pairs = found.tests;
-  if (found.stopped) result.status = QueryStatus::budget_exhausted;
-  const double unit = pose.unit_a;
-  const double simplified = mesh_a.header->error + pose.a_from_b.scale * mesh_b.header->error;
-  if (found.overlap || found.distance == 0) {
-    result.distance_max = unit * simplified;
+class SurfaceGap {
+ public:
+  SurfaceGap(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+             const SeparationSettings& settings, double enough, Workspace::Impl& scratch)
+      : a_(a),
+        b_(b),
+        pose_(pose),
+        settings_(settings),
+        scratch_(scratch),
+        mesh_a_(mesh_of(a)),
+        mesh_b_(mesh_of(b)),
+        simplified_(mesh_a_.header->error + pose.a_from_b.scale * mesh_b_.header->error),
+        error_(simplified_ + mesh_a_.header->rounding +
+               pose.a_from_b.scale * mesh_b_.header->rounding +
+               moved_by_poses(a, b, mesh_b_, pose) + pose.rounding_of_world()) {
+    if (settings.max_distance > 0) question_.most = settings.max_distance / pose.unit_a + error_;
+    if (enough > 0) question_.enough = enough / pose.unit_a - error_;
+    if (settings.pair_id != 0 && settings.max_visits == 0)
+      question_.kept = &scratch.exact.near.of(settings.pair_id, mesh_a_, mesh_b_, pose.a_from_b);
+  }
+
+  Separation find() {
+    // What the last step found says more than spheres do.
+    if (question_.kept == nullptr || question_.kept->nearest == KeptPairs::kNone) {
+      if (!lack_spheres(a_, b_)) ask_spheres();
+      if (overlap_) return answer({.overlap = true});
+      if (question_.likely <= question_.enough) {
+        Separation result;
+        result.distance_max = pose_.unit_a * question_.likely;
+        return result;
+      }
+    }
+    Budget budget(settings_.max_visits != 0 ? settings_.max_visits - visits_
+                                            : DescentLimits::kNoLimit);
+    const MeshGap found = mesh_gap(question_, budget, scratch_.exact);
+    visits_ += budget.visits();
+    pairs_ += found.tests;
+    return answer(found);
+  }
+
+ private:
+  /// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
+  void ask_spheres() {
+    const SphereTree a = sphere_tree(a_.tree, Measure::inner),
+                     b = sphere_tree(b_.tree, Measure::inner);
+    const double off =
+        distance_error(Precision::float64, span(a.root(), b.root(), pose_.a_from_b)) +
+        pose_.rounding_of_world();
+    GapDescent descent(a, b, pose_, std::min(kGlance, visit_limit(settings_.max_visits)),
+                       question_.most, false, scratch_);
+    descent.run();
+    visits_ = descent.visits();
+    pairs_ = descent.pairs();
+    overlap_ = descent.gap() < -off;
+    question_.likely = std::max(0.0, descent.gap()) + error_ + off;
+    const Eigen::Vector3d way = descent.centre_b() - descent.centre_a();
+    if (const double length = way.norm(); length > 0)
+      question_.toward = {way.x() / length, way.y() / length, way.z() / length};
+  }
+
+  Separation answer(const MeshGap& found) const {
+    const double unit = pose_.unit_a;
+    Separation result;
+    if (found.farther) {
+      result = farther_than(settings_.max_distance);
+    } else if (found.overlap || found.distance == 0) {
+      // Spheres are the solids' own.
+      result.distance_max = overlap_ ? 0 : unit * simplified_;
+    } else {
+      const auto world = [&](const exact::Point& p) { return pose_.to_world({p.x, p.y, p.z}); };
+      const exact::Point between = found.b - found.a;
+      result.distance = unit * found.distance;
+      result.distance_min = unit * std::max(0.0, found.least - error_);
+      result.distance_max = unit * (found.distance * (1 + 1e-15) + error_);
+      result.point_a = world(found.a);
+      result.point_b = world(found.b);
+      result.normal =
+          pose_.rotation() * Eigen::Vector3d(between.x, between.y, between.z).normalized();
+    }
+    if (found.stopped) result.status = QueryStatus::budget_exhausted;
+    result.node_visits = visits_;
+    result.sphere_pairs = pairs_;
     return result;
   }
-  const double error = simplified + mesh_a.header->rounding +
-                       pose.a_from_b.scale * mesh_b.header->rounding +
-                       moved_by_poses(a, b, mesh_b, pose) + pose.rounding_of_world();
-  const auto world = [&](const exact::Point& p) { return pose.to_world({p.x, p.y, p.z}); };
-  const exact::Point between = found.b - found.a;
-  result.distance = unit * found.distance;
-  result.distance_min = unit * std::max(0.0, found.least - error);
-  result.distance_max = unit * (found.distance * (1 + 1e-15) + error);
-  result.point_a = world(found.a);
-  result.point_b = world(found.b);
-  result.normal = pose.rotation() * Eigen::Vector3d(between.x, between.y, between.z).normalized();
-  return result;
-}
+
+  /// Nodes that are opened for a bound: more of them bring little.
+  static constexpr std::uint32_t kGlance = 64;
+
+  const PlacedTree& a_;
+  const PlacedTree& b_;
+  const RelativePose& pose_;
+  const SeparationSettings& settings_;
+  Workspace::Impl& scratch_;
+  const MeshTree mesh_a_, mesh_b_;
+  const double simplified_, error_;  ///< A's unit frame; of the meshes, and with all roundings
+  GapQuestion question_{mesh_a_, mesh_b_, pose_.a_from_b, pose_.b_from_a};
+  bool overlap_ = false;  ///< of inner spheres
+  std::uint32_t visits_ = 0, pairs_ = 0;
+};
 
 }  // namespace
 
 Separation find_separation(const PlacedTree& a, const PlacedTree& b,
-                           const SeparationSettings& settings, Workspace& workspace) noexcept {
+                           const SeparationSettings& settings, Workspace& workspace,
+                           double enough) noexcept {
   const bool surfaces = !settings.inner_spheres && keeps_mesh(a) && keeps_mesh(b);
   if (!surfaces && lack_spheres(a, b)) return not_held<Separation>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   Separation result;
   if (surfaces && pose->a_from_b.scale > kLargestScale) {
-    result = separation(b, a, settings, workspace);
+    result = find_separation(b, a, settings, workspace, enough);
     std::swap(result.point_a, result.point_b);
     result.normal = -result.normal;
     return result;
   }
-  if (surfaces) return surface_separation(a, b, *pose, settings, workspace.impl()->exact);
+  if (surfaces) return SurfaceGap(a, b, *pose, settings, enough, *workspace.impl()).find();
   const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
   const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
-  GapDescent descent(tree_a, tree_b, *pose, settings, *workspace.impl());
+  const double length = span(tree_a.root(), tree_b.root(), pose->a_from_b);
+  const double world_error = distance_error(Precision::float64, length) + pose->rounding_of_world();
+  constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+  if (settings.max_distance > 0 && settings.max_visits == 0) {
+    const double limit = settings.max_distance / pose->unit_a +
+                         distance_error(Precision::float32, length) + world_error;
+    GapDescent near(tree_a, tree_b, *pose, DescentLimits::kNoLimit, limit, true, *workspace.impl());
+    near.run();
+    if (near.cover() == limit) return farther_than(settings.max_distance);
+  }
+  GapDescent descent(tree_a, tree_b, *pose, visit_limit(settings.max_visits), kNoLimit, true,
+                     *workspace.impl());
   descent.run();
   result.node_visits = descent.visits();
   result.sphere_pairs = descent.pairs();
@@ -222,12 +330,12 @@ Separation find_separation(const PlacedTree& a, const PlacedTree& b,
   if (descent.overlap()) return result;
 
   const double unit = pose->unit_a;
-  const double length = span(tree_a.root(), tree_b.root(), pose->a_from_b);
   const double kernel_error = distance_error(descent.precision(), length);
-  const double world_error = distance_error(Precision::float64, length) + pose->rounding_of_world();
   const double gap = descent.gap();
-  result.distance = unit * gap;
   result.distance_min = unit * std::max(0.0, descent.cover() - kernel_error - world_error);
+  if (settings.max_distance > 0 && result.distance_min > settings.max_distance)
+    return farther_than(settings.max_distance);
+  result.distance = unit * gap;
   result.distance_max = unit * (gap + world_error);
   const Eigen::Vector3d axis = (descent.centre_b() - descent.centre_a()).normalized();
   result.point_a = pose->to_world(descent.centre_a() + descent.radius_a() * axis);

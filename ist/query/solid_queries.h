@@ -15,8 +15,11 @@ Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
 Penetration find_penetration(const PlacedField& a, const PlacedTree& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
+/// `enough`: once the distance is known to be no more than this [u], distance_max is all that is
+/// asked for.
 Separation find_separation(const PlacedTree& a, const PlacedTree& b,
-                           const SeparationSettings& settings, Workspace& workspace) noexcept;
+                           const SeparationSettings& settings, Workspace& workspace,
+                           double enough = 0) noexcept;
 Separation find_separation(const PlacedField& a, const PlacedTree& b,
                            const SeparationSettings& settings, Workspace& workspace) noexcept;
 

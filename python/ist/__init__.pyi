@@ -396,7 +396,8 @@ def penetration(
 def separation(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None, max_visits: int = 0,
-    inner_spheres: bool | None = None, threads: int = 0, wanted: Sequence[str] | None = None,
+    inner_spheres: bool | None = None, max_distance: float = 0.0, pair_id: int = 0,
+    threads: int = 0, wanted: Sequence[str] | None = None,
     out: Any = None, stream: Any = None,
 ) -> Separation: ...  # of solids on a GPU gpu.Separation
 def raycast(
@@ -423,7 +424,8 @@ def overlap_outline(
 ) -> OverlapOutline: ...
 def overlap(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: ArrayLike | None = None,
-    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, threads: int = 0,
+    poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, margin: float = 0.0,
+    threads: int = 0,
 ) -> _Count: ...  # (n,) of Overlapping; one for one pose
 def time_of_impact(
     a: _Solid, b: _Solid, poses: ArrayLike, poses_to: ArrayLike, *,

@@ -120,13 +120,14 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
   return answer;
 }
 
-py::object overlaps(const Rows& rows, unsigned threads) {
+py::object overlaps(const Rows& rows, double margin, unsigned threads) {
   const Column<std::uint32_t> answers(rows.shape());
   if (rows.shape().empty() && !fault_of(rows.at(0)).empty())
     refuse_unanswered(rows, QueryStatus::invalid_input);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    answers.write(i, overlap(row.a.placed(), row.b.placed(), workspace));
+    answers.write(i, margin > 0 ? overlap(row.a.placed(), row.b.placed(), margin, workspace)
+                                : overlap(row.a.placed(), row.b.placed(), workspace));
   });
   return answers.handed_out();
 }
@@ -136,8 +137,14 @@ constexpr const char* kSeparationDoc =
 
 If both assets keep a mesh, the distance of their surfaces. Otherwise, or with inner_spheres=True,
 that of their inner spheres. Arguments as for penetration(). max_visits: 0: no limit.
+max_distance: [u] of solids that are certain to be farther apart the answer says no more, and takes
+    little time: distance and distance_min are max_distance, distance_max is inf, points and normal are
+    NaN, the status is ok. 0: no limit.
+pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps of
+    one motion: between surfaces the nearest triangles are kept from step to step. Same answers.
 
-Solids on a GPU: of two Assets; a row of a Field is not_held. The distance is always that of the inner
+Solids on a GPU: of two Assets; a row of a Field is not_held, and max_distance raises. The CPU's default
+is another distance, that of the surfaces. On a GPU it is always that of the inner
 spheres, so inner_spheres=False raises: the minimum over all pairs in double. The CPU's may be larger by
 1e-6 of the solids' size, and among equally near pairs the two may differ. A stopped row's interval may
 differ from the CPU's.
@@ -167,6 +174,8 @@ contact.penetration.status reports that.)";
 constexpr const char* kOverlapDoc = R"(Whether solids share a point. Yes and no are certified.
 
 Arguments as for penetration(). Costs a fraction of a penetration query.
+margin: [u] whether they come within this of each other: by their surfaces, if both Assets keep a mesh.
+    0: whether inner spheres meet, or no covers do.
 
 Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown, also for invalid rows; a number for one
 pose.)";
@@ -234,12 +243,13 @@ void add_separation(py::module_& module) {
   add_pair_query(
       module, "separation",
       +[](const GivenPair& pair, std::uint32_t max_visits, std::optional<bool> inner_spheres,
-          unsigned threads, const py::object& wanted, const py::object& out,
-          const py::object& stream) -> py::object {
+          double max_distance, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
+          const py::object& out, const py::object& stream) -> py::object {
         const GivenOutput given{wanted, out, stream};
         if (const DeviceSides sides = device_sides(pair.a, pair.b); sides.solids != nullptr) {
           refuse_given("False; on a GPU distances are those of inner spheres",
                        {{"inner_spheres", !inner_spheres.value_or(true)}});
+          refuse_given("not on a GPU", {{"max_distance", max_distance != 0}});
           return ask<GpuSeparations>(
               sides, pair, given, {},
               [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
@@ -248,10 +258,14 @@ void add_separation(py::module_& module) {
               });
         }
         refuse_output(given);
-        return py::cast(
-            separations(pair.rows(), {max_visits, inner_spheres.value_or(false)}, threads));
+        if (!(max_distance >= 0))
+          throw value_error("max_distance: " + std::to_string(max_distance) + "; wanted 0 or more");
+        return py::cast(separations(
+            pair.rows(), {max_visits, inner_spheres.value_or(false), max_distance, pair_id},
+            threads));
       },
-      py::arg("max_visits") = 0, py::arg("inner_spheres") = py::none(), py::arg("threads") = 0,
+      py::arg("max_visits") = 0, py::arg("inner_spheres") = py::none(),
+      py::arg("max_distance") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
       py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
       kSeparationDoc);
   add_pair_query(
@@ -306,8 +320,12 @@ void add_separation(py::module_& module) {
       kOutlineDoc);
   add_pair_query(
       module, "overlap",
-      +[](const GivenPair& pair, unsigned threads) { return overlaps(pair.rows(), threads); },
-      py::arg("threads") = 0, kOverlapDoc);
+      +[](const GivenPair& pair, double margin, unsigned threads) {
+        if (!(margin >= 0))
+          throw value_error("margin: " + std::to_string(margin) + "; wanted 0 or more");
+        return overlaps(pair.rows(), margin, threads);
+      },
+      py::arg("margin") = 0.0, py::arg("threads") = 0, kOverlapDoc);
 }
 
 void add_gpu_separation(py::module_& module) {

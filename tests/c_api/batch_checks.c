@@ -92,6 +92,30 @@ static int patch_batches_answer(scene_t* s, const ist_pair_t* pairs, const ist_p
   return 0;
 }
 
+/* Distances up to a limit: as single ones, near and far. */
+static int gap_batches_answer(scene_t* s, const ist_pair_t* pairs, ist_workspace_t* workspaces) {
+  static ist_separation_t gaps[PAIRS];
+  ist_separation_t one = {.size = sizeof one};
+  ist_separation_settings_t settings = {.size = sizeof settings, .max_distance = 1e-3};
+  const size_t size = sizeof one;
+  size_t i;
+  memset(gaps, 0xcd, sizeof gaps); /* nothing of it is read */
+  CHECK(ist_separation_batch(pairs, PAIRS, &settings, workspaces, 3, gaps, size, NULL) == IST_OK);
+  for (i = 0; i < PAIRS; ++i) {
+    ist_separation(pairs[i].a, pairs[i].b, &settings, &s->workspace, &one);
+    CHECK(memcmp(&one, &gaps[i], size) == 0);
+    CHECK((one.status == IST_NULL_POINTER) == (i == 7));
+  }
+  CHECK(gaps[0].distance == 0);
+  CHECK(ist_separation_batch(pairs, PAIRS, NULL, NULL, 0, gaps, size, NULL) == IST_OK);
+  CHECK(gaps[0].status == IST_BUDGET_EXHAUSTED && isinf(gaps[0].distance_max));
+  CHECK(ist_separation_batch(NULL, PAIRS, NULL, workspaces, 3, gaps, size, NULL) ==
+        IST_NULL_POINTER);
+  CHECK(ist_separation_batch(pairs, PAIRS, NULL, workspaces, 3, gaps, size - 8, NULL) ==
+        IST_WRONG_SIZE);
+  return 0;
+}
+
 int batches_answer(scene_t* s) {
   ist_placed_t placed[PAIRS];
   ist_pair_t pairs[PAIRS];
@@ -115,6 +139,7 @@ int batches_answer(scene_t* s) {
     field_pairs[i].a = &ball;
     pairs[i].b = field_pairs[i].b = i == 7 ? NULL : &placed[i];
   }
+  CHECK(gap_batches_answer(s, pairs, workspaces) == 0);
   memset(answers, 0xcd, sizeof answers); /* nothing of it is read */
   CHECK(ist_penetration_batch(pairs, PAIRS, NULL, workspaces, 3, answers, size, &parallel) ==
         IST_OK);

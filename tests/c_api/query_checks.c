@@ -153,6 +153,27 @@ int separations_answer(scene_t* s) {
   CHECK(memcmp(&gap, &separation, sizeof gap) == 0);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &lone) == IST_OK);
   CHECK(memcmp(&lone, &penetration, sizeof lone) == 0);
+  {
+    ist_overlapping_t within = IST_OVERLAP_UNKNOWN;
+    const double distance = gap.distance;
+    settings.max_distance = 0.9 * distance;
+    settings.pair_id = 5;
+    CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &separation) == IST_OK);
+    CHECK(separation.distance == settings.max_distance && isinf(separation.distance_max));
+    CHECK(isnan(separation.normal[0]) && separation.distance_min == settings.max_distance);
+    settings.max_distance = 1.1 * distance;
+    CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &separation) == IST_OK);
+    CHECK(separation.distance == distance && separation.point_b[0] == gap.point_b[0]);
+    settings.max_distance = 0;
+    settings.pair_id = 0;
+    CHECK(ist_overlap_within(&s->a, &s->b, 2 * distance, &s->workspace, &within) == IST_OK);
+    CHECK(within == IST_OVERLAP_YES);
+    CHECK(ist_overlap_within(&s->a, &s->b, 0.5 * distance, &s->workspace, &within) == IST_OK);
+    CHECK(within == IST_OVERLAP_NO);
+    CHECK(ist_overlap_within(&s->a, &s->b, -1, &s->workspace, &within) == IST_INVALID_INPUT);
+    CHECK(within == IST_OVERLAP_UNKNOWN);
+    CHECK(ist_overlap_within(&s->a, NULL, 1, &s->workspace, &within) == IST_NULL_POINTER);
+  }
   settings.max_visits = 1;
   CHECK(ist_separation(&s->a, &s->b, &settings, &s->workspace, &gap) == IST_BUDGET_EXHAUSTED);
   CHECK(ist_query(&s->a, &s->b, NULL, &settings, &s->workspace, &penetration, &separation) ==

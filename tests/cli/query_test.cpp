@@ -138,6 +138,20 @@ TEST_F(QueryCommand, ABudgetIsNamedInTheStatus) {
   EXPECT_NE(all[0].find(",budget_exhausted,"), std::string::npos) << all[0];
 }
 
+TEST_F(QueryCommand, DistancesEndAtTheLargestThatMatters) {
+  const std::vector<double> farther = row("1,0,0,0,3,0,0", {"--max-distance", "0.25"});
+  EXPECT_EQ(farther[distance], 0.25);
+  EXPECT_EQ(farther[distance_min], 0.25);
+  EXPECT_TRUE(std::isinf(farther[distance_max]));
+  const std::vector<double> near = row("1,0,0,0,3,0,0", {"--max-distance", "2.5"});
+  EXPECT_EQ(near[distance], row("1,0,0,0,3,0,0")[distance]);
+  const Outcome text = ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,3,0,0",
+                            "--max-distance", "0.25"});
+  EXPECT_NE(text.out.find("> 0.25 u"), std::string::npos) << text.out;
+  expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,3,0,0", "--max-distance", "-1"},
+              "--max-distance");
+}
+
 TEST_F(QueryCommand, APairBudgetTakesACoarserLevel) {
   ASSERT_EQ(ist({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000"}).exit_code, 0);
   const auto row = [&](const char* budget) {

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <ist/overlap.h>
 #include <ist/surface.h>
 
 #include <cmath>
@@ -364,6 +365,124 @@ TEST(Surface, SeparationMatchesAllPairsOfTriangles) {
     }
   EXPECT_GT(apart, 15);
   EXPECT_GT(meet, 15);
+}
+
+/// The bits of two answers: all but the counts.
+void expect_same_gap(const Separation& got, const Separation& want, int step) {
+  EXPECT_EQ(got.distance, want.distance) << step;
+  EXPECT_EQ(got.distance_min, want.distance_min) << step;
+  EXPECT_EQ(got.distance_max, want.distance_max) << step;
+  EXPECT_EQ(got.point_a, want.point_a) << step;
+  EXPECT_EQ(got.point_b, want.point_b) << step;
+  EXPECT_EQ(got.normal, want.normal) << step;
+  EXPECT_EQ(got.status, want.status) << step;
+}
+
+std::vector<Body> small_bodies() {
+  std::vector<Body> out;
+  out.emplace_back(testing::box_mesh({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}));
+  out.emplace_back(testing::box_mesh({-0.5, -0.25, -1e-3}, {0.5, 0.25, 1e-3}));
+  out.emplace_back(testing::box_mesh({-0.5, -1e-6, -0.25}, {0.5, 1e-6, 0.25}));
+  out.emplace_back(testing::joined(
+      testing::box_mesh({-1, -1, -1}, {1, 1, 1}),
+      testing::inverted(testing::box_mesh({-0.75, -0.75, -0.75}, {0.75, 0.75, 0.75}))));
+  out.emplace_back(testing::icosphere_mesh(1));
+  return out;
+}
+
+/// Lattice poses, in which faces are flush and edges touch, as often as any; far from the origin
+/// too. A distance that is asked for up to a limit has the same bits, or is farther.
+TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
+  std::mt19937_64 random(54);
+  std::uniform_int_distribution<int> quarter(-6, 6), turn(0, 3), axis(0, 2);
+  Workspace workspace;
+  const std::vector<Body> solids = small_bodies();
+  int apart = 0, meet = 0, touch = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const Body &of_a = solids[random() % solids.size()], &of_b = solids[random() % solids.size()];
+    Pose pose = testing::random_pose(random, 1.2);
+    if (i % 2 == 0) {
+      const double half = 0.25 * 3.14159265358979323846 * turn(random);
+      pose = {{std::cos(half), 0, 0, 0}, {}};
+      pose.q[1 + axis(random)] = std::sin(half);
+      for (double& t : pose.t) t = 0.25 * quarter(random);
+    }
+    const double scale = i % 5 == 0 ? 0.125 : 1;
+    const PlacedTree a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, scale};
+    exact::NearestPair least;
+    for (const exact::FlatTriangle& x : of_a.triangles(a))
+      for (const exact::FlatTriangle& y : of_b.triangles(b)) {
+        for (int k = 0; k < 3; ++k) {
+          least.take(x.corner[k], nearest_on_triangle(x.corner[k], y));
+          least.take(nearest_on_triangle(y.corner[k], x), y.corner[k]);
+        }
+        take_nearest(x, y, {}, {}, least);
+      }
+    const bool overlap = testing::exactly(a, b, workspace).volume > 1e-14;
+    const double want = overlap ? 0 : std::sqrt(least.squared);
+    const Separation got = separation(a, b, {}, workspace);
+    ASSERT_EQ(got.status, QueryStatus::ok);
+    EXPECT_NEAR(got.distance, want, 1e-13) << i;
+    EXPECT_LE(got.distance_min, want) << i;
+    EXPECT_GE(got.distance_max, want - 1e-13 * (want < 1e-12)) << i;
+    (overlap ? meet : want < 1e-12 ? touch : apart) += 1;
+    if (want < 1e-12) continue;
+    EXPECT_NEAR(nearest(of_a.triangles(a), got.point_a), 0, 1e-13) << i;
+    EXPECT_NEAR(nearest(of_b.triangles(b), got.point_b), 0, 1e-13) << i;
+    EXPECT_NEAR(separation(b, a, {}, workspace).distance, got.distance, 1e-13) << i;
+    for (const double part : {0.01, 0.5, 1 - 1e-9, 1 + 1e-9, 3.0}) {
+      const Separation up_to = separation(a, b, {.max_distance = part * want}, workspace);
+      const Overlapping within = ist::overlap(a, b, part * want, workspace);
+      if (part > 1) {
+        expect_same_gap(up_to, got, i);
+        EXPECT_EQ(within, Overlapping::yes) << i << ' ' << part;
+        continue;
+      }
+      EXPECT_EQ(up_to.status, QueryStatus::ok);
+      EXPECT_EQ(up_to.distance, part * want) << i;
+      EXPECT_EQ(up_to.distance_min, part * want) << i;
+      EXPECT_TRUE(std::isinf(up_to.distance_max)) << i;
+      EXPECT_TRUE(std::isnan(up_to.normal[0]) && std::isnan(up_to.point_a[1])) << i;
+      EXPECT_EQ(within, Overlapping::no) << i << ' ' << part;
+    }
+  }
+  EXPECT_GT(apart, 500);
+  EXPECT_GT(meet, 100);
+  EXPECT_GT(touch, 25);
+}
+
+/// What is kept of a pair changes no bit, whatever way the motion goes.
+TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
+  std::mt19937_64 random(55);
+  Workspace kept, scratch;
+  const std::vector<Body> solids = bodies();
+  int fewer = 0, steps = 0;
+  for (std::size_t s = 0; s < solids.size(); ++s)
+    for (const double step : {1e-7, 1e-3, 0.05}) {
+      const Body &of_a = solids[s], &of_b = solids[(s + 1) % solids.size()];
+      Pose pose = testing::random_pose(random, 1.5);
+      std::uniform_real_distribution<double> any(-step, step);
+      const auto id = static_cast<std::uint32_t>(1 + s);
+      for (int i = 0; i < 60; ++i) {
+        for (double& t : pose.t) t += any(random) - 0.2 * step * (t > 0 ? 1 : -1);
+        for (double& q : pose.q) q += 0.3 * any(random);
+        if (i % 20 == 19) pose = testing::random_pose(random, 1.2);
+        const PlacedTree a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, 0.7};
+        const double most = i % 7 == 3 ? 0.2 : 0;
+        const Separation want = separation(a, b, {.max_distance = most}, scratch);
+        const Separation got = separation(a, b, {.max_distance = most, .pair_id = id}, kept);
+        if (std::isnan(want.normal[0])) {
+          EXPECT_EQ(got.distance, want.distance);
+          EXPECT_TRUE(std::isinf(got.distance_max));
+          continue;
+        }
+        expect_same_gap(got, want, i);
+        fewer += got.node_visits + 1 < want.node_visits;
+        ++steps;
+      }
+    }
+  EXPECT_GT(fewer, 80);
+  EXPECT_GT(steps, 800);
 }
 
 /// A ball in a cavity that is nearly as far away everywhere, so that most pairs of nodes wait.

@@ -22,6 +22,25 @@ def test_boxes_overlap_by_their_volume(cube):
     assert found.status == ist.QueryStatus.ok
 
 
+def test_distances_up_to_a_limit(gear, knot, random_poses):
+    poses = random_poses(64, 3)
+    gaps = ist.separation(gear, knot, poses)
+    limit = float(np.median(gaps.distance[gaps.distance > 0]))
+    found = ist.separation(gear, knot, poses, max_distance=limit, pair_id=3)
+    farther = np.isinf(found.distance_max)
+    assert np.array_equal(farther, gaps.distance > limit) and farther.any()
+    assert (found.distance[farther] == limit).all() and np.isnan(found.normal[farther]).all()
+    assert np.array_equal(found.point_a[~farther], gaps.point_a[~farther])
+    assert (found.status == ist.QueryStatus.ok).all()
+    within = ist.overlap(gear, knot, poses, margin=limit * (1 + 1e-9))
+    assert np.array_equal(within == ist.Overlapping.yes, gaps.distance <= limit)
+    assert (within != ist.Overlapping.unknown).all()
+    for call in (lambda: ist.separation(gear, knot, poses, max_distance=-1),
+                 lambda: ist.overlap(gear, knot, poses, margin=float("nan"))):
+        with pytest.raises(ValueError, match="wanted 0 or more"):
+            call()
+
+
 def test_a_batch_is_its_single_queries(gear, knot, random_poses):
     poses = random_poses(64, 3)
     many = ist.penetration(gear, knot, poses, scale_gradients=True)

@@ -6,7 +6,7 @@ namespace ist::testing {
 
 /// The same limits for a separation.
 inline SeparationSettings for_separation(const PenetrationSettings& s) {
-  return {s.max_visits, false};
+  return {s.max_visits, false, 0, s.pair_id};
 }
 
 /// The same limits for both halves of query().

@@ -54,5 +54,11 @@ inline Penetration unknown_penetration() noexcept {
   unknown.status = QueryStatus::budget_exhausted;
   return unknown;
 }
+inline Separation unknown_separation() noexcept {
+  Separation unknown;
+  unknown.distance = unknown.distance_max = std::numeric_limits<double>::infinity();
+  unknown.status = QueryStatus::budget_exhausted;
+  return unknown;
+}
 
 }  // namespace ist

@@ -50,6 +50,7 @@ class Budget {
     return true;
   }
 
+  bool limited() const noexcept { return most_ != DescentLimits::kNoLimit; }
   std::uint32_t left() const noexcept { return most_ - visits_; }
   std::uint32_t visits() const noexcept { return visits_; }
 

@@ -60,4 +60,12 @@ Answer invalid_input() noexcept {
   return no_answer<Answer>(QueryStatus::invalid_input);
 }
 
+/// Of solids that are certain to be farther apart than the caller cares for.
+inline Separation farther_than(double most) noexcept {
+  Separation result = no_answer<Separation>(QueryStatus::ok);
+  result.distance = result.distance_min = most;
+  result.distance_max = std::numeric_limits<double>::infinity();
+  return result;
+}
+
 }  // namespace ist

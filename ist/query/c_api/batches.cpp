@@ -21,20 +21,20 @@ struct Staff {
   }
 };
 
-/// answers[i] by ask(i, workspace), or what nobody was there to find out. `Settings`: of C++, for
-/// what was `given`.
-template <class Settings, class Given, class Ask>
+/// answers[i] by ask(i, workspace), or `unknown` where nobody was there to find out. `Settings`: of
+/// C++, for what was `given`.
+template <class Settings, class Given, class Answer, class Unknown, class Ask>
 ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& staff,
-                          ist_penetration_t* answers, std::size_t answer_size,
+                          Answer* answers, std::size_t answer_size, const Unknown& unknown,
                           const Ask& ask) noexcept {
   if (count > 0 && answers == nullptr) return IST_NULL_POINTER;
-  if (answer_size != sizeof(ist_penetration_t)) return IST_WRONG_SIZE;
+  if (answer_size != sizeof(Answer)) return IST_WRONG_SIZE;
   Settings settings;
   ist_status_t status = read(given, settings);
   if (status == IST_OK) status = staff.check();
   if (status != IST_OK) return status;
   if (staff.workers == 0) {
-    for (std::size_t i = 0; i < count; ++i) write(unknown_penetration(), answers[i]);
+    for (std::size_t i = 0; i < count; ++i) write(unknown, answers[i]);
     return IST_OK;
   }
   const ParallelFor threads = staff.parallel == nullptr
@@ -61,8 +61,21 @@ ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
   if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
   return answer_pairs<ist::PenetrationSettings>(
       count, settings, {workspaces, workers, parallel}, answers, answer_size,
-      [&](std::size_t i, ist_workspace_t* scratch) {
+      ist::unknown_penetration(), [&](std::size_t i, ist_workspace_t* scratch) {
         ist_penetration(pairs[i].a, pairs[i].b, settings, scratch, answers + i);
+      });
+}
+
+ist_status_t ist_separation_batch(const ist_pair_t* pairs, std::size_t count,
+                                  const ist_separation_settings_t* settings,
+                                  ist_workspace_t* workspaces, std::size_t workers,
+                                  ist_separation_t* answers, std::size_t answer_size,
+                                  const ist_parallel_t* parallel) {
+  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
+  return answer_pairs<ist::SeparationSettings>(
+      count, settings, {workspaces, workers, parallel}, answers, answer_size,
+      ist::unknown_separation(), [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_separation(pairs[i].a, pairs[i].b, settings, scratch, answers + i);
       });
 }
 
@@ -80,7 +93,7 @@ ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t coun
   }
   return answer_pairs<ist::ContactSettings>(
       count, settings, {workspaces, workers, parallel}, wholes, whole_size,
-      [&](std::size_t i, ist_workspace_t* scratch) {
+      ist::unknown_penetration(), [&](std::size_t i, ist_workspace_t* scratch) {
         ist_contact_patches(pairs[i].a, pairs[i].b, settings, scratch, patches + i, wholes + i);
       });
 }

@@ -54,6 +54,19 @@ ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
   return status;
 }
 
+/// `ask(a, b, workspace)` answers an Overlapping.
+template <class Ask>
+ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
+                          ist_overlapping_t* answer, const Ask& ask) noexcept {
+  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(Overlapping::unknown));
+  if (answer == nullptr) return IST_NULL_POINTER;
+  *answer = IST_OVERLAP_UNKNOWN;
+  return ask_about<PlacedSolid>(a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
+    *answer = static_cast<ist_overlapping_t>(ask(x, y, scratch));
+    return ist_status_t{IST_OK};
+  });
+}
+
 /// Empties the outline.
 ist_status_t check_room(ist_outline_t* given) noexcept {
   const ist_status_t status = check_size(given);
@@ -99,14 +112,18 @@ ist_status_t ist_separation(const ist_placed_t* a, const ist_placed_t* b,
 
 ist_status_t ist_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                          ist_overlapping_t* answer) {
-  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(ist::Overlapping::unknown));
-  if (answer == nullptr) return IST_NULL_POINTER;
-  *answer = IST_OVERLAP_UNKNOWN;
-  return ask_about<ist::PlacedSolid>(
-      a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
-        *answer = static_cast<ist_overlapping_t>(ist::overlap(x, y, scratch));
-        return ist_status_t{IST_OK};
+  return find_overlap(a, b, workspace, answer, [](const auto& x, const auto& y, auto& scratch) {
+    return ist::overlap(x, y, scratch);
+  });
+}
+
+ist_status_t ist_overlap_within(const ist_placed_t* a, const ist_placed_t* b, double margin,
+                                ist_workspace_t* workspace, ist_overlapping_t* answer) {
+  const ist_status_t status =
+      find_overlap(a, b, workspace, answer, [&](const auto& x, const auto& y, auto& scratch) {
+        return ist::overlap(x, y, margin, scratch);
       });
+  return status == IST_OK && !(margin >= 0) ? IST_INVALID_INPUT : status;
 }
 
 ist_status_t ist_query(const ist_placed_t* a, const ist_placed_t* b,

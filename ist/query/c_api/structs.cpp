@@ -21,6 +21,8 @@ ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& se
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
   settings.max_visits = given->max_visits;
   settings.inner_spheres = given->inner_spheres != 0;
+  settings.max_distance = given->max_distance;
+  settings.pair_id = given->pair_id;
   return IST_OK;
 }
 

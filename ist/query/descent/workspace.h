@@ -26,6 +26,7 @@ struct WaitingPair {
   double cover;  ///< likewise no cover balls
   std::uint32_t a, b;
   std::int32_t level_a, level_b;
+  double order = 0;  ///< of two that wait the lesser one comes first
 };
 
 /// List of node pairs, one block index a side.

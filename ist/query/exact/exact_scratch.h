@@ -288,6 +288,7 @@ struct ExactScratch {
         gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
         crossings(most_crossings, hooks),
         kept(most_pairs(), hooks),
+        near(most_crossings, hooks),
         keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
         other_keys(hooked_array<std::uint64_t>(hooks, most_pairs())),
         flood(hooked_array<std::uint32_t>(hooks, most_blocks)),
@@ -342,7 +343,8 @@ struct ExactScratch {
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
   Crossings crossings;
-  KeptRing kept;
+  KeptRing kept;  ///< that may cross
+  KeptRing near;  ///< that may be the nearest
   HookedArray<std::uint64_t> keys, other_keys;
   HookedArray<std::uint32_t> flood;
   // Of parts:

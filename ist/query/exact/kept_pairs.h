@@ -12,6 +12,8 @@ namespace ist {
 /// The pairs of triangles of two solids that may cross, or be near, while no point of B has moved
 /// by more than `margin` against A.
 struct KeptPairs {
+  static constexpr std::uint64_t kNone = ~std::uint64_t{0};
+
   std::uint64_t mesh[2];    ///< hashes of the assets
   Similarity last;          ///< B in A at the last query
   double step;              ///< how far it had moved since the one before
@@ -22,6 +24,7 @@ struct KeptPairs {
   double room;              ///< of the search that found them
   std::uint64_t first;      ///< in the ring
   std::uint32_t count;
+  std::uint64_t nearest = kNone;  ///< of distances: the pair that the last query found
 };
 
 /// What exact queries keep from call to call: pairs of triangles of many pairs of solids. The

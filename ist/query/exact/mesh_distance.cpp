@@ -1,284 +1,232 @@
 #include "query/exact/mesh_distance.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/exact/mesh_distance.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/exact/box_gaps-inl.h"
 #include "query/exact/crossing.h"
 #include "query/exact/mesh_queries.h"
-#include "query/exact/nearest_points.h"
+#include "query/exact/placed_mesh-inl.h"
+#include "query/exact/triangle_gaps-inl.h"
 
-namespace ist {
-namespace {
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
 
-using exact::Point;
+/// The nearest two triangles so far; of those that are as near, to rounding, the ones of the lowest
+/// numbers.
+struct NearestTriangles {
+  double rounding;                            ///< of a distance
+  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to there all is as near as the least
+  double squared = HUGE_VAL;
+  std::uint64_t pair = KeptPairs::kNone;  ///< A's << 32 | B's
+  exact::Point on_a = {}, between = {};   ///< from there to B's
 
-/// What is no nearer than the best by more than this, relative, need not be looked at.
-constexpr double kNearer = 1 - 1e-13;
-
-/// A box by its middle and its slab, in its own frame.
-struct MiddleBox {
-  double middle[3], half[3];
-  double normal[3] = {}, slab_low = 0, slab_high = 0;
-
-  double size() const noexcept { return std::max({half[0], half[1], half[2]}); }
-};
-
-MiddleBox box_of(const BoxBlock& boxes, std::uint32_t l) noexcept {
-  MiddleBox box;
-  for (int k = 0; k < 3; ++k) {
-    box.middle[k] = 0.5 * (double{boxes.low[k][l]} + boxes.high[k][l]);
-    box.half[k] = 0.5 * (double{boxes.high[k][l]} - boxes.low[k][l]);
-    box.normal[k] = boxes.normal[k][l];
-  }
-  box.slab_low = boxes.slab_low[l], box.slab_high = boxes.slab_high[l];
-  return box;
-}
-
-/// The box of a node: a lane of the block above, or that of the whole mesh, which has no slab.
-MiddleBox box_of(const MeshTree& mesh, int level, std::uint32_t i) noexcept {
-  if (level < mesh.top) return box_of(mesh.level[level + 1].boxes[i / kWidth], i % kWidth);
-  MiddleBox all;
-  const BoxBlock& root = mesh.level[mesh.top].boxes[0];
-  const std::uint32_t used = mesh.level[mesh.top - 1].count;
-  for (int k = 0; k < 3; ++k) {
-    const double low = *std::min_element(root.low[k], root.low[k] + used);
-    const double high = *std::max_element(root.high[k], root.high[k] + used);
-    all.middle[k] = 0.5 * (low + high);
-    all.half[k] = 0.5 * (high - low);
-  }
-  return all;
-}
-
-/// Squared distances of sixteen boxes from one of another frame, or less: along their own axes,
-/// along its axes, along the normals of all slabs, and along the unit vector `toward` it.
-void gaps_of(const BoxBlock& boxes, const MiddleBox& one, const Similarity& map,
-             const double (&toward)[3], double (&squared)[kWidth]) noexcept {
-  double middle[3], hull[3], axis[3][3], reach[3], normal[3];
-  map.apply(one.middle, middle);
-  for (int i = 0; i < 3; ++i) {
-    hull[i] = (std::abs(map.m[3 * i]) * one.half[0] + std::abs(map.m[3 * i + 1]) * one.half[1]) +
-              std::abs(map.m[3 * i + 2]) * one.half[2];
-    for (int k = 0; k < 3; ++k) axis[k][i] = map.m[3 * i + k] / map.scale;
-    reach[i] = map.scale * one.half[i];
-  }
-  for (int i = 0; i < 3; ++i)
-    normal[i] =
-        (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) + axis[2][i] * one.normal[2];
-  // Its slab from its middle; all below is told from there.
-  const double before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
-                        one.normal[2] * one.middle[2];
-  const double low = map.scale * (one.slab_low - before),
-               high = map.scale * (one.slab_high - before);
-  // How far it reaches back along `toward`.
-  const double turned = (toward[0] * normal[0] + toward[1] * normal[1]) + toward[2] * normal[2];
-  double by_box = 0, by_slab = std::min(turned * low, turned * high);
-  for (int k = 0; k < 3; ++k) {
-    const double x = toward[0] * axis[k][0] + toward[1] * axis[k][1] + toward[2] * axis[k][2];
-    by_box -= reach[k] * std::abs(x);
-    by_slab -= reach[k] * std::abs(x - turned * one.normal[k]);
-  }
-  const double nearest = std::max(by_box, by_slab);
-  double away[3][kWidth], half[3][kWidth], along[kWidth] = {}, across[kWidth] = {};
-  for (int i = 0; i < 3; ++i)
-    for (std::uint32_t l = 0; l < kWidth; ++l) {
-      away[i][l] = 0.5 * (double{boxes.low[i][l]} + boxes.high[i][l]) - middle[i];
-      half[i][l] = 0.5 * (double{boxes.high[i][l]} - boxes.low[i][l]);
-      const double gap = std::max(0.0, std::abs(away[i][l]) - (half[i][l] + hull[i]));
-      along[l] += gap * gap;
+  void take(const PairGaps& gaps, std::uint32_t n, std::uint64_t name) {
+    const double found = gaps.squared[n];
+    if (found < least) {
+      least = found;
+      alike = (std::sqrt(least) + rounding) * (std::sqrt(least) + rounding);
     }
-  for (int k = 0; k < 3; ++k)
-    for (std::uint32_t l = 0; l < kWidth; ++l) {
-      const double* const u = axis[k];
-      const double between = (u[0] * away[0][l] + u[1] * away[1][l]) + u[2] * away[2][l];
-      const double width =
-          (std::abs(u[0]) * half[0][l] + std::abs(u[1]) * half[1][l]) + std::abs(u[2]) * half[2][l];
-      const double gap = std::max(0.0, std::abs(between) - (width + reach[k]));
-      across[l] += gap * gap;
-    }
-  for (std::uint32_t l = 0; l < kWidth; ++l) {
-    const double n[3] = {boxes.normal[0][l], boxes.normal[1][l], boxes.normal[2][l]};
-    // n is `turn` times the other normal and a rest, by which only boxes are known.
-    const double turn = (n[0] * normal[0] + n[1] * normal[1]) + n[2] * normal[2];
-    const double steep = (n[0] * toward[0] + n[1] * toward[1]) + n[2] * toward[2];
-    double rest[3], other_rest[3], at_middle = 0, at_box = 0, other_at_box = 0, to_box = 0;
-    double ahead = 0, ahead_of_slab = 0;
-    for (int i = 0; i < 3; ++i) {
-      ahead += toward[i] * away[i][l] + std::abs(toward[i]) * half[i][l];
-      const double beside = toward[i] - steep * n[i];
-      ahead_of_slab += beside * away[i][l] + std::abs(beside) * half[i][l];
-      rest[i] = n[i] - turn * normal[i];
-      other_rest[i] = normal[i] - turn * n[i];
-      at_middle += n[i] * middle[i];
-      other_at_box += std::abs(other_rest[i]) * half[i][l];
-      to_box += other_rest[i] * away[i][l];
-    }
-    for (int k = 0; k < 3; ++k)
-      at_box +=
-          reach[k] * std::abs((axis[k][0] * rest[0] + axis[k][1] * rest[1]) + axis[k][2] * rest[2]);
-    // Along n, from the one's middle: it, and the lane's slab.
-    const double slab_low = boxes.slab_low[l] - at_middle,
-                 slab_high = boxes.slab_high[l] - at_middle;
-    const double gap = std::max(slab_low - (std::max(turn * low, turn * high) + at_box),
-                                (std::min(turn * low, turn * high) - at_box) - slab_high);
-    const double most = to_box + std::max(turn * slab_low, turn * slab_high) + other_at_box;
-    const double least = to_box + std::min(turn * slab_low, turn * slab_high) - other_at_box;
-    const double other_gap = std::max(low - most, least - high);
-    constexpr double kLength = 1 - 1e-5;  // of normals, or more
-    const double slabs = kLength * std::max({0.0, gap, other_gap});
-    ahead_of_slab += std::max(steep * slab_low, steep * slab_high);
-    const double ahead_gap = std::max(0.0, nearest - std::min(ahead, ahead_of_slab));
-    squared[l] = std::max({along[l], across[l], slabs * slabs, ahead_gap * ahead_gap});
-  }
-}
-
-/// A block's triangles in A's unit frame.
-struct PlacedBlock {
-  std::uint32_t number = ~0u;
-  const MeshBlock* block;
-  double vertex[3][kWidth];
-  double low[3][kWidth], high[3][kWidth];  ///< of triangles; of unused lanes those of the first
-  double all_low[3], all_high[3];
-
-  void place(const MeshTree& mesh, std::uint32_t i, const Similarity* map) noexcept {
-    if (number == i) return;
-    number = i;
-    block = &mesh.blocks[i];
-    for (std::uint32_t v = 0; v < kWidth; ++v) {
-      Point x = mesh.vertex(block->vertex[v]);
-      if (map != nullptr) x = map_point(*map, x);
-      vertex[0][v] = x.x, vertex[1][v] = x.y, vertex[2][v] = x.z;
-    }
-    for (int k = 0; k < 3; ++k) {
-      for (std::uint32_t t = 0; t < kWidth; ++t) {
-        const std::uint32_t lane = t < block->triangles ? t : 0;
-        const double x = vertex[k][block->corner[0][lane]], y = vertex[k][block->corner[1][lane]],
-                     z = vertex[k][block->corner[2][lane]];
-        low[k][t] = std::min(x, std::min(y, z));
-        high[k][t] = std::max(x, std::max(y, z));
-      }
-      all_low[k] = *std::min_element(vertex[k], vertex[k] + kWidth);
-      all_high[k] = *std::max_element(vertex[k], vertex[k] + kWidth);
-    }
-  }
-  void look_along(const Point& w, double (&along)[kWidth]) const noexcept {
-    for (std::uint32_t v = 0; v < kWidth; ++v)
-      along[v] = (w.x * vertex[0][v] + w.y * vertex[1][v]) + w.z * vertex[2][v];
-  }
-  Point at(std::uint32_t v) const noexcept { return {vertex[0][v], vertex[1][v], vertex[2][v]}; }
-  exact::FlatTriangle triangle(std::uint32_t t) const noexcept {
-    return exact::FlatTriangle(at(block->corner[0][t]), at(block->corner[1][t]),
-                               at(block->corner[2][t]));
+    if (!(found <= alike) || (squared <= alike && pair < name)) return;
+    squared = found;
+    pair = name;
+    on_a = {gaps.on_a[0][n], gaps.on_a[1][n], gaps.on_a[2][n]};
+    between = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
   }
 };
 
-double squared_gap(const double* low, const double* high, const PlacedBlock& of,
-                   std::uint32_t t) noexcept {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double gap = std::max({of.low[k][t] - high[k], low[k] - of.high[k][t], 0.0});
-    sum += gap * gap;
-  }
-  return sum;
-}
+class MeshGapSearch {
+  /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
+  static constexpr double kMargin = 0.7;
+  /// Pairs that are measured only to be kept: more would not pay.
+  static constexpr std::uint32_t kMostBeyond = 300;
 
-class GapSearch {
  public:
-  GapSearch(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-            const Similarity& b_from_a, Budget& budget, ExactScratch& scratch) noexcept
-      : a_(a),
-        b_(b),
-        a_from_b_(a_from_b),
-        b_from_a_(b_from_a),
+  MeshGapSearch(const GapQuestion& asked, Budget& budget, ExactScratch& scratch)
+      : asked_(asked),
+        a_(asked.a),
+        b_(asked.b),
         budget_(budget),
-        waiting_(scratch.gaps.get()) {}
+        scratch_(scratch),
+        waiting_(scratch.gaps.get()),
+        scale_(asked.a_from_b.scale),
+        reach_(reach_of(asked)),
+        single_(kLost * reach_ < std::min(a_.extent(), scale_ * b_.extent())),
+        slack_(1e-14 * reach_),
+        blur_(single_ ? 2e-6 * reach_ : slack_),
+        single_a_(asked.a_from_b, blur_),
+        single_b_(asked.b_from_a, blur_ / scale_),
+        double_a_(asked.a_from_b, blur_),
+        double_b_(asked.b_from_a, blur_ / scale_),
+        best_{4e-15 * reach_} {
+    look_along(asked.toward);
+    scratch.forget(a_.hash);
+    scratch.pairs->count = 0;
+    most_ = (asked.most + slack_) * (single_ ? 1 : 1 + 2 * kAlike);
+    limit_to(std::min(most_, asked.likely + slack_));
+  }
 
-  MeshGap run() noexcept {
-    best_.take(a_.vertex(0), map_point(a_from_b_, b_.vertex(0)));
-    out_.overlap = holds({a_}, b_, {&a_from_b_}) || holds({b_, &a_from_b_, &b_from_a_}, a_, {});
+  MeshGap run() {
+    KeptRing& ring = scratch_.near;
+    KeptPairs* const kept = single_ ? asked_.kept : nullptr;
+    double least = 0;
+    if (kept != nullptr && kept->nearest != KeptPairs::kNone) measure(kept->nearest);
+    if (kept != nullptr && ring.serves(*kept, b_, asked_.a_from_b, 0)) {
+      for (std::uint32_t n = 0; n < kept->count && !done(); ++n) {
+        const std::uint64_t blocks = ring.pair(*kept, n);
+        measure(static_cast<std::uint32_t>(blocks >> 32), static_cast<std::uint32_t>(blocks));
+      }
+    } else {
+      if (kept != nullptr) {
+        ring.begin(*kept, a_, b_, 0);
+        kept->margin *= kMargin;
+        if (kept->margin > 0) keep_ = kept;
+        limit_to(nearest_limit_);
+      }
+      if (budget_.limited()) measure(0);  // what is stopped has an answer
+      least = search();
+      if (best_.pair == KeptPairs::kNone && asked_.likely < asked_.most) {
+        limit_to(most_);
+        least = search();
+      }
+    }
+    // What ended early has not come to all that is near.
+    const bool whole = !done();
+    finish(least);
+    if (kept != nullptr) {
+      kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
+      if (!whole || out_.overlap || out_.farther) kept->margin = 0;
+    }
+    return out_;
+  }
+
+ private:
+  /// Floats tell boxes of both solids apart as long as neither is so small in what is between them.
+  static constexpr double kLost = 1e-3;
+  /// Of solids that are far apart for their size all is as near, to rounding: one pair will do.
+  static constexpr double kAlike = 1e-13;
+
+  /// No coordinate is larger, nor a difference of two.
+  static double reach_of(const GapQuestion& asked) {
+    double shift = 0;
+    for (const double t : asked.a_from_b.t) shift = std::max(shift, std::abs(t));
+    return asked.a.extent() + asked.a_from_b.scale * asked.b.extent() + shift;
+  }
+
+  void look_along(const exact::Point& toward) {
+    toward_ = toward;
+    const double(&m)[9] = asked_.b_from_a.m;
+    const auto back = [&](int i) {
+      return -scale_ * ((m[3 * i] * toward.x + m[3 * i + 1] * toward.y) + m[3 * i + 2] * toward.z);
+    };
+    const exact::Point to_a = {back(0), back(1), back(2)};
+    single_ ? single_a_.turn(toward) : double_a_.turn(toward);
+    single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
+  }
+
+  /// Farther pairs decide nothing; of those that are kept what comes as near by the next search.
+  void limit_to(double distance) {
+    nearest_limit_ = distance;
+    limit_ = distance;
+    if (keep_ != nullptr) limit_ += 2 * keep_->margin;
+    squared_limit_ = limit_ * limit_;
+  }
+
+  double search() {
+    size_ = 0;
+    depth_first_ = false;
     push({0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)});
     double least = 0;
-    while (size_ > 0 && !out_.overlap && !out_.stopped) {
+    while (size_ > 0 && !done()) {
       const GapPair pair = waiting_[0];
       least = pair.squared;
-      if (!(least < kNearer * best_.squared)) break;
+      if (least > squared_limit_) break;
       std::pop_heap(waiting_, waiting_ + size_--);
       // Behind a full heap all below the pair waits on a stack, and comes before the rest.
       const std::uint32_t heap = size_;
       depth_first_ = heap >= ExactScratch::kMostGaps;
       visit(pair);
-      while (depth_first_ && size_ > heap && !out_.overlap && !out_.stopped)
-        visit(waiting_[--size_]);
+      while (depth_first_ && size_ > heap && !done()) visit(waiting_[--size_]);
     }
-    if (!out_.stopped) least = best_.squared;
-    if (out_.overlap) return out_;
-    out_.distance = std::sqrt(best_.squared);
-    out_.a = best_.a, out_.b = best_.b;
-    out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(least) - slack());
-    return out_;
+    return least;
   }
 
- private:
-  void push(const GapPair& pair) noexcept {
+  bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
+  double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
+
+  /// `least`: no pair that waits is nearer.
+  void finish(double least) {
+    out_.overlap = out_.overlap || holds(false) || holds(true);
+    out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
+    if (out_.overlap || out_.farther) return;
+    out_.a = best_.on_a;
+    out_.b = best_.on_a + best_.between;
+    out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
+    if (!out_.stopped) least = best_.least;
+    out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(least) - slack_);
+  }
+
+  void push(const GapPair& pair) {
     waiting_[size_++] = pair;
     if (!depth_first_) std::push_heap(waiting_, waiting_ + size_);
   }
 
-  void visit(GapPair pair) noexcept {
-    if (!(pair.squared < kNearer * best_.squared)) return;
+  void visit(const GapPair& pair) {
+    if (pair.squared > squared_limit_) return;
     out_.stopped = budget_.grant(1) == 0;
     if (out_.stopped) return;
-    if (pair.level_a == 0 && pair.level_b == 0)
+    if (pair.level_a == 0 && pair.level_b == 0) {
+      least_here_ = HUGE_VAL;
       measure(pair.a, pair.b);
-    else
-      open(pair);
+      if (keep_ != nullptr && least_here_ <= squared_limit_) keep(pair.a, pair.b);
+    } else if (single_) {
+      open(pair, single_a_, single_b_);
+    } else {
+      open(pair, double_a_, double_b_);
+    }
   }
 
-  /// Whether a solid holds a shell of the other.
-  struct ShellMap {
-    const Similarity* to_a = nullptr;
-  };
-  static bool holds(const MeshOfPair& solid, const MeshTree& other, const ShellMap& map) noexcept {
+  /// Whether a solid holds a shell of the other, B or A.
+  bool holds(bool b_in_a) const {
+    const MeshTree& other = b_in_a ? b_ : a_;
+    const MeshOfPair solid =
+        b_in_a ? MeshOfPair{a_} : MeshOfPair{b_, &asked_.a_from_b, &asked_.b_from_a};
     for (std::uint32_t s = 0; s < other.header->shell_count; ++s) {
-      const Point x = other.vertex(other.blocks[other.shells[s].block].vertex[0]);
-      if (is_inside(solid, map.to_a != nullptr ? map_point(*map.to_a, x) : x)) return true;
+      const exact::Point x = other.vertex(other.blocks[other.shells[s].block].vertex[0]);
+      if (is_inside(solid, b_in_a ? map_point(asked_.a_from_b, x) : x)) return true;
     }
     return false;
   }
 
-  /// What distances are off by, by rounding: of coordinates, and of thin triangles.
-  double slack() const noexcept {
-    double shift = 0;
-    for (const double t : a_from_b_.t) shift = std::max(shift, std::abs(t));
-    return 1e-14 * ((a_.extent() + a_from_b_.scale * b_.extent()) + shift) + thin_;
-  }
-
   /// The larger node's sixteen against the other's box.
-  void open(const GapPair& pair) noexcept {
-    const MiddleBox box_a = box_of(a_, pair.level_a, pair.a),
-                    box_b = box_of(b_, pair.level_b, pair.b);
+  template <class T>
+  void open(const GapPair& pair, const BoxLook<T>& at_a, const BoxLook<T>& at_b) {
     const bool open_a =
-        pair.level_b == 0 || (pair.level_a > 0 && box_a.size() >= a_from_b_.scale * box_b.size());
+        pair.level_b == 0 || (pair.level_a > 0 && size_of(a_, pair.level_a, pair.a) >=
+                                                      scale_ * size_of(b_, pair.level_b, pair.b));
     const MeshTree& mesh = open_a ? a_ : b_;
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t number = open_a ? pair.a : pair.b;
-    double squared[kWidth];
-    const Point w = best_.direction();
-    if (open_a) {
-      gaps_of(mesh.level[level].boxes[number], box_b, a_from_b_, {w.x, w.y, w.z}, squared);
-    } else {
-      double back[3];
-      for (int i = 0; i < 3; ++i)
-        back[i] = -((b_from_a_.m[3 * i] * w.x + b_from_a_.m[3 * i + 1] * w.y) +
-                    b_from_a_.m[3 * i + 2] * w.z) /
-                  b_from_a_.scale;
-      gaps_of(mesh.level[level].boxes[number], box_a, b_from_a_, back, squared);
-      for (double& gap : squared) gap *= a_from_b_.scale * a_from_b_.scale;
-    }
+    const BoxBlock& boxes = mesh.level[level].boxes[number];
+    alignas(64) T squared[kWidth];
+    if (open_a)
+      at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), squared);
+    else
+      at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), squared);
+    const double unit = open_a ? 1 : asked_.a_from_b.scale * asked_.a_from_b.scale;
     const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * number);
     const std::uint32_t first = size_;
     for (std::uint32_t l = 0; l < used; ++l) {
-      if (!(squared[l] < kNearer * best_.squared)) continue;
+      const double gap = unit * double{squared[l]};
+      if (gap > squared_limit_) continue;
       GapPair child = pair;
-      child.squared = std::max(pair.squared, squared[l]);
+      child.squared = std::max(pair.squared, gap);
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
       push(child);
@@ -286,121 +234,191 @@ class GapSearch {
     if (depth_first_) std::sort(waiting_ + first, waiting_ + size_);
   }
 
-  void measure(std::uint32_t a, std::uint32_t b) noexcept {
-    placed_a_.place(a_, a, nullptr);
-    placed_b_.place(b_, b, &a_from_b_);
-    // Along the way between the nearest points so far nothing else may be nearer: then that is all.
-    const Point w = best_.direction();
-    double along_a[kWidth], along_b[kWidth];
-    placed_a_.look_along(w, along_a);
-    placed_b_.look_along(w, along_b);
-    const double first_b = *std::min_element(along_b, along_b + kWidth);
-    if (apart(first_b - *std::max_element(along_a, along_a + kWidth))) return;
-    near_vertices();
-    double ahead_b[kWidth];
-    const auto& corner_a = placed_a_.block->corner;
-    const auto& corner_b = placed_b_.block->corner;
-    for (std::uint32_t l = 0; l < kWidth; ++l)
-      ahead_b[l] =
-          std::min({along_b[corner_b[0][l]], along_b[corner_b[1][l]], along_b[corner_b[2][l]]});
-    for (std::uint32_t t = 0; t < placed_a_.block->triangles && !out_.overlap; ++t) {
-      const double ahead =
-          std::max({along_a[corner_a[0][t]], along_a[corner_a[1][t]], along_a[corner_a[2][t]]});
-      if (apart(first_b - ahead) ||
-          !(squared_gap(placed_b_.all_low, placed_b_.all_high, placed_a_, t) < best_.squared))
-        continue;
-      double squared[kWidth] = {};
-      for (int k = 0; k < 3; ++k) {
-        const double low = placed_a_.low[k][t], high = placed_a_.high[k][t];
-        for (std::uint32_t l = 0; l < kWidth; ++l) {
-          const double gap =
-              std::max(0.0, std::max(placed_b_.low[k][l] - high, low - placed_b_.high[k][l]));
-          squared[l] += gap * gap;
-        }
-      }
-      const exact::FlatTriangle of_a = placed_a_.triangle(t);
-      const exact::Point& n = of_a.normal;
-      double height[kWidth];
-      for (std::uint32_t v = 0; v < kWidth; ++v)
-        height[v] = (n.x * (placed_b_.vertex[0][v] - of_a.corner[0].x) +
-                     n.y * (placed_b_.vertex[1][v] - of_a.corner[0].y)) +
-                    n.z * (placed_b_.vertex[2][v] - of_a.corner[0].z);
-      for (std::uint32_t l = 0; l < placed_b_.block->triangles && !out_.overlap; ++l)
-        if (squared[l] < best_.squared && !apart(ahead_b[l] - ahead))
-          measure(of_a, l, squared[l],
-                  {height[corner_b[0][l]], height[corner_b[1][l]], height[corner_b[2][l]]});
-    }
+  const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
+    return of_b ? placed_vertices(b_, number, &asked_.a_from_b, *scratch_.placed_b)
+                : placed_vertices(a_, number, nullptr, *scratch_.placed_a);
   }
 
-  /// Two vertices bound the distance well before any triangles are measured.
-  void near_vertices() noexcept {
-    for (std::uint32_t v = 0; v < placed_a_.block->vertices; ++v) {
-      double squared[kWidth] = {};
-      for (int k = 0; k < 3; ++k)
-        for (std::uint32_t l = 0; l < kWidth; ++l) {
-          const double between = placed_b_.vertex[k][l] - placed_a_.vertex[k][v];
-          squared[l] += between * between;
-        }
-      const auto nearest = std::min_element(squared, squared + kWidth);
-      if (*nearest < best_.squared)
-        best_.take(placed_a_.at(v), placed_b_.at(static_cast<std::uint32_t>(nearest - squared)));
-    }
-  }
-
-  bool apart(double gap) const noexcept {
-    return gap > 0 && !(kNearer * (gap * gap) < best_.squared);
-  }
-
-  /// Of three heights, times the normal's length: whether a plane is further than the best.
-  bool beyond(const exact::Heights& height, double squared_normal) const noexcept {
-    const double least = std::max(std::min({height[0], height[1], height[2]}),
-                                  -std::max({height[0], height[1], height[2]}));
-    return least > 0 && kNearer * (least * least) > best_.squared * squared_normal;
-  }
-
-  void measure(const exact::FlatTriangle& a, std::uint32_t lane, double boxes_gap,
-               const exact::Heights& over_a) noexcept {
-    if (beyond(over_a, a.squared_normal)) return;
-    const exact::FlatTriangle b = placed_b_.triangle(lane);
-    exact::Heights over_b;
-    for (int k = 0; k < 3; ++k) over_b[k] = dot(b.normal, a.corner[k] - b.corner[0]);
-    if (beyond(over_b, b.squared_normal)) return;
-    ++out_.tests;
-    if (boxes_gap == 0 && exact::cross_exactly(a.corner, b.corner)) {
-      out_.overlap = true;
+  /// The triangles of two blocks that may be near enough.
+  void measure(std::uint32_t number_a, std::uint32_t number_b) {
+    const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
+    if (cannot_answer(of_a, of_b, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
+      return;
+    const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
+                        all_b = (1u << b_.blocks[number_b].triangles) - 1;
+    const auto take = [&](std::uint32_t i, std::uint32_t lanes) {
+      for (; lanes != 0; lanes &= lanes - 1)
+        add(kWidth * number_a + i, of_a,
+            kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)), of_b);
+    };
+    if (!single_) {
+      for (std::uint32_t left = all_a; left != 0; left &= left - 1)
+        take(static_cast<std::uint32_t>(std::countr_zero(left)), all_b);
+      measure_added();
       return;
     }
-    exact::take_nearest(a, b, over_a, over_b, best_);
-    for (const exact::FlatTriangle* t : {&a, &b}) {
-      const double longest = std::max(
-          {dot(t->side[0], t->side[0]), dot(t->side[1], t->side[1]), dot(t->side[2], t->side[2])});
-      // A foot is off by a rounding over the angle, or by the width.
-      if (t->squared_normal < 1e-4 * longest * longest && t->squared_normal > 0) {
-        const double width = std::sqrt(t->squared_normal / longest);
-        thin_ = std::max(thin_, std::min(width, 1e-14 * longest / width));
+    const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
+    const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
+    TriangleCulls culls(a, b, toward_, static_cast<float>(blur_));
+    for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
+      const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
+      take(i, culls.lanes(i, limit_) & all_b);
+    }
+    measure_added();
+  }
+
+  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
+  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
+  bool cannot_answer(const PlacedVertices& of_a, const PlacedVertices& of_b,
+                     std::uint64_t first) const {
+    const double distance = std::sqrt(best_.least);
+    if (keep_ != nullptr || !(best_.pair < first) || distance < 4 * best_.rounding) return false;
+    const D d;
+    const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
+    const auto along = [&](const PlacedVertices& of, std::size_t l) {
+      return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
+             z * hn::Load(d, of.at[2] + l);
+    };
+    V last = along(of_a, 0), next = along(of_b, 0);
+    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
+      last = hn::Max(last, along(of_a, l));
+      next = hn::Min(next, along(of_b, l));
+    }
+    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last)) >=
+           distance - 0.5 * best_.rounding;
+  }
+
+  /// Two triangles.
+  void measure(std::uint64_t pair) {
+    const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
+    add(a, vertices(false, a / kWidth), b, vertices(true, b / kWidth));
+    measure_added();
+  }
+
+  void add(std::uint32_t triangle_a, const PlacedVertices& vertices_a, std::uint32_t triangle_b,
+           const PlacedVertices& vertices_b) {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t n = pairs.count;
+    const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
+                          const PlacedVertices& from) {
+      const MeshBlock& block = mesh.blocks[triangle / kWidth];
+      for (int c = 0; c < 3; ++c) {
+        const std::uint32_t v = block.corner[c][triangle % kWidth];
+        for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][n] = from.at[k][v];
       }
+      pairs.triangle[side][n] = triangle;
+    };
+    take(0, a_, triangle_a, vertices_a);
+    take(1, b_, triangle_b, vertices_b);
+    if (++pairs.count == 8) measure_added();
+  }
+
+  void measure_added() {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t count = pairs.count;
+    pairs.count = 0;
+    if (count == 0 || out_.overlap) return;
+    out_.tests += count;
+    PairGaps gaps;
+    std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
+    for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1)
+      out_.overlap = crosses(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
+    if (out_.overlap) return;
+    const double before = best_.least;
+    std::uint32_t beyond = 0;
+    for (std::uint32_t n = 0; n < count; ++n) {
+      const std::uint64_t name = std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
+      best_.take(gaps, n, name);
+      least_here_ = std::min(least_here_, gaps.squared[n]);
+      beyond += gaps.squared[n] > before && gaps.squared[n] <= squared_limit_;
+    }
+    if (keep_ != nullptr && (beyond_ += beyond) > kMostBeyond) give_up();
+    if (!(best_.least < before)) return;
+    const double distance = std::sqrt(best_.least);
+    limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kAlike) * distance));
+    if (distance > 0) {
+      look_along((1 / distance) * best_.between);
+      level_ = toward_;
+      for (std::uint32_t n = 0; n < count; ++n)
+        if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
+          for (int side = 0; side < 2; ++side) take_level(corners(pairs, side, n));
     }
   }
 
+  /// Two blocks, which the next steps look at again.
+  void keep(std::uint32_t number_a, std::uint32_t number_b) {
+    if (keep_->count < scratch_.near.most())
+      scratch_.near.add(*keep_, std::uint64_t{number_a} << 32 | number_b);
+    else
+      give_up();
+  }
+  void give_up() {
+    KeptRing::give_up(*keep_);
+    keep_ = nullptr;
+    limit_to(nearest_limit_);
+  }
+
+  using Corners = std::array<exact::Point, 3>;
+  static Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
+    Corners at;
+    for (int c = 0; c < 3; ++c)
+      at[c] = {pairs.corner[side][c][0][n], pairs.corner[side][c][1][n],
+               pairs.corner[side][c][2][n]};
+    return at;
+  }
+
+  static bool crosses(const TrianglePairs& pairs, std::uint32_t n) {
+    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
+    return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
+  }
+
+  /// The way between level faces is their normal: a short way has few digits of it.
+  void take_level(const Corners& t) {
+    const exact::Point n = cross(t[1] - t[0], t[2] - t[0]);
+    const double length = std::sqrt(dot(n, n)), along = dot(n, toward_);
+    constexpr double kLevel = 1 - 1e-10;
+    if (length > 0 && std::abs(along) > kLevel * length)
+      level_ = ((along > 0 ? 1 : -1) / length) * n;
+  }
+
+  const GapQuestion& asked_;
   const MeshTree& a_;
   const MeshTree& b_;
-  const Similarity& a_from_b_;
-  const Similarity& b_from_a_;
   Budget& budget_;
-  exact::NearestPair best_;
-  MeshGap out_;
-  double thin_ = 0;
-  PlacedBlock placed_a_, placed_b_;
+  ExactScratch& scratch_;
   GapPair* const waiting_;  ///< a heap
   std::uint32_t size_ = 0;
   bool depth_first_ = false;
+  const double scale_, reach_;
+  const bool single_;                   ///< boxes are measured in floats
+  const double slack_;                  ///< what distances of triangles are off by, by rounding
+  const double blur_;                   ///< likewise of boxes
+  BoxLook<float> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
+  BoxLook<double> double_a_, double_b_;
+  double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
+  NearestTriangles best_;
+  double least_here_ = HUGE_VAL;  ///< squared, of two blocks
+  std::uint32_t beyond_ = 0;      ///< pairs that were measured only to be kept
+  exact::Point toward_, level_ = {0, 0, 0};
+  KeptPairs* keep_ = nullptr;
+  MeshGap out_;
 };
 
-}  // namespace
+MeshGap search_gap(const GapQuestion& question, Budget& budget, ExactScratch& scratch) {
+  return MeshGapSearch(question, budget, scratch).run();
+}
 
-MeshGap mesh_gap(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-                 const Similarity& b_from_a, Budget& budget, ExactScratch& scratch) noexcept {
-  return GapSearch(a, b, a_from_b, b_from_a, budget, scratch).run();
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(search_gap);
+
+MeshGap mesh_gap(const GapQuestion& question, Budget& budget, ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_gap)(question, budget, scratch);
 }
 
 }  // namespace ist
+#endif

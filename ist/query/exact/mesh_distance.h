@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "query/base/budget.h"
@@ -9,20 +10,35 @@
 
 namespace ist {
 
+/// Two placed meshes whose distance is asked; all lengths in A's unit frame.
+struct GapQuestion {
+  const MeshTree& a;
+  const MeshTree& b;
+  const Similarity& a_from_b;
+  const Similarity& b_from_a;
+  double most = HUGE_VAL;           ///< the distance, if it is more, is not asked for
+  double enough = -1;               ///< nor a smaller one, once one as small as this is found
+  double likely = HUGE_VAL;         ///< it is no more than this, unless a solid holds the other
+  exact::Point toward = {0, 0, 0};  ///< unit, from A to B near where they are nearest; or zero
+  KeptPairs* kept = nullptr;        ///< what is kept of this pair; null: nothing
+};
+
 /// The gap between two meshes, A's unit frame.
 struct MeshGap {
   double distance = 0;          ///< of the nearest points that were found
   double least = 0;             ///< no two points are nearer, roundings included
   exact::Point a = {}, b = {};  ///< these points
   bool overlap = false;         ///< surfaces cross, or one solid holds a shell of the other
-  bool stopped = false;         ///< by the budget, or for want of room
+  bool farther = false;         ///< than `most`
+  bool stopped = false;         ///< by the budget
   std::uint32_t tests = 0;      ///< pairs of triangles measured
 };
 
 /// Branch and bound over both trees of boxes, always the nearest pair that waits. A visit opens one
-/// node, or measures two blocks. Allocates, locks and throws nothing; the same answer on every
-/// instruction set.
-MeshGap mesh_gap(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b,
-                 const Similarity& b_from_a, Budget& budget, ExactScratch& scratch) noexcept;
+/// node, or measures two blocks. Of pairs of triangles that are as near, to rounding, the one of
+/// the lowest numbers answers, so that neither the order of the search nor what is kept under
+/// `pair_id` decides. Allocates, locks and throws nothing; the same answer on every instruction
+/// set.
+MeshGap mesh_gap(const GapQuestion& question, Budget& budget, ExactScratch& scratch) noexcept;
 
 }  // namespace ist
