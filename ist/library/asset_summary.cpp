@@ -330,6 +330,9 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
 std::string describe_counted_twice(const TreeView& tree) {
   const bool resolved = tree.mesh_state() == MeshState::resolved;
   if (!resolved && tree.mesh_state() != MeshState::unresolved) return "";
+  if (tree.counted_twice() == 0)
+    return "parts of the mesh touch: the asset represents their union, without the walls between "
+           "them";
   return fmt::format(
       "parts of the mesh overlap and count {:.3g} u³, {:.2g} % of the volume, more than once: {}",
       tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),

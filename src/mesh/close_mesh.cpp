@@ -252,7 +252,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   tbb::parallel_invoke(look_for_intersections, [&] { report = survey(mesh, surface.edges); });
   report.self_intersections = surface.met ? surface.met->count : 0;
   report.self_intersections_counted = surface.met.has_value();
-  refuse_unusable_coordinates(name, report);
+  if (facing == Facing::any) refuse_unusable_coordinates(name, report);
   note_findings(report);
   reduce(surface, report);
   if (mesh.triangles.empty())
