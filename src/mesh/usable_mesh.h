@@ -23,7 +23,7 @@ double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
 
 /// As close_mesh(), of a closed surface whose triangles face outward already: none is turned.
-/// Shells that face inward count as cavities.
+/// Shells that face inward count as cavities. How its triangles meet is not looked for.
 ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
 
 }  // namespace ist

@@ -137,9 +137,9 @@ Pressed press_together(const TriangleMesh& mesh) {
   Pressed pressed;
   const double near = kNearSteps * spacing_at(largest_coordinate(bounds_of(mesh.vertices)));
   const auto find_touching = [&](const TriangleMesh& of, const Faces& faces) {
-    return find_pairs(of.vertices, of.triangles, near, [&](std::uint32_t a, std::uint32_t b) {
-             return faces.touch(a, b);
-           }).value_or(Pairs());
+    return find_pairs(of.vertices, of.triangles, near,
+                      [&](std::uint32_t a, std::uint32_t b) { return faces.touch(a, b); })
+        .value_or(Pairs());
   };
   const Faces as_they_came(mesh, near);
   const Pairs touching = find_touching(mesh, as_they_came);
