@@ -48,12 +48,13 @@ std::optional<std::uint64_t> enough_spheres(const TreeView& tree) {
 }
 
 std::string describe_coarseness(const TreeView& tree) {
-  const std::optional<std::uint64_t> enough = enough_spheres(tree);
-  if (!enough) return "";
-  return fmt::format(
-      "the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; about {} "
-      "spheres are enough",
-      100 * tree.header().coverage, grouped(*enough));
+  if (tree.header().sphere_count == 0 || !(tree.header().coverage < kCoarse)) return "";
+  const std::string coarse =
+      fmt::format("the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; ",
+                  100 * tree.header().coverage);
+  if (const auto enough = enough_spheres(tree))
+    return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
+  return coarse + "no number of spheres is enough. Bake the surface alone (--surface-only)";
 }
 
 namespace {
