@@ -288,7 +288,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
     const ResolvedMesh resolved = resolve(mesh, progress);
-    const MeshSolid solid(resolved.mesh);
+    const MeshSolid solid(resolved);
     return bake_solid(resolved.mesh, solid, resolved.resolution, settings, progress);
   });
 }
@@ -300,7 +300,7 @@ Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsi
     throw Error(mesh.name + ": a surface alone needs a surface; set surface.wanted");
   return thread_arena(threads).execute([&] {
     const ResolvedMesh resolved = resolve(mesh, progress);
-    const MeshSolid solid(resolved.mesh);
+    const MeshSolid solid(resolved);
     AssetArrays arrays;
     arrays.header = describe_solid(resolved.mesh, solid);
     describe_bounds(solid, 0, arrays.header);

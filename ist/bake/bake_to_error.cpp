@@ -109,7 +109,7 @@ class TargetBake {
         settings_(settings),
         most_(settings.max_spheres == 0 ? kMostCounted : settings.max_spheres),
         watch_(progress, settings.time_limit),
-        solid_(mesh_),
+        solid_(resolved_),
         surface_(solid_, resolved_.resolution, settings.surface, settings.threads,
                  settings.time_limit),
         backend_(make_backend(solid_, settings.device, settings.gpu)) {}

@@ -250,7 +250,7 @@ MeshArrays lay_out_mesh(const MeshView& surface) {
   return arrays;
 }
 
-/// Of a mesh that could not be resolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as
+/// Of a mesh that may not be resolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as
 /// far as its signs are one. 0: the mesh is the boundary of its solid, but for faces that touch.
 double estimate_counted_twice(const MeshSolid& solid) {
   constexpr double kNothing = 1e-9;  // of the volume: what rounding makes of faces that touch
@@ -259,9 +259,9 @@ double estimate_counted_twice(const MeshSolid& solid) {
   return more > kNothing * solid.unit_volume() ? more : 0;
 }
 
-std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid, const Resolution& resolution) {
+std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid) {
   MeshArrays mesh = lay_out_mesh(solid.arrays());
-  mesh.header.rounding = solid.rounding() + resolution.moved / solid.frame().scale();
+  mesh.header.rounding = solid.moved();
   return std::make_shared<const MeshArrays>(std::move(mesh));
 }
 
@@ -306,18 +306,19 @@ KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
   const auto find_mesh = [&] {
     using How = Resolution::How;
     const double scale = solid.frame().scale();
-    kept.counted_twice = resolution.how == How::unresolved
-                             ? estimate_counted_twice(solid)
-                             : resolution.counted_twice / (scale * scale * scale);
-    kept.state = resolution.how == How::resolved ? MeshState::resolved : MeshState::own;
-    if (resolution.how == How::unresolved && kept.counted_twice > 0)
-      kept.state = MeshState::unresolved;
-    if (kept.state != MeshState::unresolved && error == 0) kept.mesh = own_mesh(solid, resolution);
+    if (resolution.how == How::resolved) {
+      kept.state = MeshState::resolved;
+      kept.counted_twice = resolution.counted_twice / (scale * scale * scale);
+    } else {
+      kept.counted_twice = estimate_counted_twice(solid);
+      kept.state = kept.counted_twice > 0 ? MeshState::unresolved : MeshState::own;
+    }
+    if (kept.state != MeshState::unresolved && error == 0) kept.mesh = own_mesh(solid);
   };
   tbb::parallel_invoke(find_surface, find_mesh);
   if (kept.state != MeshState::unresolved && error > 0) {
     const bool all = !surface || surface->own;
-    kept.mesh = all ? own_mesh(solid, resolution) : mesh_of(*surface);
+    kept.mesh = all ? own_mesh(solid) : mesh_of(*surface);
     if (!all) kept.state = MeshState::simplified;
   }
   if (with_surface && surface)

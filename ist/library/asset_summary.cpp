@@ -48,12 +48,13 @@ std::optional<std::uint64_t> enough_spheres(const TreeView& tree) {
 }
 
 std::string describe_coarseness(const TreeView& tree) {
-  const std::optional<std::uint64_t> enough = enough_spheres(tree);
-  if (!enough) return "";
-  return fmt::format(
-      "the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; about {} "
-      "spheres are enough",
-      100 * tree.header().coverage, grouped(*enough));
+  if (tree.header().sphere_count == 0 || !(tree.header().coverage < kCoarse)) return "";
+  const std::string coarse =
+      fmt::format("the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; ",
+                  100 * tree.header().coverage);
+  if (const auto enough = enough_spheres(tree))
+    return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
+  return coarse + "no number of spheres is enough. Bake the surface alone (--surface-only)";
 }
 
 namespace {
@@ -330,6 +331,9 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
 std::string describe_counted_twice(const TreeView& tree) {
   const bool resolved = tree.mesh_state() == MeshState::resolved;
   if (!resolved && tree.mesh_state() != MeshState::unresolved) return "";
+  if (tree.counted_twice() == 0)
+    return "parts of the mesh touch: the asset represents their union, without the walls between "
+           "them";
   return fmt::format(
       "parts of the mesh overlap and count {:.3g} u³, {:.2g} % of the volume, more than once: {}",
       tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),

@@ -32,7 +32,7 @@ std::string describe_target(const TreeView& tree);
 std::optional<std::uint64_t> enough_spheres(const TreeView& tree);
 
 /// "the spheres are too coarse for thin parts: 19 % of the solid is covered; about 60,000 spheres
-/// would do"; "" where they are not.
+/// would do", or that no number would; "" where they are not.
 std::string describe_coarseness(const TreeView& tree);
 
 }  // namespace ist

@@ -246,13 +246,13 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
   const auto look_for_intersections = [&] {
-    surface.met = find_self_intersections(mesh.vertices, mesh.triangles);
+    if (facing == Facing::any) surface.met = find_self_intersections(mesh.vertices, mesh.triangles);
   };
   MeshReport report;
   tbb::parallel_invoke(look_for_intersections, [&] { report = survey(mesh, surface.edges); });
   report.self_intersections = surface.met ? surface.met->count : 0;
   report.self_intersections_counted = surface.met.has_value();
-  refuse_unusable_coordinates(name, report);
+  if (facing == Facing::any) refuse_unusable_coordinates(name, report);
   note_findings(report);
   reduce(surface, report);
   if (mesh.triangles.empty())
@@ -262,6 +262,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   TriangleMesh unrepaired;
   if (count_odd_edges(surface.edges) > 0) {
     if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);
+    drop_inner_walls(mesh, report);
     unrepaired = mesh;
     mesh = repair(std::move(mesh), name, report);
     surface.triangles_changed();

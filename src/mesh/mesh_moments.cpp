@@ -302,21 +302,6 @@ double squared_reach(const MeshView& mesh, const Vector3d& from) {
   return most;
 }
 
-/// Bound on the volume of what lies within `distance` of the surface: by Steiner's formula for each
-/// triangle.
-double slab_volume(const MeshView& mesh, double distance) {
-  constexpr double kPi = std::numbers::pi;
-  const double e = distance;
-  double sum = 0;
-  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
-    const Vector3d a = vertex(mesh, t, 0), b = vertex(mesh, t, 1), c = vertex(mesh, t, 2);
-    const double area = (b - a).cross(c - a).norm() / 2;
-    const double rim = (b - a).norm() + (c - b).norm() + (a - c).norm();
-    sum += 2 * e * area + kPi / 2 * e * e * rim + 4 * kPi / 3 * e * e * e;
-  }
-  return sum;
-}
-
 /// What the mesh encloses less an excess.
 MeshMoments less(const MeshView& mesh, const WindingExcess& excess) {
   const Sum<4> enclosed = first_moments(mesh);
@@ -349,6 +334,19 @@ MeshMoments less(const MeshView& mesh, const WindingExcess& excess) {
 }
 
 }  // namespace
+
+double slab_volume(const MeshView& mesh, double distance) {
+  constexpr double kPi = std::numbers::pi;
+  const double e = distance;
+  double sum = 0;
+  for (std::size_t t = 0; t < mesh.triangle_count; ++t) {
+    const Vector3d a = vertex(mesh, t, 0), b = vertex(mesh, t, 1), c = vertex(mesh, t, 2);
+    const double area = (b - a).cross(c - a).norm() / 2;
+    const double rim = (b - a).norm() + (c - b).norm() + (a - c).norm();
+    sum += 2 * e * area + kPi / 2 * e * e * rim + 4 * kPi / 3 * e * e * e;
+  }
+  return sum;
+}
 
 WindingExcess winding_excess(const MeshView& mesh, const HierarchyMaker& hierarchy) {
   const ExcessIntegral integral(mesh, hierarchy);

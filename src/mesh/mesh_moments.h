@@ -52,6 +52,10 @@ MeshMoments enclosed_moments(const MeshView& mesh);
 MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
                                 const HierarchyMaker& hierarchy);
 
+/// Bound on the volume of what lies within `distance` of the surface: by Steiner's formula for each
+/// triangle.
+double slab_volume(const MeshView& mesh, double distance);
+
 /// The same for a solid that agrees with the mesh's at all points further than `distance` from its
 /// surface: the errors of centre and inertia grow by what may lie within it. The volume's does not.
 MeshMoments moments_near(const MeshView& mesh, MeshMoments moments, double distance);

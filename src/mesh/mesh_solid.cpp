@@ -11,7 +11,6 @@
 #include <cmath>
 
 #include "mesh/exact_closest_point.h"
-#include "mesh/resolve/resolve.h"
 #include "mesh/winding.h"
 
 namespace ist {
@@ -116,6 +115,13 @@ MeshSolid::MeshSolid(const ClosedMesh& closed) {
     if (rounding_ == 0) meeting_pairs_ = closed.meeting_pairs;
   }
   may_overlap_ = closed.report.meets_itself || closed.report.shells != 1;
+  moved_ = rounding_;
+}
+
+MeshSolid::MeshSolid(const ResolvedMesh& resolved) : MeshSolid(resolved.mesh) {
+  if (resolved.resolution.how == Resolution::How::unresolved) return;
+  meets_itself_ = may_overlap_ = false;
+  moved_ += resolved.resolution.moved / frame_.scale();
 }
 
 double MeshSolid::signed_distance(const Eigen::Vector3d& x) const {
@@ -151,6 +157,9 @@ const MeshMoments& MeshSolid::unit_moments() const {
     const HierarchyMaker hierarchy = [this]() -> const MeshView& { return view(); };
     moments_ = may_overlap_ ? winding_set_moments(arrays_, meets_itself_, hierarchy)
                             : enclosed_moments(arrays_);
+    if (!(moved_ > rounding_)) return;
+    moments_ = moments_near(arrays_, moments_, moved_);
+    moments_.volume_error += slab_volume(arrays_, moved_);
   });
   return moments_;
 }
@@ -170,7 +179,7 @@ int MeshSolid::winding_number(const Eigen::Vector3d& unit) const {
 }
 
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {
-  return std::make_unique<MeshSolid>(resolve(mesh).mesh);
+  return std::make_unique<MeshSolid>(resolve(mesh));
 }
 
 }  // namespace ist

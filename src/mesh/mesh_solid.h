@@ -13,6 +13,7 @@
 
 #include "mesh/bvh.h"
 #include "mesh/mesh_moments.h"
+#include "mesh/resolve/resolve.h"
 #include "stage/raw_array.h"
 
 namespace ist {
@@ -40,6 +41,8 @@ inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
 class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
+  /// Of a mesh known to be its solid's boundary, unless it is unresolved.
+  explicit MeshSolid(const ResolvedMesh& resolved);
 
   double signed_distance(const Eigen::Vector3d& x) const override;
   Eigen::AlignedBox3d bounds() const override { return bounds_; }
@@ -51,7 +54,9 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   double rounding() const { return rounding_; }  ///< unit frame: no vertex was moved further
   double unit_volume() const { return unit_moments().volume; }  ///< unit frame³
   const MeshMoments& unit_moments() const;
-  /// Triangles of the mesh intersect, or may: they were not looked for.
+  /// Unit frame: no vertex is further from where it would be without any rounding.
+  double moved() const { return moved_; }
+  /// Triangles of the mesh intersect, or may: they were not looked for. Not by rounding alone.
   bool meets_itself() const { return meets_itself_; }
   /// ClosedMesh::meeting_pairs, where they are those of the unit frame too: no coordinate was
   /// rounded on the way there. Null where they are not known.
@@ -81,7 +86,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   RawArray<double> vertices_;  // unit frame
   RawArray<std::uint32_t> triangles_;
   MeshView arrays_;
-  double rounding_ = 0;  // unit frame
+  double rounding_ = 0, moved_ = 0;  // unit frame
   bool meets_itself_ = false, may_overlap_ = false;
   std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs_;
 

@@ -89,6 +89,27 @@ void look_along(const std::vector<std::array<double, 3>>& points,
       }
 }
 
+UnitFrame frame_of(const TriangleMesh& soup) {
+  Eigen::AlignedBox3d bounds;
+  for (const Triangle& t : soup.triangles)
+    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
+  return unit_frame(bounds);
+}
+
+/// What is seen of each patch from far away, along the three axes both ways.
+std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const UnitFrame& frame) {
+  std::vector<Votes> votes(soup.triangles.size());
+  std::vector<std::array<double, 3>> points(soup.vertices.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::size_t v = 0; v < points.size(); ++v) {
+      const Eigen::Vector3d x = frame.to_unit(soup.vertices[v]);
+      points[v] = {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
+    }
+    look_along(points, soup.triangles, patches, votes);
+  }
+  return votes;
+}
+
 /// For each patch the volume between it and the middle of its area: > 0 where it bulges to its
 /// front. 0 where only rounding is left, as of a flat one.
 std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
@@ -136,19 +157,8 @@ void orient_soup(TriangleMesh& soup) {
   const EdgeTable edges(soup.triangles);
   make_consistent(soup.triangles, manifold_partners(edges));
   DisjointSets patches = connected_pieces(edges, 2);
-  Eigen::AlignedBox3d bounds;
-  for (const Triangle& t : soup.triangles)
-    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
-  const UnitFrame frame = unit_frame(bounds);
-  std::vector<Votes> votes(soup.triangles.size());
-  std::vector<std::array<double, 3>> points(soup.vertices.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    for (std::size_t v = 0; v < points.size(); ++v) {
-      const Eigen::Vector3d x = frame.to_unit(soup.vertices[v]);
-      points[v] = {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
-    }
-    look_along(points, soup.triangles, patches, votes);
-  }
+  const UnitFrame frame = frame_of(soup);
+  const std::vector<Votes> votes = look(soup, patches, frame);
   const std::vector<double> bulge = bulges(soup, patches, frame);
   // Lines by which a patch shows its front more than its back, or as it bulges.
   const auto in_favour = [&](std::uint32_t patch) {
@@ -281,6 +291,35 @@ std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh) {
   surface.mesh = std::move(mesh);
   surface.name = "triangles";
   return std::make_unique<MeshSolid>(surface);
+}
+
+std::vector<bool> inner_walls(const TriangleMesh& soup, DisjointSets& patches,
+                              const std::vector<bool>& asked) {
+  constexpr double kSolid = 0.75;
+  const std::vector<Votes> votes = look(soup, patches, frame_of(soup));
+  std::vector<bool> inner(soup.triangles.size(), false);
+  TriangleMesh rest = {soup.vertices, {}, {}};
+  for (std::uint32_t t = 0; t < inner.size(); ++t) {
+    const std::uint32_t patch = patches.find(t);
+    inner[t] = asked[patch] && votes[patch].fronts + votes[patch].backs == 0;
+    if (!inner[t]) rest.triangles.push_back(soup.triangles[t]);
+  }
+  if (rest.triangles.size() == inner.size()) return inner;
+  const OutwardWinding winding(std::move(rest));
+  std::vector<double> area(inner.size(), 0), solid(inner.size(), 0);  // by patch
+  for (std::uint32_t t = 0; t < inner.size(); ++t) {
+    if (!inner[t]) continue;
+    const auto& [a, b, c] = soup.triangles[t];
+    const Eigen::Vector3d &p = soup.vertices[a], &q = soup.vertices[b], &r = soup.vertices[c];
+    const double size = (q - p).cross(r - p).norm();
+    area[patches.find(t)] += size;
+    if (winding.at((p + q + r) / 3) > kSolid) solid[patches.find(t)] += size;
+  }
+  for (std::uint32_t t = 0; t < inner.size(); ++t) {
+    const std::uint32_t patch = patches.find(t);
+    inner[t] = inner[t] && solid[patch] > kSolid * area[patch];
+  }
+  return inner;
 }
 
 OutwardWinding::OutwardWinding(TriangleMesh mesh) {

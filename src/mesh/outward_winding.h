@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "mesh/disjoint_sets.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/mesh_view.h"
 
@@ -60,5 +61,10 @@ class [[gnu::visibility("hidden")]] OutwardWinding {
   std::unique_ptr<MeshSolid> surface_;
   std::optional<SoupWinding> winding_;
 };
+
+/// [triangle] whether its patch, one of those `asked` for by their first triangles, is an inner
+/// wall: nobody sees it from far away, and without all such the winding number is 1 about it.
+std::vector<bool> inner_walls(const TriangleMesh& soup, DisjointSets& patches,
+                              const std::vector<bool>& asked);
 
 }  // namespace ist

@@ -14,6 +14,7 @@
 #include "mesh/edge_table.h"
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/message_text.h"
+#include "mesh/outward_winding.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/weld.h"
@@ -206,21 +207,34 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
   return counts;
 }
 
+/// Patches that hang together by edges of two faces, named by their first triangles, and what they
+/// do to others.
+struct HangingPatches {
+  DisjointSets sets;
+  std::vector<int> gain;  ///< odd edges fewer without this patch
+  std::vector<std::vector<std::uint32_t>> shared_edges;
+
+  HangingPatches(const TriangleMesh& mesh, const EdgeTable& edges)
+      : sets(connected_pieces(edges, 2)),
+        gain(mesh.triangles.size(), 0),
+        shared_edges(mesh.triangles.size()) {
+    for (std::uint32_t e = 0; e < edges.size(); ++e) {
+      const auto sides = edges.sides(e);
+      if (sides.size() == 2) continue;  // inside a patch
+      for (const auto& [patch, count] : patches_at(sets, sides)) {
+        if (count % 2 == 1) gain[patch] += sides.size() % 2 == 1 ? 1 : -1;
+        if (count < sides.size()) shared_edges[patch].push_back(e);
+      }
+    }
+  }
+};
+
 /// Drops patches that hang on others and leave fewer odd edges when they go, best first. What is
 /// right for one changes what is right for its neighbours, so those wait. Returns how many went.
 std::size_t drop_fins_once(TriangleMesh& mesh) {
   const EdgeTable edges(mesh.triangles);
-  DisjointSets patches = connected_pieces(edges, 2);
-  std::vector<int> gain(mesh.triangles.size(), 0);  // odd edges fewer without this patch
-  std::vector<std::vector<std::uint32_t>> shared_edges(mesh.triangles.size());
-  for (std::uint32_t e = 0; e < edges.size(); ++e) {
-    const auto sides = edges.sides(e);
-    if (sides.size() == 2) continue;  // inside a patch
-    for (const auto& [patch, count] : patches_at(patches, sides)) {
-      if (count % 2 == 1) gain[patch] += sides.size() % 2 == 1 ? 1 : -1;
-      if (count < sides.size()) shared_edges[patch].push_back(e);
-    }
-  }
+  HangingPatches hanging(mesh, edges);
+  auto& [patches, gain, shared_edges] = hanging;
   std::vector<std::uint32_t> order;
   for (std::uint32_t patch = 0; patch < gain.size(); ++patch)
     if (gain[patch] > 0 && !shared_edges[patch].empty()) order.push_back(patch);
@@ -317,6 +331,27 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
 }
 
 }  // namespace
+
+void drop_inner_walls(TriangleMesh& mesh, MeshReport& report) {
+  const EdgeTable edges(mesh.triangles);
+  HangingPatches hanging(mesh, edges);
+  std::vector<bool> asked(mesh.triangles.size());
+  for (std::uint32_t patch = 0; patch < asked.size(); ++patch)
+    asked[patch] = !hanging.shared_edges[patch].empty();
+  if (std::find(asked.begin(), asked.end(), true) == asked.end()) return;
+  const std::vector<bool> inner = inner_walls(mesh, hanging.sets, asked);
+  std::vector<Triangle> kept;
+  std::size_t walls = 0;
+  for (std::uint32_t t = 0; t < inner.size(); ++t) {
+    if (!inner[t]) kept.push_back(mesh.triangles[t]);
+    walls += inner[t] && hanging.sets.find(t) == t ? 1 : 0;
+  }
+  if (walls == 0 || count_odd_edges(EdgeTable(kept)) >= count_odd_edges(edges)) return;
+  mesh.triangles = std::move(kept);
+  report.repaired = true;
+  report.notes.push_back("repair: " + counted(walls, "inner wall") +
+                         " removed: there is solid on both sides");
+}
 
 TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report) {
   report.repaired = true;

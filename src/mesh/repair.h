@@ -10,6 +10,10 @@
 
 namespace ist {
 
+/// Drops walls between parts of the solid that share them: patches at edges of three and more faces
+/// with solid on both sides, where fewer odd edges are left without them. Says so in the notes.
+void drop_inner_walls(TriangleMesh& mesh, MeshReport& report);
+
 /// Makes a mesh with odd edges a closed surface: closes cracks with a growing tolerance up to 1e-5
 /// of the diagonal, drops fins and open sheets, caps the holes that are left. Says in the report's
 /// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.

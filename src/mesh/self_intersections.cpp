@@ -47,9 +47,10 @@ struct alignas(64) EightBoxes {
 /// their width and rounded to float, all of which keeps their order: boxes that meet still do.
 class TriangleBoxes {
  public:
-  /// On the caller's TBB threads. At most 2^21 triangles.
+  /// On the caller's TBB threads. At most 2^21 triangles. `margin`: [u] boxes no further apart
+  /// meet.
   TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
-                const std::vector<Triangle>& triangles);
+                const std::vector<Triangle>& triangles, double margin = 0);
 
   std::size_t size() const { return order_.size(); }
   /// The triangle at a place of the curve.
@@ -173,8 +174,13 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 }
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
-                             const std::vector<Triangle>& triangles) {
+                             const std::vector<Triangle>& triangles, const double margin) {
   const RawArray<FloatPoint> points = placed(vertices);
+  float wider = 0;
+  if (margin > 0) {
+    constexpr double kRounding = 0x1p-22;  // of two coordinates
+    wider = static_cast<float>(2 * margin / bounds_of(vertices).sizes().maxCoeff() + kRounding);
+  }
   RawArray<std::uint64_t> keys(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     keys[t] = is_degenerate(vertices, triangles[t])
@@ -189,7 +195,8 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
 
   levels_.push_back(in_eights(order_.size(), [&](const std::size_t i, const std::size_t k) {
     const Triangle& t = triangles[order_[i]];
-    return std::minmax({points[t[0]][k], points[t[1]][k], points[t[2]][k]});
+    const auto [low, high] = std::minmax({points[t[0]][k], points[t[1]][k], points[t[2]][k]});
+    return std::pair{low, high + wider};
   }));
   while (levels_.back().size() > 1) {
     const std::vector<EightBoxes>& below = levels_.back();
@@ -239,71 +246,88 @@ bool share_corner(const Triangle& a, const Triangle& b) {
 constexpr std::size_t kMostTriangles = 2'000'000, kMostCandidates = 50'000'000;
 constexpr std::size_t kMostPairs = 10'000'000;
 
-/// What the parts of a search know and add to. Integers only: their sums do not depend on the
-/// order.
-struct Search {
-  const std::vector<Eigen::Vector3d>& vertices;
-  const std::vector<Triangle>& triangles;
-  const TriangleBoxes boxes{vertices, triangles};
-  const std::vector<Triangle> spread = spread_corners(vertices, triangles, boxes);
+/// What the parts of a search add to. Integers only: their sums do not depend on the order.
+struct Sums {
   std::atomic<std::size_t> candidates{0}, met{0};
 };
 
+enum class Look { apart, candidates, met };
+
 /// Looks at the candidates of one part.
+template <class LookAt>
 class Visitor {
  public:
-  Visitor(Search& search, std::vector<std::array<std::uint32_t, 2>>& pairs)
-      : search_(search), pairs_(pairs) {}
+  Visitor(const TriangleBoxes& boxes, const LookAt& look_at, Sums& sums,
+          std::vector<std::array<std::uint32_t, 2>>& pairs)
+      : boxes_(boxes), look_at_(look_at), sums_(sums), pairs_(pairs) {}
   Visitor(const Visitor&) = delete;
   Visitor& operator=(const Visitor&) = delete;
-  ~Visitor() { search_.candidates += candidates_; }
+  ~Visitor() { sums_.candidates += candidates_; }
 
-  bool done() const { return search_.candidates.load(std::memory_order_relaxed) > kMostCandidates; }
+  bool done() const { return sums_.candidates.load(std::memory_order_relaxed) > kMostCandidates; }
 
   void operator()(const std::size_t i, const std::size_t j) {
-    const bool spread_out = share_corner(search_.spread[i], search_.spread[j]);
-    if (spread_out || look_at(search_.boxes.triangle(i), search_.boxes.triangle(j))) {
-      constexpr std::size_t kOften = 1024;
-      if (++candidates_ == kOften) search_.candidates += std::exchange(candidates_, 0);
-    }
+    const Look found = look_at_(i, j);
+    if (found == Look::apart) return;
+    constexpr std::size_t kOften = 1024;
+    if (++candidates_ == kOften) sums_.candidates += std::exchange(candidates_, 0);
+    if (found == Look::candidates || sums_.met++ >= kMostPairs) return;
+    const std::uint32_t a = boxes_.triangle(i), b = boxes_.triangle(j);
+    pairs_.push_back({std::min(a, b), std::max(a, b)});
   }
 
  private:
-  /// Whether they are candidates.
-  bool look_at(const std::uint32_t a, const std::uint32_t b) {
-    const std::vector<Eigen::Vector3d>& vertices = search_.vertices;
-    const Triangle &of_a = search_.triangles[a], &of_b = search_.triangles[b];
-    if (!boxes_meet(vertices, of_a, of_b)) return false;
-    if (!seen_apart(vertices, of_a, of_b) && meet_elsewhere(vertices, of_a, of_b) &&
-        search_.met++ < kMostPairs)
-      pairs_.push_back({std::min(a, b), std::max(a, b)});
-    return true;
-  }
-
-  Search& search_;
+  const TriangleBoxes& boxes_;
+  const LookAt& look_at_;
+  Sums& sums_;
   std::vector<std::array<std::uint32_t, 2>>& pairs_;
   std::size_t candidates_ = 0;  ///< not yet in the sum
 };
 
-}  // namespace
-
-std::optional<SelfIntersections> find_self_intersections(
-    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
-  if (triangles.size() > kMostTriangles) return std::nullopt;
-  Search search{vertices, triangles};
+/// `look_at`: at the triangles of two places.
+template <class LookAt>
+std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt& look_at) {
+  Sums sums;
   tbb::enumerable_thread_specific<std::vector<std::array<std::uint32_t, 2>>> of_threads;
-  tbb::parallel_for(std::size_t{0}, search.boxes.parts(), [&](const std::size_t part) {
-    Visitor visitor(search, of_threads.local());
-    search.boxes.for_each_pair(part, visitor);
+  tbb::parallel_for(std::size_t{0}, boxes.parts(), [&](const std::size_t part) {
+    Visitor visitor(boxes, look_at, sums, of_threads.local());
+    boxes.for_each_pair(part, visitor);
   });
-  if (search.candidates > kMostCandidates) return std::nullopt;
-  SelfIntersections result{search.met, std::nullopt};
+  if (sums.candidates > kMostCandidates) return std::nullopt;
+  SelfIntersections result{sums.met, std::nullopt};
   if (result.count > kMostPairs) return result;
   result.pairs.emplace();
   for (const auto& pairs : of_threads)
     result.pairs->insert(result.pairs->end(), pairs.begin(), pairs.end());
   std::sort(result.pairs->begin(), result.pairs->end());
   return result;
+}
+
+}  // namespace
+
+std::optional<SelfIntersections> find_self_intersections(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
+  if (triangles.size() > kMostTriangles) return std::nullopt;
+  const TriangleBoxes boxes(vertices, triangles);
+  const std::vector<Triangle> spread = spread_corners(vertices, triangles, boxes);
+  return search(boxes, [&](const std::size_t i, const std::size_t j) {
+    if (share_corner(spread[i], spread[j])) return Look::candidates;
+    const Triangle &a = triangles[boxes.triangle(i)], &b = triangles[boxes.triangle(j)];
+    if (!boxes_meet(vertices, a, b)) return Look::apart;
+    return !seen_apart(vertices, a, b) && meet_elsewhere(vertices, a, b) ? Look::met
+                                                                         : Look::candidates;
+  });
+}
+
+std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+    const double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted) {
+  if (triangles.size() > kMostTriangles) return std::nullopt;
+  const TriangleBoxes boxes(vertices, triangles, margin);
+  auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
+    return wanted(boxes.triangle(i), boxes.triangle(j)) ? Look::met : Look::candidates;
+  });
+  return found ? std::move(found->pairs) : std::nullopt;
 }
 
 }  // namespace ist

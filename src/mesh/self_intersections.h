@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -40,5 +41,12 @@ struct SelfIntersections {
 /// caller's TBB threads; the answer does not depend on their number.
 std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles);
+
+/// Pairs of triangles, the smaller index first, sorted, whose boxes are no further than `margin`
+/// [u] apart and for which `wanted` holds, which several threads ask at once. Limits and threads as
+/// above.
+std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+    double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted);
 
 }  // namespace ist

@@ -95,6 +95,34 @@ SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
   return partners;
 }
 
+SidePartners nearest_partners(const std::vector<Eigen::Vector3d>& vertices,
+                              const std::vector<Triangle>& triangles, const EdgeTable& edges) {
+  SidePartners partners = manifold_partners(edges);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    if (edges.sides(e).size() <= 2) continue;
+    auto order = around_edge(vertices, triangles, edges, e);
+    while (order.size() >= 2) {
+      std::size_t first = order.size();
+      double least = HUGE_VAL;
+      for (std::size_t i = 0; i < order.size(); ++i) {
+        const auto& [from, side] = order[i];
+        const auto& [to, next] = order[(i + 1) % order.size()];
+        const double angle = i + 1 < order.size() ? to - from : to + 4 - from;
+        if (runs_up(triangles, side) == runs_up(triangles, next) || !(angle < least)) continue;
+        least = angle;
+        first = i;
+      }
+      if (first == order.size()) break;  // unbalanced
+      const std::size_t second = (first + 1) % order.size();
+      partners[order[first].second] = order[second].second;
+      partners[order[second].second] = order[first].second;
+      order.erase(order.begin() + static_cast<std::ptrdiff_t>(std::max(first, second)));
+      order.erase(order.begin() + static_cast<std::ptrdiff_t>(std::min(first, second)));
+    }
+  }
+  return partners;
+}
+
 std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
                                              const SidePartners& partners) {
   const std::size_t n = triangles.size();

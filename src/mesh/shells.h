@@ -36,6 +36,12 @@ SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
 /// Triangles that hang together by edges of no more sides than `most`. 2: patches of a manifold.
 DisjointSets connected_pieces(const EdgeTable& edges, std::size_t most = SIZE_MAX);
 
+/// Partners of an oriented surface: at edges of four, six … sides neighbours in the angle about the
+/// edge that agree about the outside, those with the smallest angle between them first. They make
+/// pieces of which each is closed if all are.
+SidePartners nearest_partners(const std::vector<Eigen::Vector3d>& vertices,
+                              const std::vector<Triangle>& triangles, const EdgeTable& edges);
+
 /// Turns triangles so that partners agree about the outside; the smaller part of each connected
 /// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and
 /// then turns none.

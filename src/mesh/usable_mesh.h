@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,11 @@ Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
 /// The largest magnitude of a coordinate.
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 
+/// The spacing of doubles at `size`.
+inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
+
 /// As close_mesh(), of a closed surface whose triangles face outward already: none is turned.
-/// Shells that face inward count as cavities.
+/// Shells that face inward count as cavities. How its triangles meet is not looked for.
 ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
 
 }  // namespace ist

@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
+#include <array>
 #include <random>
 #include <set>
 #include <string>
@@ -43,6 +46,48 @@ TEST(Repair, HolesAreCapped) {
   TriangleMesh tube = torus_mesh(2, 0.5, 24, 12);
   std::erase_if(tube.triangles, [](const auto& t) { return t[0] / 12 == 3 || t[0] / 12 == 12; });
   EXPECT_EQ(repaired(tube).report.filled_holes, 4u);
+}
+
+/// Boxes side by side, whose walls in common are there once, facing any way.
+TEST(Repair, LayersLoseTheirInnerWallsAndKeepTheirOutside) {
+  std::mt19937_64 random(5);
+  for (const std::array<int, 3>& cells : {std::array{2, 1, 1}, {4, 1, 1}, {2, 2, 1}, {3, 2, 2}})
+    for (int turn = 0; turn < 4; ++turn) {
+      TriangleMesh mesh;
+      const auto face = [&](Eigen::Vector3d at, const int k, const double thickness) {
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (const int corner : {0, 1, 3, 2}) {
+          Eigen::Vector3d p = at;
+          p[(k + 1) % 3] += corner & 1;
+          p[(k + 2) % 3] += corner >> 1;
+          p[0] *= thickness;
+          mesh.vertices.push_back(p);
+        }
+        const bool turned = random() % 2 == 0;
+        for (const std::array<std::uint32_t, 3>& t : {std::array{0u, 1u, 2u}, {0u, 2u, 3u}})
+          mesh.triangles.push_back(
+              {first + t[0], first + t[turned ? 2 : 1], first + t[turned ? 1 : 2]});
+      };
+      const double thickness = turn % 2 == 0 ? 1 : 0.03;
+      for (int k = 0; k < 3; ++k) {
+        std::array<int, 3> end = cells;
+        ++end[static_cast<std::size_t>(k)];
+        for (int x = 0; x < end[0]; ++x)
+          for (int y = 0; y < end[1]; ++y)
+            for (int z = 0; z < end[2]; ++z) face(Eigen::Vector3d(x, y, z), k, thickness);
+      }
+      std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), random);
+      if (turn > 1) {
+        const Eigen::Matrix3d turned =
+            Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+        for (Eigen::Vector3d& v : mesh.vertices) v = turned * v;
+      }
+      const ClosedMesh closed = close_mesh(mesh, "layers", OpenMeshPolicy::repair);
+      const double volume = cells[0] * cells[1] * cells[2] * thickness;
+      EXPECT_NEAR(closed.report.volume, volume, 1e-12 * volume) << cells[0] << turn;
+      ASSERT_TRUE(closed.report.judged);
+      EXPECT_GT(closed.report.judged->confidence, 0.95);
+    }
 }
 
 TEST(Repair, CracksAreStitched) {

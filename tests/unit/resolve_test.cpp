@@ -91,9 +91,123 @@ TEST(Resolve, ShellInAShell) {
   EXPECT_EQ(result.resolution.moved, 0);
 }
 
-TEST(Resolve, WhatOnlyTouchesStaysAsItIs) {
-  for (const Point& at : {Point(1, 0, 0), Point(1, 0.5, 0.25), Point(1, 1, 0), Point(1, 1, 1),
-                          Point(1, 1, 0.5), Point(3, 0, 0)}) {
+double area_of(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Point& from = mesh.vertices[a];
+    area += (mesh.vertices[b] - from).cross(mesh.vertices[c] - from).norm() / 2;
+  }
+  return area;
+}
+
+/// A prism of n sides and radius 1 about the z axis.
+TriangleMesh prism(const std::uint32_t n, const double low, const double high, const double turn) {
+  TriangleMesh mesh;
+  for (const double z : {low, high})
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const double angle = turn + 2 * 3.14159265358979 * i / n;
+      mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), z);
+    }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    mesh.triangles.push_back({i, j, n + j});
+    mesh.triangles.push_back({i, n + j, n + i});
+    if (i < 1 || i + 1 >= n) continue;
+    mesh.triangles.push_back({0, i + 1, i});
+    mesh.triangles.push_back({n, n + i, n + i + 1});
+  }
+  return mesh;
+}
+
+/// What a prism fits into; its outer radius is 2.
+TriangleMesh tube(const std::uint32_t n, const double low, const double high) {
+  TriangleMesh mesh;
+  mesh.vertices = joined(prism(n, low, high, 0), prism(n, low, high, 0)).vertices;
+  const auto quad = [&](const std::uint32_t a, const std::uint32_t b, const std::uint32_t c,
+                        const std::uint32_t d) {
+    mesh.triangles.push_back({a, b, c});
+    mesh.triangles.push_back({a, c, d});
+  };
+  for (std::uint32_t v = 2 * n; v < 4 * n; ++v) mesh.vertices[v].head<2>() *= 2;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    quad(2 * n + i, 2 * n + j, 3 * n + j, 3 * n + i);
+    quad(j, i, n + i, n + j);
+    quad(i, j, 2 * n + j, 2 * n + i);
+    quad(n + j, n + i, 3 * n + i, 3 * n + j);
+  }
+  return mesh;
+}
+
+/// Parts that touch, and the surface of their union.
+struct Touching {
+  TriangleMesh mesh;
+  double volume, area, twice = 0;
+};
+
+std::vector<Touching> touching_parts() {
+  const TriangleMesh cube = cube_at({0, 0, 0});
+  const TriangleMesh row = joined(joined(cube, cube_at({0, 0, 1})), cube_at({1, 0, 0}));
+  const TriangleMesh on_it =
+      joined(box_mesh({0.3, 0.3, 1}, {0.6, 0.6, 1.5}), box_mesh({0.6, 0.1, 1}, {0.9, 0.6, 1.2}));
+  const TriangleMesh inside =
+      joined(box_mesh({0, 0, 0}, {3, 3, 3}), box_mesh({0, 1, 1}, {1, 2, 2}));
+  constexpr std::uint32_t kSides = 13;
+  const double disc = kSides / 2.0 * std::sin(2 * 3.14159265358979 / kSides);
+  const double rim = 2 * kSides * std::sin(3.14159265358979 / kSides);
+  return {
+      {joined(cube, cube_at({0.3, 0.2, 1})), 2, 12 - 2 * 0.56},
+      {joined(cube, cube_at({0, 0.5, 1})), 2, 12 - 2 * 0.5},
+      {joined(box_mesh({-2, -0.5, 0}, {2, 0.5, 1}), box_mesh({-0.5, -2, 1}, {0.5, 2, 2})), 8, 34},
+      {row, 3, 14},
+      {joined(cube, on_it), 1 + 0.045 + 0.03, 6 + 1.2 * 0.5 + 1.6 * 0.2 - 2 * 0.3 * 0.2},
+      {joined(inside, cube_at({1, 1, 1})), 27, 54, 2},
+      {joined(tube(kSides, 0, 1), prism(kSides, 0, 1, 0)), 4 * disc, 8 * disc + 2 * rim},
+      {joined(tube(kSides, 0, 1), prism(kSides, -0.4, 1.9, 0)), 4 * disc + 1.3 * disc,
+       8 * disc + 2 * rim + 1.3 * rim},
+  };
+}
+
+TEST(Resolve, PartsThatTouchAreOneSolidAtEveryTurn) {
+  std::mt19937_64 random(17);
+  std::uniform_real_distribution<double> by(-3, 3);
+  for (const Touching& parts : touching_parts())
+    for (int turn = 0; turn < 24; ++turn) {
+      TriangleMesh mesh = parts.mesh;
+      double scale = 1;
+      if (turn > 0) {  // every fourth by right angles
+        const Point angles = Point(by(random), by(random), by(random));
+        const auto angle = [&](const int k) {
+          return turn % 4 == 0 ? std::round(angles[k]) * std::acos(0.0) : angles[k];
+        };
+        const Eigen::Matrix3d turned = (Eigen::AngleAxisd(angle(0), Point::UnitX()) *
+                                        Eigen::AngleAxisd(angle(1), Point::UnitY()) *
+                                        Eigen::AngleAxisd(angle(2), Point::UnitZ()))
+                                           .toRotationMatrix();
+        scale = std::array{1.0, 0.001, 25.4}[static_cast<std::size_t>(turn) % 3];
+        const Point to = turn % 2 == 0 ? Point(by(random), by(random), by(random)) : Point::Zero();
+        for (Point& v : mesh.vertices) v = scale * (turned * v + to);
+      }
+      const ClosedMesh closed = close_mesh(mesh, "parts");
+      const ResolvedMesh result = resolve(closed);
+      ASSERT_NE(result.resolution.how, How::unresolved) << result.resolution.reason;
+      const double cubed = scale * scale * scale;
+      const double volume = parts.volume * cubed, area = parts.area * scale * scale;
+      EXPECT_NEAR(result.resolution.counted_twice, parts.twice * cubed, 1e-11 * volume);
+      EXPECT_GE(result.resolution.counted_twice, 0);
+      EXPECT_NEAR(result.mesh.report.volume, volume, 1e-11 * volume) << turn;
+      EXPECT_NEAR(area_of(result.mesh.mesh), area, 1e-9 * area) << "an inner wall, " << turn;
+      const Asset asset = bake_surface(closed);
+      EXPECT_NEAR(asset.view().volume(), volume, 1e-11 * volume);
+      if (turn % 6 > 1) continue;
+      for (const Invariant& one : check(asset, closed))
+        EXPECT_EQ(one.violations, 0u) << one.name << ' ' << one.worst;
+    }
+}
+
+TEST(Resolve, WhatOnlyTouchesInEdgesAndCornersStaysAsItIs) {
+  for (const Point& at :
+       {Point(1, 0, 0), Point(1, 1, 0), Point(1, 1, 1), Point(1, 1, 0.5), Point(3, 0, 0)}) {
     const TriangleMesh mesh = joined(cube_at({0, 0, 0}), cube_at(at));
     const ClosedMesh closed = close_mesh(mesh, "cubes");
     const ResolvedMesh result = resolve(closed);

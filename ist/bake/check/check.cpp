@@ -188,9 +188,9 @@ class DistanceSolid final : public CheckedSolid {
   Eigen::AlignedBox3d bounds_;
 };
 
-Bounding bounding_of(const ClosedMesh& mesh) {
-  if (mesh.report.meets_itself) return Bounding::parts;
-  return mesh.report.shells != 1 ? Bounding::shells : Bounding::all;
+Bounding bounding_of(const MeshSolid& solid) {
+  if (solid.meets_itself()) return Bounding::parts;
+  return solid.may_overlap() ? Bounding::shells : Bounding::all;
 }
 
 /// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
@@ -198,12 +198,13 @@ Bounding bounding_of(const ClosedMesh& mesh) {
 /// the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
                                  const CheckedSolid& solid, const CheckedMesh& surface,
-                                 const UnitFrame& frame, const MeshMoments& moments) {
+                                 const UnitFrame& frame, const MeshMoments& moments,
+                                 const Bounding bounding) {
   std::vector<Invariant> all;
   all.push_back(check_frame(asset, frame));
   append(all, check_mass(asset, moments, solid));
   append(all, check_bounds(asset, surface));
-  append(all, check_kept_mesh(asset, mesh, frame, surface, bounding_of(mesh)));
+  append(all, check_kept_mesh(asset, mesh, frame, surface, bounding));
   if (asset.sphere_count == 0) return all;
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
@@ -215,17 +216,19 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_surface(asset, surface, bounding_of(mesh)));
+  append(all, check_surface(asset, surface, bounding));
   return all;
 }
 
 std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as_it_came) {
-  const ClosedMesh mesh = resolve(as_it_came).mesh;
-  const MeshSolid solid(mesh);
+  const ResolvedMesh resolved = resolve(as_it_came);
+  const ClosedMesh& mesh = resolved.mesh;
+  const MeshSolid solid(resolved);
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
   const CheckedMesh surface(mesh, solid.frame());
-  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments());
+  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments(),
+                   bounding_of(solid));
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
@@ -241,7 +244,7 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   MeshMoments moments = moments_near(mesh.arrays(), mesh.unit_moments(), made.error / scale);
   moments.volume_error += off / scale / scale / scale;
   return check_all(asset, closed, DistanceSolid(solid, mesh.frame()),
-                   CheckedMesh(closed, mesh.frame()), mesh.frame(), moments);
+                   CheckedMesh(closed, mesh.frame()), mesh.frame(), moments, bounding_of(mesh));
 }
 
 }  // namespace

@@ -254,7 +254,7 @@ std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMes
   if (asset.mesh == 0) return {};
   const KeptMesh mesh(asset, *at<MeshHeader>(asset, asset.mesh));
   std::vector<Invariant> out;
-  if (static_cast<MeshState>(asset.mesh_state) == MeshState::own) {
+  if (static_cast<MeshState>(asset.mesh_state) != MeshState::simplified) {
     out.push_back(same_triangles(mesh.triangles(), surface.triangles()));
     out.push_back(rounding(baked, frame, mesh.header.rounding));
   } else {

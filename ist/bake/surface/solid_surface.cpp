@@ -247,7 +247,11 @@ std::optional<Overlaps> find_overlaps(const MeshSolid& solid) {
 }  // namespace
 
 std::optional<SolidSurface> SolidSurface::of(const MeshSolid& solid, double enough) {
-  if (!solid.may_overlap()) return SolidSurface(solid);
+  if (!solid.may_overlap()) {
+    SolidSurface surface(solid);
+    surface.off_ = solid.moved() - solid.rounding();
+    return surface;
+  }
   if (!solid.meets_itself()) return of_shells(solid);
   const std::optional<Overlaps> overlaps = find_overlaps(solid);
   if (!overlaps || overlaps->off > enough) return std::nullopt;

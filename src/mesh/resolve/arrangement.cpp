@@ -239,7 +239,8 @@ class ClusterWork {
     std::sort(inner.begin(), inner.end());
     inner.erase(std::unique(inner.begin(), inner.end()), inner.end());
     PlanarTriangulation plane(points_, cluster_.axis, frame, inner);
-    for (Segment& s : cluster_.segments) {
+    for (std::size_t place = 0; place < cluster_.segments.size(); ++place) {
+      Segment& s = cluster_.segments[place];
       stop_.look();
       const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
         const int by_first = points_.compare(first(), p, q);
@@ -247,7 +248,9 @@ class ClusterWork {
       };
       std::sort(s.on.begin(), s.on.end(), along);
       const int step = !s.is_side() ? 0 : s.on.front() == s.from ? 1 : -1;
-      for (std::size_t k = 0; k + 1 < s.on.size(); ++k) plane.insert(s.on[k], s.on[k + 1], step);
+      const std::size_t facing = s.is_side() ? facing_of(place) : 0;
+      for (std::size_t k = 0; k + 1 < s.on.size(); ++k)
+        plane.insert(s.on[k], s.on[k + 1], step, facing);
     }
     plane.make_round();
     cluster_.pieces = plane.covered();
@@ -258,6 +261,11 @@ class ClusterWork {
     double low, high;
   };
 
+  /// 1 for sides of triangles that face away from the viewer.
+  std::size_t facing_of(const std::size_t side) const {
+    const Triangle& t = triangles_[cluster_.triangles[side / 3]];
+    return turn(t[0], t[1], t[2]) < 0 ? 1 : 0;
+  }
   int first() const { return (cluster_.axis + 1) % 3; }
   int second() const { return (cluster_.axis + 2) % 3; }
   int turn(const std::uint32_t a, const std::uint32_t b, const std::uint32_t c) const {
@@ -400,7 +408,7 @@ void drop_copies(Cluster& cluster) {
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
                     const std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work) {
-  Arrangement out{ExactPoints(vertices), {}, {}, {}, {}};
+  Arrangement out{ExactPoints(vertices), {}, {}, {}, {}, {}};
   const std::vector<Meeting> meetings =
       find_meetings(out.points, triangles, pairs, work, kMeetings);
   const Frames frames = add_frames(out.points);
@@ -433,12 +441,19 @@ Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
     out.source.push_back(source);
     out.winding_step.push_back(std::abs(step));
   };
+  const auto add_pieces = [&](const Cluster& cluster, const std::uint32_t source) {
+    bool wall = false;
+    for (const auto& [corners, winding] : cluster.pieces) {
+      if (winding[0] + winding[1] != 0) add(corners, source, winding[0] + winding[1]);
+      wall |= winding[0] != 0 && winding[1] != 0;
+    }
+    if (wall) out.walls.push_back(source);
+  };
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     if (cluster_of[t] == kNoIndex) {
       if (!is_degenerate(vertices, triangles[t])) add(triangles[t], t, 1);
     } else if (out.plane[t] == t) {
-      for (const auto& [corners, winding] : clusters[cluster_of[t]].pieces)
-        add(corners, t, winding);
+      add_pieces(clusters[cluster_of[t]], t);
     }
   }
   return out;

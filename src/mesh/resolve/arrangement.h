@@ -50,10 +50,12 @@ struct Arrangement {
   std::vector<std::uint32_t> source;  ///< [piece] a triangle of the mesh in whose plane it lies
   std::vector<int> winding_step;      ///< [piece] > 0: of the winding number, to behind it
   std::vector<std::uint32_t> plane;   ///< [triangle] those in one plane that meet have the same
+  std::vector<std::uint32_t> walls;   ///< by `plane`: where pieces cancelled each other
 };
 
-/// Triangles on a line are left out, and pieces that others cancel. `pairs`: those that meet.
-/// The same for any number of threads. Throws Unresolvable, and as `work` does.
+/// Triangles on a line are left out, and pieces that others, which face the other way, cancel.
+/// `pairs`: those that meet. The same for any number of threads. Throws Unresolvable, and as `work`
+/// does.
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
                     std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work);

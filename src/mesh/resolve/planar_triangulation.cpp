@@ -122,10 +122,11 @@ PlanarTriangulation::Place PlanarTriangulation::edge_between(const std::uint32_t
   return {kNoIndex, 0};
 }
 
-void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t to, const int step) {
+void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t to, const int step,
+                                 const std::size_t of) {
   const bool up = from < to;
-  const auto [known, fresh] = steps_.try_emplace(key(std::min(from, to), std::max(from, to)), 0);
-  known->second += up ? step : -step;
+  const auto [known, fresh] = steps_.try_emplace(key(std::min(from, to), std::max(from, to)));
+  known->second[of] += up ? step : -step;
   if (!fresh || edge_between(from, to).cell != kNoIndex) return;
   // The edges it crosses, from one end to the other.
   Place at = place_of(from);
@@ -210,10 +211,10 @@ void PlanarTriangulation::make_round() {
 }
 
 std::vector<PlanarTriangulation::Covered> PlanarTriangulation::covered() const {
-  constexpr int kUnknown = INT_MAX;
-  std::vector<int> winding(cells_.size(), kUnknown);
+  constexpr std::array<int, 2> kUnknown = {INT_MAX, INT_MAX}, kNothing = {0, 0};
+  std::vector<std::array<int, 2>> winding(cells_.size(), kUnknown);
   std::vector<std::uint32_t> reached = {cell_at_.at(frame_[0])};
-  winding[reached[0]] = 0;
+  winding[reached[0]] = kNothing;
   while (!reached.empty()) {
     const std::uint32_t cell = reached.back();
     reached.pop_back();
@@ -223,14 +224,15 @@ std::vector<PlanarTriangulation::Covered> PlanarTriangulation::covered() const {
       // The cell is on the left of a → b, u on the right.
       const std::uint32_t a = cells_[cell].corner[after(k)], b = cells_[cell].corner[before(k)];
       const auto step = steps_.find(key(std::min(a, b), std::max(a, b)));
-      const int up = step == steps_.end() ? 0 : a < b ? step->second : -step->second;
-      winding[u] = winding[cell] - up;
+      winding[u] = winding[cell];
+      for (std::size_t of = 0; of < 2 && step != steps_.end(); ++of)
+        winding[u][of] -= a < b ? step->second[of] : -step->second[of];
       reached.push_back(u);
     }
   }
   std::vector<Covered> result;
   for (std::size_t cell = 0; cell < cells_.size(); ++cell)
-    if (winding[cell] != 0) result.push_back({cells_[cell].corner, winding[cell]});
+    if (winding[cell] != kNothing) result.push_back({cells_[cell].corner, winding[cell]});
   return result;
 }
 

@@ -19,17 +19,18 @@ class PlanarTriangulation {
                       const std::vector<std::uint32_t>& inner);
 
   /// Makes a segment between two of the points part of it. Nothing else may lie on the segment or
-  /// cross it. The winding number steps up by `step` from its right to its left.
-  void insert(std::uint32_t from, std::uint32_t to, int step);
+  /// cross it. The winding number of one of two kinds of curves, whichever `of` says, steps up by
+  /// `step` from its right to its left.
+  void insert(std::uint32_t from, std::uint32_t to, int step, std::size_t of);
 
   /// Turns edges that are no segments where that makes triangles rounder.
   void make_round();
 
   struct Covered {
-    Triangle triangle;  ///< counter-clockwise
-    int winding;        ///< ≠ 0
+    Triangle triangle;           ///< counter-clockwise
+    std::array<int, 2> winding;  ///< not both 0
   };
-  /// Triangles about which the segments wind.
+  /// Triangles about which either kind of segments winds.
   std::vector<Covered> covered() const;
 
  private:
@@ -67,7 +68,8 @@ class PlanarTriangulation {
   std::array<std::uint32_t, 3> frame_;
   std::vector<Cell> cells_;
   std::unordered_map<std::uint32_t, std::uint32_t> cell_at_;  ///< [point]
-  std::unordered_map<std::uint64_t, int> steps_;  ///< of segments, from the smaller number
+  /// Of segments, from the smaller number.
+  std::unordered_map<std::uint64_t, std::array<int, 2>> steps_;
   std::uint64_t random_ = 1;
 };
 

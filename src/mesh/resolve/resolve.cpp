@@ -16,11 +16,13 @@
 #include "mesh/disjoint_sets.h"
 #include "mesh/message_text.h"
 #include "mesh/resolve/arrangement.h"
+#include "mesh/resolve/press.h"
 #include "mesh/resolve/unresolvable.h"
 #include "mesh/self_intersections.h"
 #include "mesh/shells.h"
 #include "mesh/triangle_columns.h"
 #include "mesh/usable_mesh.h"
+#include "mesh/weld.h"
 #include "stage/stage.h"
 #include "stage/thread_arena.h"
 
@@ -173,7 +175,7 @@ using How = Resolution::How;
 
 constexpr std::size_t kMostResolvedPairs = 2'000'000;
 
-Pairs pairs_of(ClosedMesh& closed) {
+const Pairs& pairs_of(ClosedMesh& closed) {
   if (!closed.meeting_pairs) {
     auto met = find_self_intersections(closed.mesh.vertices, closed.mesh.triangles);
     if (met) closed.meeting_pairs = std::move(met->pairs);
@@ -213,23 +215,41 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
   return groups;
 }
 
-/// The spacing of doubles at the mesh's largest coordinate. What differs by less is one vertex,
-/// near the origin too.
-double snap_step(const std::vector<Eigen::Vector3d>& vertices) {
-  double largest = 0;
-  for (const Eigen::Vector3d& v : vertices) largest = std::max(largest, v.cwiseAbs().maxCoeff());
-  return std::ldexp(1.0, std::ilogb(largest) - 52);
-}
-
 /// To the nearest multiples of a power of two.
 Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
   return (p / step).array().rint() * step;
 }
 
+/// Drops pieces of a closed surface that are thinner than rounding: gaps between faces that have
+/// their corners in common, and what pressing left.
+void drop_flat_pieces(TriangleMesh& mesh, const double thinnest, const Eigen::Vector3d& from) {
+  const SidePartners partners =
+      nearest_partners(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
+  DisjointSets pieces(mesh.triangles.size());
+  for (std::uint32_t side = 0; side < partners.size(); ++side)
+    if (partners[side] != kNoIndex) pieces.unite(side / 3, partners[side] / 3);
+  std::vector<double> volume(mesh.triangles.size(), 0), area(mesh.triangles.size(), 0);
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto corner = [&](const std::size_t k) { return mesh.vertices[mesh.triangles[t][k]]; };
+    volume[pieces.find(t)] += volume_of(corner(0), corner(1), corner(2), from) / 6;
+    area[pieces.find(t)] += (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm() / 2;
+  }
+  std::vector<Triangle> kept;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t piece = pieces.find(t);
+    if (std::abs(volume[piece]) > thinnest * area[piece]) kept.push_back(mesh.triangles[t]);
+  }
+  if (!kept.empty()) mesh.triangles = std::move(kept);
+}
+
 class Resolver {
  public:
-  Resolver(ClosedMesh& closed, WatchedWork& work)
-      : closed_(closed),
+  /// `closed`: with pressed vertices, if any.
+  Resolver(const ClosedMesh& as_it_came, const Pressed& pressed, ClosedMesh& closed,
+           WatchedWork& work)
+      : closed_(as_it_came),
+        pressed_(pressed),
+        vertices_(pressed.moved > 0 ? pressed.mesh.vertices : closed.mesh.vertices),
         triangles_(closed.mesh.triangles),
         pairs_(pairs_of(closed)),
         arrangement_(arrange(closed.mesh.vertices, triangles_, pairs_, work)),
@@ -252,36 +272,58 @@ class Resolver {
       resolution.counted_twice += (std::max(back - 1, 0) - std::max(front - 1, 0)) * volume;
       resolution.counted_against += (std::max(-back, 0) - std::max(-front, 0)) * volume;
     }
-    if (!any) return std::nullopt;
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+      if (std::binary_search(arrangement_.walls.begin(), arrangement_.walls.end(),
+                             arrangement_.plane[t]))
+        any = changed[groups[t]] = true;
+    // What differs by less is one vertex, near the origin too.
+    const double step = spacing_at(largest_coordinate(bounds_of(vertices_)));
     TriangleMesh made;
-    const double step = snap_step(closed_.mesh.vertices);
+    if (!any && pressed_.moved == 0) {
+      made = closed_.mesh;
+      drop_flat_pieces(made, kNearSteps * step, from_);
+      if (made.triangles.size() == triangles_.size()) return std::nullopt;
+      return made;
+    }
     for (std::uint32_t v = 0; v < arrangement_.points.size(); ++v)
       made.vertices.push_back(arrangement_.points.is_given(v)
-                                  ? arrangement_.points.rounded(v)
+                                  ? vertices_[v]
                                   : snapped(arrangement_.points.rounded(v), step));
     for (std::size_t t = 0; t < triangles_.size(); ++t)
       if (!changed[groups[t]]) made.triangles.push_back(triangles_[t]);
+    std::vector<bool> used(made.vertices.size(), false);
     for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
       if (!changed[group_of_piece(p)] || in_front(p) > 0 || behind(p) < 1) continue;
       made.triangles.push_back(arrangement_.pieces[p]);
-      for (const std::uint32_t v : arrangement_.pieces[p])
+      for (const std::uint32_t v : arrangement_.pieces[p]) {
+        used[v] = true;
         if (!arrangement_.points.is_given(v)) resolution.moved = 1.7321 * step;  // √3
+      }
     }
     if (made.triangles.empty()) throw Unresolvable{"the winding number is nowhere 1 or more"};
+    if (pressed_.moved > 0) {
+      resolution.moved += pressed_.moved + pressed_.apart;
+      made = weld_among(made, pressed_.apart, used);
+      std::erase_if(made.triangles, has_repeated_corner);
+    }
+    drop_flat_pieces(made, kNearSteps * step, from_);
     return made;
   }
 
   /// Closes the surface and holds its volume against what the mesh counts.
-  ClosedMesh close(TriangleMesh surface, const Resolution& resolution) const {
+  ClosedMesh close(TriangleMesh surface, Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))
       throw Unresolvable{"the resolved surface is not closed"};
     const Volume before(closed_.mesh, from_), after(result.mesh, from_);
     const double expected = before.sum - resolution.counted_twice + resolution.counted_against;
     const double off = std::abs(after.sum - expected);
-    if (!(off <= 2 * resolution.moved * after.area + 1e-12 * (before.size + after.size)))
+    const double rounding = 2 * resolution.moved * after.area;
+    if (!(off <= rounding + 1e-12 * (before.size + after.size)))
       throw Unresolvable{"the volume of the resolved surface is " + shortest(after.sum) + ", not " +
                          shortest(expected)};
+    for (double* const counted : {&resolution.counted_twice, &resolution.counted_against})
+      if (*counted <= rounding + 1e-15 * before.size) *counted = 0;  // below 0 too
     MeshReport& report = result.report;
     report.filled_holes = closed_.report.filled_holes;
     report.repaired = closed_.report.repaired;
@@ -305,8 +347,10 @@ class Resolver {
   }
 
   const ClosedMesh& closed_;
+  const Pressed& pressed_;
+  const std::vector<Eigen::Vector3d>& vertices_;  ///< where they stay
   const std::vector<Triangle>& triangles_;
-  Pairs pairs_;
+  const Pairs& pairs_;
   Arrangement arrangement_;
   Patches patches_;
   Eigen::Vector3d from_;
@@ -317,6 +361,8 @@ std::string percent(const double part, const double of) {
 }
 
 std::string describe(const Resolution& resolution, const double volume) {
+  if (resolution.counted_twice == 0 && resolution.counted_against == 0)
+    return "parts of the mesh touch: the walls between them are no boundary and were removed";
   std::string text = "parts of the mesh overlap: " + percent(resolution.counted_twice, volume) +
                      " of the solid's volume was counted twice and is now counted once";
   if (resolution.counted_against > 0)
@@ -334,7 +380,10 @@ ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {
   try {
     Resolution resolution;
     resolution.how = How::resolved;
-    const Resolver resolver(result.mesh, work);
+    const Pressed pressed = press_together(result.mesh.mesh);
+    ClosedMesh moved;
+    if (pressed.moved > 0) moved.mesh = {pressed.vertices, pressed.mesh.triangles, {}};
+    const Resolver resolver(result.mesh, pressed, pressed.moved > 0 ? moved : result.mesh, work);
     auto surface = resolver.surface(resolution);
     if (!surface) return as_it_is(std::move(result.mesh));
     ClosedMesh made = resolver.close(std::move(*surface), resolution);
@@ -352,7 +401,11 @@ ResolvedMesh resolve_watched(ClosedMesh closed, WatchedWork& work) {
 }  // namespace
 
 ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress) {
-  if (closed.meeting_pairs && closed.meeting_pairs->empty() && closed.report.shells == 1)
+  // One shell that meets itself nowhere. (Faces that lie on each other belong to several, or they
+  // share edges, or some were one already.)
+  const MeshReport& report = closed.report;
+  if (closed.meeting_pairs && closed.meeting_pairs->empty() && report.shells == 1 &&
+      report.nonmanifold_edges == 0 && report.coincident_triangles == 0)
     return as_it_is(std::move(closed));
   WatchedWork work;
   if (!progress) return resolve_watched(std::move(closed), work);

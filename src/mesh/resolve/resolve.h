@@ -10,15 +10,14 @@ namespace ist {
 /// What a mesh counts more than once, and what was done about it. w is its winding number.
 struct Resolution {
   enum class How {
-    as_it_is,   ///< w is 0 or 1 almost everywhere: nothing was changed
-    resolved,   ///< the mesh is now the boundary of where w ≥ 1
+    as_it_is,   ///< the mesh is the boundary of where w ≥ 1: nothing was changed
+    resolved,   ///< the mesh is now that boundary
     unresolved  ///< nothing was changed; the other figures are not known and 0
   };
   How how = How::as_it_is;
   double counted_twice = 0;  ///< [u³] ∫ (w − 1)⁺ before: what the mesh's volume has too much
   double counted_against = 0;  ///< [u³] ∫ (−w)⁺ before: what it has too little
-  /// [u] no vertex is further than this from where it would be without rounding. Vertices of the
-  /// mesh as it came have not moved.
+  /// [u] no vertex is further than this from where it would be without rounding. 0: none has moved.
   double moved = 0;
   std::string reason;  ///< a sentence: what was done, or why nothing could be
 };
@@ -28,12 +27,14 @@ struct ResolvedMesh {
   Resolution resolution;
 };
 
-/// A mesh whose winding number is 0 or 1 almost everywhere, of the same solid.
+/// A mesh whose winding number is 0 or 1 almost everywhere, of the same solid and without walls in
+/// it.
 ///
 /// Triangles are cut exactly where they meet, in whole numbers; pieces between winding numbers of
 /// 0 or less and 1 or more are kept, and new vertices are rounded to double at last. Up to that
-/// rounding the surface meets itself at most in points, edges and double walls. Parts that hang
-/// together, or meet, and count nothing twice keep their triangles.
+/// rounding the surface meets itself at most in points and edges. Faces that lie on each other from
+/// opposite sides, exactly or but for the rounding of a turn (press.h), are no boundary. Parts that
+/// hang together, or meet, and count nothing twice and have no such faces keep their triangles.
 ///
 /// Same bytes for any number of threads, which are those of the current arena. Takes milliseconds
 /// for thousands of triangles that meet. Never throws for what a mesh looks like.
