@@ -203,8 +203,9 @@ def test_a_mesh_that_is_no_solid_is_named_once(folder, capfd):
 def test_an_open_mesh_is_refused(folder):
     spec = mujoco.MjSpec.from_string(CUBE.format(ground=PLANE, height=1).replace("0 2 1  1 2 3  ", "")
                                      .replace('scale="', 'inertia="shell" scale="'))
-    with pytest.raises(ist.OpenMeshError, match="cube"):
+    with pytest.raises(ist.OpenMeshError, match="cube.*repair=True"):
         ist.mujoco.attach(spec, cache=folder / "cache")
+    assert ist.mujoco.attach(spec, cache=folder / "cache", repair=True) == 1
 
 
 def test_a_pose_that_is_no_number_is_no_contact(folder):

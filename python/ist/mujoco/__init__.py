@@ -49,7 +49,7 @@ def load():
     return path
 
 
-def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=None):
+def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=None, repair=False):
     """Makes solids of the colliding mesh geoms of an MjSpec; returns their number.
 
     Each such geom becomes one of type sdf with an instance of the plug-in `ist.solid`. Its mesh is
@@ -65,8 +65,10 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=
     measure: "matched", "inner" or "exact"; exact between two solids that both have it. None: exact
         for meshes of at most 5,000 triangles, matched for others.
 
-    Raises ist.OpenMeshError for a mesh that is not closed: repair it first (ist.close_mesh) or
-    leave it out of `geoms`.
+    repair: close open meshes (see ist.close_mesh) instead of refusing them.
+
+    Raises ist.OpenMeshError for a mesh that is not closed: repair=True closes most; or leave it out
+    of `geoms`.
     """
     load()
     model = spec.compile()
@@ -87,7 +89,7 @@ def attach(spec, geoms=None, cache=None, *, spheres=4000, patches=None, measure=
             continue
         mesh = int(model.geom_dataid[geom.id])
         if mesh not in instances:
-            instances[mesh] = _instance(spec, model, mesh, geom.meshname, folder, spheres, patches, measure)
+            instances[mesh] = _instance(spec, model, mesh, geom.meshname, folder, spheres, patches, measure, repair)
         geom.type = mujoco.mjtGeom.mjGEOM_SDF
         geom.plugin.active = True
         geom.plugin.plugin_name = "ist.solid"
@@ -104,12 +106,13 @@ def _folder(cache):
     return folder.absolute()
 
 
-def _instance(spec, model, mesh, name, folder, spheres, patches, measure):
+def _instance(spec, model, mesh, name, folder, spheres, patches, measure, repair):
+    path = _baked(model, mesh, name, folder, spheres, repair)  # or the spec stays as it is
     if not any(p.plugin_name == "ist.solid" for p in spec.plugins):
         spec.activate_plugin("ist.solid")
     plugin = spec.add_plugin(name=f"ist {name} {len(spec.plugins)}", plugin_name="ist.solid", active=True)
     plugin.config = {
-        "file": str(_baked(model, mesh, name, folder, spheres)),
+        "file": str(path),
         "scale": "1",
     } | {key: str(value) for key, value in {"patches": patches, "measure": measure}.items() if value is not None}
     for m in spec.meshes:
@@ -118,7 +121,7 @@ def _instance(spec, model, mesh, name, folder, spheres, patches, measure):
     return plugin.name
 
 
-def _baked(model, mesh, name, folder, spheres):
+def _baked(model, mesh, name, folder, spheres, repair):
     """The asset of a compiled mesh, in the frame of its file but with its scale."""
     import numpy as np
 
@@ -128,7 +131,7 @@ def _baked(model, mesh, name, folder, spheres):
     vertices = model.mesh_vert[first:first + count].astype(float) @ turn.reshape(3, 3).T + model.mesh_pos[mesh]
     first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     faces = np.ascontiguousarray(model.mesh_face[first:first + count], dtype=np.uint32)
-    key = hashlib.sha256(f"{ist._core._bake_revision} {spheres} ".encode() + vertices.tobytes() + faces.tobytes())
+    key = hashlib.sha256(f"{ist._core._bake_revision} {spheres} {repair} ".encode() + vertices.tobytes() + faces.tobytes())
     path = folder / f"{key.hexdigest()[:32]}.ist"
     if path.exists():
         try:
@@ -136,7 +139,7 @@ def _baked(model, mesh, name, folder, spheres):
             return path
         except ist.Error:  # of another format: baked again
             pass
-    asset = ist.bake(ist.close_mesh(ist.Mesh(vertices, faces), name=name), max_spheres=spheres)
+    asset = ist.bake(ist.close_mesh(ist.Mesh(vertices, faces), name=name, repair=repair), max_spheres=spheres)
     part = path.with_suffix(f".{os.getpid()}")
     asset.save(part)
     os.replace(part, path)  # another process may bake the same
