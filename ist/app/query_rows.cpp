@@ -329,7 +329,7 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
       line("error", fmt::format("{:g} %", 100 * settings.relative_error),
            p.status == QueryStatus::error_exceeded ? "accepted; predicted error is larger"
            : p.status == QueryStatus::ok           ? "accepted; predicted error is smaller"
-                                       : fmt::format("accepted, but {} the query", stop));
+                                         : fmt::format("accepted, but {} the query", stop));
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");

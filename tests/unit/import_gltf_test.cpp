@@ -283,6 +283,11 @@ TEST(ReadGltf, EveryLieIsCaught) {
       {"not a multiple of three", [](json& d) { d["accessors"][1]["count"] = 11; }},
       {"names vertex 3 of 3", [](json& d) { d["accessors"][0]["count"] = 3; }},
       {"\"count\"", [](json& d) { d["accessors"][0]["sparse"] = json::object(); }},
+      {"without data",
+       [](json& d) {
+         d["accessors"][0].erase("bufferView");
+         d["accessors"][0]["count"] = 1 << 20;
+       }},
       {"mode", [](json& d) { d["meshes"][0]["primitives"][0]["mode"] = 7; }},
       {"not valid glTF", [](json& d) { d.erase("asset"); }},
       {"not valid glTF", [](json& d) { d["meshes"][0].erase("primitives"); }},
