@@ -18,6 +18,7 @@ typedef struct ist_bake_settings {
   uint32_t threads;      /* 0: all cores; never changes the asset */
   uint64_t spheres;      /* count; 0: 10,000 */
   uint32_t surface_only; /* not 0: no spheres; the asset serves the exact measure alone */
+  uint32_t repair;       /* not 0: an open mesh is closed, as by OpenMeshPolicy::repair */
 } ist_bake_settings_t;
 
 /* Makes the asset of a closed mesh. `tree` owns it: release it with ist_tree_release().

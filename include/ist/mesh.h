@@ -24,6 +24,9 @@ struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;                ///< [u]
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
   DeclaredFrame declared = {};                          ///< as loaded; nothing later reads it
+  /// What the file holds and its reader left out though it may change the shape: one printable
+  /// sentence each. close_mesh() and wrap_mesh() take them into their report.
+  std::vector<std::string> notes = {};
 };
 
 /// Options of load_mesh().
@@ -108,8 +111,9 @@ enum class OpenMeshPolicy {
 /// Reads a mesh file: OBJ, STL, PLY, OFF, GLB/glTF and DAE by readers of this library, level sets
 /// of OpenVDB as load_vdb() does, all others by assimp.
 ///
-/// The file's own node transforms are applied. Axes and units are not converted, except that
-/// COLLADA is scaled to metres. Vertices are welded.
+/// The file's own node transforms are applied; in glTF also skins, morph weights and instances.
+/// Axes and units are not converted, except that COLLADA is scaled to metres. Vertices are welded.
+/// What was left out and may change the shape is in TriangleMesh::notes.
 ///
 /// Throws Error (file, place, remedy). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});

@@ -25,7 +25,7 @@ std::optional<ClosedMesh> LinkMeshes::close(const std::vector<std::string>& link
   for (const std::string& name : links) {
     try {
       ClosedMesh closed =
-          close_or_advise(make(), fmt::format("{}: link {}", robot_, name), settings_);
+          close_as_asked(make(), fmt::format("{}: link {}", robot_, name), settings_);
       for (const std::string& link : links)
         for (const std::string& note : closed.report.notes) warn(link, note);
       return closed;
@@ -59,19 +59,8 @@ void LinkMeshes::finish() const {
                           robot_, faults_.size()));
 }
 
-ClosedMesh close_or_advise(TriangleMesh mesh, const std::string& name,
-                           const MeshSettings& settings) {
-  try {
-    return close_as_asked(std::move(mesh), name, settings);
-  } catch (const OpenMeshError& error) {
-    throw OpenMeshError(std::string(error.what()) +
-                        (settings.repair ? "; --wrap 0.5% encloses it in a closed surface"
-                                         : "; --repair tries to close it"));
-  }
-}
-
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {
-  InputMesh mesh = read_input_mesh(path, settings, close_or_advise);
+  InputMesh mesh = read_input_mesh(path, settings);
   for (const std::string& note : mesh.closed.report.notes) spdlog::warn("{}: {}", path, note);
   return mesh;
 }

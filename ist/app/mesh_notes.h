@@ -44,12 +44,7 @@ class LinkMeshes {
   std::map<std::string, Warning> warnings_;
 };
 
-/// close_as_asked(). Throws Error, with the option that may help.
-ClosedMesh close_or_advise(TriangleMesh mesh, const std::string& name,
-                           const MeshSettings& settings);
-
-/// read_input_mesh() by close_or_advise(); notes about the mesh go to stderr as warnings. Throws
-/// Error.
+/// read_input_mesh(); notes about the mesh go to stderr as warnings. Throws Error.
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);
 
 /// How a mesh that was not closed was closed, and with what confidence; "" for one that was.

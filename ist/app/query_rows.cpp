@@ -322,16 +322,19 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
   if (answer.status() == QueryStatus::invalid_input)
     return fmt::format("  no answer: {}: {}\n", name_of(answer.status()), pose_fault(answer.row));
   const bool exact = settings.measure == Measure::exact;
+  const char* const stop = settings.max_visits > 0    ? "--max-visits ended"
+                           : settings.pair_budget > 0 ? "--pair-budget ended"
+                                                      : "a full workspace ended";
   std::string text;
-  const auto line = [&](const char* name, const std::string& value, const char* meaning) {
+  const auto line = [&](const char* name, const std::string& value, const std::string& meaning) {
     text += fmt::format("  {:<10} {:<{}} {}\n", name, value, exact ? 44 : 36, meaning);
   };
   const bool known = !std::isnan(p.volume);
   if (exact) {
     line("volume", known ? fmt::format("{} u³", p.volume) : "unknown",
          p.status == QueryStatus::ok ? "of the true overlap"
-         : known ? "of the overlap, by matched spheres: a limit stopped the exact query"
-                 : "a limit stopped the exact query, and an asset has no spheres");
+         : known ? fmt::format("of the overlap, by matched spheres: {} the exact query", stop)
+                 : fmt::format("{} the exact query, and an asset has no spheres", stop));
     line("bounds", fmt::format("{} … {} u³", p.volume_min, p.volume_max),
          "contain the true volume");
     if (p.touching && p.contact_area > 0) {
@@ -353,7 +356,7 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
       line("error", fmt::format("{:g} %", 100 * settings.relative_error),
            p.status == QueryStatus::error_exceeded ? "accepted; predicted error is larger"
            : p.status == QueryStatus::ok           ? "accepted; predicted error is smaller"
-                                                   : "accepted, but a limit stopped the query");
+                                         : fmt::format("accepted, but {} the query", stop));
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
@@ -375,8 +378,7 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
                    grouped(answer.node_visits()), grouped(answer.sphere_pairs()),
                    exact                         ? "triangle"
                    : settings.relative_error > 0 ? "sphere or triangle"
-                                                 : "sphere")
-           .c_str());
+                                                 : "sphere"));
   return text;
 }
 

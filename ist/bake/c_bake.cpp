@@ -30,7 +30,9 @@ ist_status_t ist_bake(const double* vertices, std::size_t vertex_count,
     for (std::size_t i = 0; i < vertex_count; ++i) mesh.vertices.emplace_back(vertices + 3 * i);
     for (std::size_t i = 0; i < triangle_count; ++i)
       mesh.triangles.push_back({triangles[3 * i], triangles[3 * i + 1], triangles[3 * i + 2]});
-    const ClosedMesh closed = close_mesh(std::move(mesh), "the mesh");
+    const ClosedMesh closed =
+        close_mesh(std::move(mesh), "the mesh",
+                   wanted.repair != 0 ? OpenMeshPolicy::repair : OpenMeshPolicy::refuse);
     PackingSettings packing;
     packing.threads = wanted.threads;
     if (wanted.spheres > 0) packing.max_spheres = wanted.spheres;

@@ -10,6 +10,7 @@
 
 #include "bake/surface/build_surface.h"
 #include "bake/surface/surface_patches.h"
+#include "mesh/disjoint_sets.h"
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/triangle_frame.h"
@@ -89,6 +90,55 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
   arrays.header.vertex_count = used;
 }
 
+/// Calls visit(b, other, place) for blocks that share a vertex, `place` in block b: at a vertex of
+/// many blocks, each of which would name all others, only for those on both sides of an edge, and
+/// where these leave groups apart for one of each.
+template <class Visit>
+void for_neighbours(const MeshArrays& arrays, const ItemGroups<>& around, const Visit& visit) {
+  const auto place_of = [&](const std::uint32_t b, const std::uint32_t v) {
+    const std::uint32_t* const all = arrays.blocks[b].vertex;
+    return static_cast<std::uint32_t>(std::find(all, all + kWidth, v) - all);
+  };
+  const auto both = [&](const std::uint32_t b, const std::uint32_t other, const std::uint32_t v) {
+    visit(b, other, place_of(b, v));
+    visit(other, b, place_of(other, v));
+  };
+  const auto is_large = [&](const std::uint32_t v) { return around[v].size() > kMostAround; };
+  std::vector<std::array<std::uint32_t, 3>> spokes;  // large vertex, the edge's other end, block
+  for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
+    const MeshBlock& block = arrays.blocks[b];
+    for (std::uint32_t i = 0; i < block.vertices; ++i)
+      if (!is_large(block.vertex[i]))
+        for (const std::uint32_t other : around[block.vertex[i]])
+          if (other != b) visit(b, other, i);
+    for (std::uint32_t side = 0; side < 3u * block.triangles; ++side) {
+      const std::uint32_t v = block.vertex[block.corner[side % 3][side / 3]],
+                          w = block.vertex[block.corner[(side + 1) % 3][side / 3]];
+      if (is_large(v)) spokes.push_back({v, w, b});
+      if (is_large(w)) spokes.push_back({w, v, b});
+    }
+  }
+  std::sort(spokes.begin(), spokes.end());
+  for (std::size_t i = 0; i < spokes.size();) {
+    const std::uint32_t v = spokes[i][0];
+    const auto blocks = around[v];
+    DisjointSets groups(blocks.size());
+    const auto number = [&](const std::uint32_t b) {
+      return static_cast<std::uint32_t>(std::lower_bound(blocks.begin(), blocks.end(), b) -
+                                        blocks.begin());
+    };
+    const auto join = [&](const std::uint32_t b, const std::uint32_t other) {
+      both(b, other, v);
+      groups.unite(number(b), number(other));
+    };
+    for (++i; i < spokes.size() && spokes[i][0] == v; ++i)
+      if (spokes[i][1] == spokes[i - 1][1] && spokes[i][2] != spokes[i - 1][2])
+        join(spokes[i - 1][2], spokes[i][2]);
+    for (std::uint32_t k = 1; k < blocks.size(); ++k)
+      if (groups.find(k - 1) != groups.find(k)) join(blocks[k - 1], blocks[k]);
+  }
+}
+
 void find_neighbours(MeshArrays& arrays) {
   const ItemGroups<> around(arrays.header.vertex_count,
                             [&](const auto& visit) {  // blocks, vertices
@@ -96,13 +146,15 @@ void find_neighbours(MeshArrays& arrays) {
                                 for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
                                   visit(arrays.blocks[b].vertex[i], b);
                             });
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> found;  // block, place of the vertex
+  // Of each block: other block, place of the vertex.
+  std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found_of(arrays.blocks.size());
+  for_neighbours(arrays, around,
+                 [&](const std::uint32_t b, const std::uint32_t other, const std::uint32_t place) {
+                   found_of[b].emplace_back(other, place);
+                 });
   for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
     MeshBlock& block = arrays.blocks[b];
-    found.clear();
-    for (std::uint32_t i = 0; i < block.vertices; ++i)
-      for (const std::uint32_t other : around[block.vertex[i]])
-        if (other != b) found.emplace_back(other, i);
+    std::vector<std::pair<std::uint32_t, std::uint32_t>>& found = found_of[b];
     std::sort(found.begin(), found.end());
     block.first_neighbour = static_cast<std::uint32_t>(arrays.neighbours.size());
     for (std::size_t k = 0; k < found.size(); ++k)

@@ -13,6 +13,9 @@
 
 namespace ist {
 
+/// Blocks around a vertex: where there are more, a block names only some of the others.
+inline constexpr std::size_t kMostAround = 256;
+
 /// What an asset keeps of its solid's surface.
 struct KeptSurface {
   std::shared_ptr<const SurfaceArrays> surface;  ///< null: none

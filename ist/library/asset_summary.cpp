@@ -292,7 +292,10 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
       {"mesh_hash", hex(h.mesh_hash)},
       {"spheres", h.sphere_count},
       {"coverage", h.coverage},
-      {"enough_spheres", enough ? nlohmann::ordered_json(*enough) : nlohmann::ordered_json()},
+      {"enough_spheres", enough ? nlohmann::ordered_json(*enough)
+                         : h.sphere_count > 0 && h.coverage >= kCoarse
+                             ? nlohmann::ordered_json(h.sphere_count)
+                             : nlohmann::ordered_json()},
       {"kept_ratio_worst", kept(h.kept_ratio_worst)},
       {"kept_ratio_median", kept(h.kept_ratio_median)},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},

@@ -34,12 +34,11 @@ ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name,
   return wrapped;
 }
 
-InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings,
-                          decltype(close_as_asked)& close) {
+InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings) {
   TriangleMesh mesh = load_mesh(path);
   place(mesh, settings);
   InputMesh result{mesh.declared, {}};
-  result.closed = close(std::move(mesh), path, settings);
+  result.closed = close_as_asked(std::move(mesh), path, settings);
   return result;
 }
 

@@ -19,8 +19,7 @@ struct InputMesh {
 ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
 
 /// Loads, scales, turns and closes a mesh. Throws Error.
-InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings,
-                          decltype(close_as_asked)& close = close_as_asked);
+InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings);
 
 /// What load_mesh() gives, scaled by scale_mesh() and then turned: the quarter turn about the third
 /// axis that takes up_axis to world_up.

@@ -84,17 +84,11 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
 
 CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
   InputMesh mesh;
-  try {
-    if (job.shape)
-      mesh.closed = close_as_asked(mesh_of(*job.shape, {job.urdf, {}, ""}, job.urdf).mesh, job.mesh,
-                                   job.settings.mesh);
-    else
-      mesh = read_input_mesh(job.mesh, job.settings.mesh);
-  } catch (const OpenMeshError& error) {
-    throw Error(std::string(error.what()) + (job.settings.mesh.repair
-                                                 ? "; wrap = '0.5%' encloses it in a closed surface"
-                                                 : "; repair = true tries to close it"));
-  }
+  if (job.shape)
+    mesh.closed = close_as_asked(mesh_of(*job.shape, {job.urdf, {}, ""}, job.urdf).mesh, job.mesh,
+                                 job.settings.mesh);
+  else
+    mesh = read_input_mesh(job.mesh, job.settings.mesh);
   CacheEntry entry = {bake(mesh.closed, job.settings), std::move(mesh.closed.report.notes)};
   if (const auto& judged = mesh.closed.report.judged) entry.confidence = judged->confidence;
   return entry;

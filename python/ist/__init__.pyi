@@ -85,6 +85,7 @@ class Mesh:
     triangles: Final[NDArray[np.uint32]]  # (m, 3), read-only view
     declared_up_axis: Final[Literal["X", "Y", "Z"] | None]
     declared_unit: Final[float]  # [m]
+    notes: Final[list[str]]
 
 _Drawn = Asset | Mesh | ClosedMesh
 

@@ -67,6 +67,17 @@ bool is_path(const py::object& value) {
   return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
 }
 
+/// load_mesh(), whose notes are warnings of Python.
+std::shared_ptr<TriangleMesh> loaded(const std::string& path, const ImportSettings& settings) {
+  auto mesh = offline([=](const ProgressCallback&) {
+    return std::make_shared<TriangleMesh>(load_mesh(path, settings));
+  });
+  for (const std::string& note : mesh->notes)
+    if (PyErr_WarnEx(PyExc_UserWarning, (path + ": " + note).c_str(), 1) != 0)
+      throw py::python_error();
+  return mesh;
+}
+
 template <class Mesh>
 py::object declared_up(const Mesh& mesh) {
   if (mesh.declared.up_axis == 0) return py::none();
@@ -103,10 +114,7 @@ void add_report(py::module_& module) {
 std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
   std::shared_ptr<TriangleMesh> mesh;
   if (py::try_cast(value, mesh)) return mesh;
-  if (is_path(value))
-    return offline([name = path_of(value)](const ProgressCallback&) {
-      return std::make_shared<TriangleMesh>(load_mesh(name));
-    });
+  if (is_path(value)) return loaded(path_of(value), {});
   if ((py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) == 2)
     return std::make_shared<TriangleMesh>(mesh_of_arrays(value[0], value[1]));
   for (const char* const triangles : {"faces", "triangles"})
@@ -163,6 +171,8 @@ void add_meshes(py::module_& module) {
       .def_prop_ro(
           "declared_unit", [](const TriangleMesh& mesh) { return mesh.declared.unit; },
           "[m] length of the file's unit; 0: not declared.")
+      .def_ro("notes", &TriangleMesh::notes,
+              "What the file holds and was not read though it may change the shape: sentences.")
       .def("__reduce__", &remade);
   py::class_<ClosedMesh>(
       module, "ClosedMesh",
@@ -194,15 +204,16 @@ void add_meshes(py::module_& module) {
   module.def(
       "load_mesh",
       [](const py::object& path, double weld_tolerance) {
-        return offline([name = path_of(path), weld_tolerance](const ProgressCallback&) {
-          return load_mesh(name, {weld_tolerance});
-        });
+        return loaded(path_of(path), {weld_tolerance});
       },
       py::arg("path"), py::kw_only(), py::arg("weld_tolerance") = 0.0,
       R"(Reads OBJ, STL, PLY, OFF, GLB/glTF, DAE and other formats of assimp.
 
 path: str or os.PathLike.
 weld_tolerance: [0, 0.1]; vertices closer than this share of the bounding box's diagonal are merged.
+
+What the file holds and was not read though it may change the shape is a UserWarning, and in
+Mesh.notes.
 
 Raises Error, which names the file, the place and the remedy.)");
   module.def(

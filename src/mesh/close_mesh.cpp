@@ -92,10 +92,17 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
     first = e;
   }
   const std::string kind = boundary == odd ? "boundary edge" : "boundary or odd edge";
-  throw OpenMeshError(name + ": " + counted(odd, kind) + ", first at vertex " +
-                      std::to_string(edges.low(first)) + " " +
-                      position_text(mesh.vertices[edges.low(first)]) +
-                      ": the mesh is not closed. Repair or close it");
+  const std::size_t junctions = count_t_junctions(mesh, edges);
+  const std::string on_them = junctions == 0
+                                  ? ""
+                                  : ". " + std::to_string(junctions) + " of them " +
+                                        (junctions == 1 ? "is a T-junction" : "are T-junctions") +
+                                        ": a vertex of other faces lies on the edge";
+  throw OpenMeshError(
+      name + ": " + counted(odd, kind) + ", first at vertex " + std::to_string(edges.low(first)) +
+      " " + position_text(mesh.vertices[edges.low(first)]) + ": the mesh is not closed" + on_them +
+      ". Close it, or have it repaired: --repair, in Python repair=True, in a "
+      "manifest repair = true, in C repair = 1, in C++ OpenMeshPolicy::repair");
 }
 
 /// Coordinates that were rounded until the shape was lost.
@@ -233,7 +240,7 @@ void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
   if (judged.confidence < kLeastConfidence)
     throw OpenMeshError(closed.name + ": repaired with a confidence below " +
                         shortest(kLeastConfidence) + " (" + describe(judged) +
-                        "), which is not reliable. Wrap or close it");
+                        "), which is not reliable. " + kWrapIt);
   closed.report.judged = judged;
   closed.report.notes.push_back("repair: " + describe(judged));
 }
@@ -250,6 +257,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   };
   MeshReport report;
   tbb::parallel_invoke(look_for_intersections, [&] { report = survey(mesh, surface.edges); });
+  report.notes = std::move(mesh.notes);
   report.self_intersections = surface.met ? surface.met->count : 0;
   report.self_intersections_counted = surface.met.has_value();
   if (facing == Facing::any) refuse_unusable_coordinates(name, report);

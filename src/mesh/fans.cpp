@@ -1,12 +1,15 @@
+#include "mesh/fan_slabs.h"
 #include "mesh/self_intersections.h"
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
-#include <utility>
+#include <vector>
 
 #include "mesh/exact_sign.h"
 #include "mesh/item_groups.h"
@@ -14,40 +17,45 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kMostSpokes = 32;
+/// A vertex's fan, and room to look at it.
+struct Fan {
+  std::vector<std::array<std::uint32_t, 2>> sides;  ///< opposite to the vertex: from, to
+  std::vector<std::uint32_t> ring;
+  std::vector<Eigen::Vector3d> spokes;
+  std::vector<exact_sign::BoundedCross> faces;
+};
 
-/// The sides opposite to a vertex, in the order in which they follow one another. 0: they are no
-/// closed ring, or too many.
-std::size_t ring_about(const std::uint32_t v, const std::span<const std::uint32_t> fan,
-                       const std::vector<Triangle>& triangles,
-                       std::array<std::uint32_t, kMostSpokes>& ring) {
-  const std::size_t count = fan.size();
-  if (count < 3 || count > kMostSpokes) return 0;
-  std::array<std::uint32_t, kMostSpokes> from, to;
-  for (std::size_t i = 0; i < count; ++i) {
-    const Triangle& t = triangles[fan[i]];
+/// The sides opposite to a vertex, in the order in which they follow one another. False: they are
+/// no closed ring.
+bool find_ring(const std::uint32_t v, const std::span<const std::uint32_t> triangles_at,
+               const std::vector<Triangle>& triangles, Fan& fan) {
+  fan.sides.clear();
+  for (const std::uint32_t at : triangles_at) {
+    const Triangle& t = triangles[at];
     const std::size_t k = t[0] == v ? 0 : t[1] == v ? 1 : 2;
-    from[i] = t[(k + 1) % 3];
-    to[i] = t[(k + 2) % 3];
+    fan.sides.push_back({t[(k + 1) % 3], t[(k + 2) % 3]});
   }
-  // Sides are brought to the front as they follow one another.
-  for (std::size_t i = 0; i < count; ++i) {
-    ring[i] = from[i];
-    std::size_t next = i + 1;
-    while (next < count && from[next] != to[i]) ++next;
-    if (next == count) return i + 1 == count && to[i] == from[0] ? count : 0;
-    std::swap(from[next], from[i + 1]);
-    std::swap(to[next], to[i + 1]);
-  }
-  return 0;
+  std::sort(fan.sides.begin(), fan.sides.end());
+  fan.ring.clear();
+  if (fan.sides.size() < 3) return false;
+  std::uint32_t from = fan.sides[0][0];
+  do {
+    const auto side = std::lower_bound(fan.sides.begin(), fan.sides.end(), std::array{from, 0u});
+    if (side == fan.sides.end() || (*side)[0] != from) return false;
+    fan.ring.push_back(from);
+    from = (*side)[1];
+  } while (from != fan.ring[0] && fan.ring.size() < fan.sides.size());
+  return from == fan.ring[0] && fan.ring.size() == fan.sides.size();
 }
 
-bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices,
-               const std::array<std::uint32_t, kMostSpokes>& ring, const std::size_t count) {
-  std::array<Eigen::Vector3d, kMostSpokes> spokes;
-  std::array<exact_sign::BoundedCross, kMostSpokes> faces;
-  for (std::size_t i = 0; i < count; ++i) spokes[i] = vertices[ring[i]] - vertices[v];
+bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fan& fan) {
+  const std::size_t count = fan.ring.size();
+  std::vector<Eigen::Vector3d>& spokes = fan.spokes;
+  std::vector<exact_sign::BoundedCross>& faces = fan.faces;
+  spokes.resize(count);
+  faces.resize(count);
   Eigen::Vector3d viewer = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < count; ++i) spokes[i] = vertices[fan.ring[i]] - vertices[v];
   for (std::size_t i = 0; i < count; ++i) {
     faces[i] = {spokes[i].data(), spokes[i + 1 < count ? i + 1 : 0].data()};
     viewer += Eigen::Map<const Eigen::Vector3d>(faces[i].value);
@@ -71,17 +79,66 @@ bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertic
 
 }  // namespace
 
-std::vector<std::uint8_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
-                                      const std::vector<Triangle>& triangles) {
+std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
+                                       const std::vector<Triangle>& triangles) {
   const ItemGroups<> fans = triangles_at_vertices(vertices.size(), triangles);
-  std::vector<std::uint8_t> spread(vertices.size(), 0);
+  std::vector<std::uint32_t> spread(vertices.size(), 0);
+  tbb::enumerable_thread_specific<Fan> of_threads;
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(vertices.size()),
                     [&](const std::uint32_t v) {
-                      std::array<std::uint32_t, kMostSpokes> ring;
-                      const std::size_t count = ring_about(v, fans[v], triangles, ring);
-                      spread[v] = count > 0 && is_spread(v, vertices, ring, count) ? 1 : 0;
+                      Fan& fan = of_threads.local();
+                      if (find_ring(v, fans[v], triangles, fan) && is_spread(v, vertices, fan))
+                        spread[v] = static_cast<std::uint32_t>(fan.ring.size());
                     });
   return spread;
+}
+
+std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
+                                     const std::vector<std::uint32_t>& spread) {
+  constexpr std::uint32_t kLarge = 64;
+  std::vector<std::uint32_t> owners;
+  if (std::none_of(spread.begin(), spread.end(), [](const auto n) { return n >= kLarge; }))
+    return owners;
+  owners.resize(triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+    const auto corner = *std::max_element(
+        triangles[t].begin(), triangles[t].end(),
+        [&](const std::uint32_t a, const std::uint32_t b) { return spread[a] < spread[b]; });
+    owners[t] = spread[corner] >= kLarge ? corner : kNoIndex;
+  });
+  return owners;
+}
+
+Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+             const std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners) {
+  Slab slab;
+  slab.owner = owners[group[0]];
+  const auto point = [&](const std::uint32_t v) {
+    return Eigen::Vector3d(double{points[v][0]}, double{points[v][1]}, double{points[v][2]});
+  };
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero(), longest = Eigen::Vector3d::UnitX();
+  double length = 0;
+  for (const std::uint32_t i : group) {
+    if (owners[i] != slab.owner) slab.owner = kNoIndex;
+    const Triangle& t = triangles[i];
+    normal += (point(t[1]) - point(t[0])).cross(point(t[2]) - point(t[0]));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d side = point(t[(k + 1) % 3]) - point(t[k]);
+      if (side.squaredNorm() <= length) continue;
+      length = side.squaredNorm();
+      longest = side;
+    }
+  }
+  longest.normalize();
+  normal -= longest * longest.dot(normal);
+  if (!(normal.squaredNorm() > 1e-30)) normal = longest.unitOrthogonal();
+  slab.axes << longest, normal.normalized(), longest.cross(normal.normalized());
+  Eigen::AlignedBox3d box;
+  for (const std::uint32_t i : group)
+    for (const std::uint32_t v : triangles[i]) box.extend(slab.axes.transpose() * point(v));
+  slab.half = box.sizes() / 2;
+  slab.centre = slab.axes * box.center();
+  return slab;
 }
 
 }  // namespace ist

@@ -1,15 +1,24 @@
 #include "mesh/judge.h"
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <iterator>
 #include <memory>
+#include <numeric>
+#include <optional>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
+#include "mesh/weld.h"
 
 namespace ist {
 namespace {
@@ -41,9 +50,85 @@ VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
   return {a.agreed + b.agreed, a.all + b.all, a.solid + b.solid, a.wound + b.wound};
 }
 
-/// Blocks of samples until there are enough of them in either.
+/// The triangles of two meshes by the numbers of their corners, which are the same where the
+/// coordinates are.
+class TwoMeshes {
+ public:
+  using Corners = std::array<std::uint32_t, 3>;
+
+  TwoMeshes(const TriangleMesh& a, const TriangleMesh& b) : first_of_b_(a.vertices.size()) {
+    const auto point = [&](const std::uint32_t v) {
+      const Eigen::Vector3d& p = v < first_of_b_ ? a.vertices[v] : b.vertices[v - first_of_b_];
+      return std::tuple(p.x(), p.y(), p.z());
+    };
+    std::vector<std::uint32_t> order(a.vertices.size() + b.vertices.size());
+    std::iota(order.begin(), order.end(), 0u);
+    tbb::parallel_sort(order.begin(), order.end(),
+                       [&](const auto v, const auto w) { return point(v) < point(w); });
+    number_.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const bool is_new = i == 0 || point(order[i]) != point(order[i - 1]);
+      number_[order[i]] = is_new ? order[i] : number_[order[i - 1]];
+    }
+  }
+
+  /// A triangle of either by those numbers, turned so that the smallest comes first.
+  Corners corners(const Corners& t, const bool of_b) const {
+    Corners named;
+    for (std::size_t k = 0; k < 3; ++k) named[k] = number_[t[k] + (of_b ? first_of_b_ : 0)];
+    std::rotate(named.begin(), std::min_element(named.begin(), named.end()), named.end());
+    return named;
+  }
+
+  std::vector<Corners> sorted(const std::vector<Corners>& triangles, const bool of_b) const {
+    std::vector<Corners> all(triangles.size());
+    tbb::parallel_for(std::size_t{0}, all.size(),
+                      [&](const std::size_t t) { all[t] = corners(triangles[t], of_b); });
+    tbb::parallel_sort(all.begin(), all.end());
+    return all;
+  }
+
+  /// [triangle] 1 where the other mesh has it too, whichever way it faces.
+  std::vector<std::uint8_t> shared(const std::vector<Corners>& triangles, const bool of_b,
+                                   const std::vector<Corners>& sorted_others) const {
+    std::vector<std::uint8_t> has(triangles.size());
+    tbb::parallel_for(std::size_t{0}, has.size(), [&](const std::size_t t) {
+      const Corners same = corners(triangles[t], of_b), turned = {same[0], same[2], same[1]};
+      has[t] = std::binary_search(sorted_others.begin(), sorted_others.end(), same) ||
+               std::binary_search(sorted_others.begin(), sorted_others.end(), turned);
+    });
+    return has;
+  }
+
+ private:
+  std::size_t first_of_b_;
+  std::vector<std::uint32_t> number_;  ///< of a's and b's vertices
+};
+
+/// The triangles of `outward` less those of `made`, which is closed: where both have most in
+/// common, few. Their winding number and that of `made` are the sum's. Nothing where they are many.
+std::optional<TriangleMesh> difference(const TriangleMesh& outward, const TriangleMesh& made,
+                                       const TwoMeshes& both,
+                                       const std::vector<TwoMeshes::Corners>& of_made) {
+  const std::vector<TwoMeshes::Corners> of_outward = both.sorted(outward.triangles, false);
+  TriangleMesh rest;
+  std::set_difference(of_made.begin(), of_made.end(), of_outward.begin(), of_outward.end(),
+                      std::back_inserter(rest.triangles));
+  for (auto& t : rest.triangles) std::swap(t[1], t[2]);
+  std::set_difference(of_outward.begin(), of_outward.end(), of_made.begin(), of_made.end(),
+                      std::back_inserter(rest.triangles));
+  if (rest.triangles.size() > outward.triangles.size() / 2) return std::nullopt;
+  rest.vertices = outward.vertices;
+  rest.vertices.insert(rest.vertices.end(), made.vertices.begin(), made.vertices.end());
+  drop_unused(rest);
+  return rest;
+}
+
+/// Blocks of samples until there are enough of them in either. The winding number is that of
+/// `rest`, and of the solid where `add_solid` says so.
 std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
-                                       const OutwardWinding& winding, const MeshSolid& made) {
+                                       const TriangleWinding& rest, const bool add_solid,
+                                       const MeshSolid& made) {
   const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
   const Eigen::Vector3d low = box.min(), size = box.sizes();
   std::vector<VolumeSums> blocks;
@@ -54,8 +139,9 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
     tbb::parallel_for(first, last, [&](std::size_t b) {
       for (std::size_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
         const Eigen::Vector3d x = low + size.cwiseProduct(cube_point(i));
-        const bool inside = made.inside(made.frame().to_unit(x));
-        const double w = std::clamp(winding.at(x), 0.0, 1.0);
+        const int winding = made.winding_number(made.frame().to_unit(x));
+        const bool inside = winding >= 1;
+        const double w = std::clamp(rest.at(x) + (add_solid ? winding : 0), 0.0, 1.0);
         const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
         blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
       }
@@ -71,7 +157,9 @@ struct Distances {
   double near = 0;           ///< share of the area within `limit`
 };
 
-Distances distances(const TriangleMesh& from, const MeshSolid& to, double limit) {
+/// `shared`: [triangle] 1 where it is one of `to`, too.
+Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
+                    const MeshSolid& to, double limit) {
   std::vector<double> area_to(from.triangles.size());  // of all triangles up to this one
   double area = 0;
   for (std::size_t t = 0; t < area_to.size(); ++t) {
@@ -86,6 +174,7 @@ Distances distances(const TriangleMesh& from, const MeshSolid& to, double limit)
     const auto found = std::lower_bound(area_to.begin(), area_to.end(), place);
     const auto t = static_cast<std::size_t>(
         std::min<std::ptrdiff_t>(found - area_to.begin(), std::ssize(area_to) - 1));
+    if (shared[t] != 0) return;
     double u = spread(i, 0.7548776662466927), v = spread(i, 0.5698402909980532);
     if (u + v > 1) {
       u = 1 - u;
@@ -109,11 +198,17 @@ Distances distances(const TriangleMesh& from, const MeshSolid& to, double limit)
 }  // namespace
 
 Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
-  const OutwardWinding winding(soup);
   const std::unique_ptr<MeshSolid> surface = triangles_as_solid(soup);
   const MeshSolid solid(made);
+  const TwoMeshes both(soup, made.mesh);
+  const std::vector<TwoMeshes::Corners> of_soup = both.sorted(soup.triangles, false),
+                                        of_made = both.sorted(made.mesh.triangles, true);
+  TriangleMesh outward = turned_outward(soup);
+  std::optional<TriangleMesh> rest = difference(outward, made.mesh, both, of_made);
+  const TriangleWinding winding(rest ? std::move(*rest) : std::move(outward));
 
-  const std::vector<VolumeSums> blocks = sample_volumes(surface->bounds(), winding, solid);
+  const std::vector<VolumeSums> blocks =
+      sample_volumes(surface->bounds(), winding, rest.has_value(), solid);
   VolumeSums all;
   for (const VolumeSums& block : blocks) all = all + block;
   Judgement judged;
@@ -131,8 +226,10 @@ Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
   if (all.solid > 0) judged.volume_ratio = all.wound / all.solid;
 
   const double diagonal = surface->bounds().diagonal().norm();
-  const Distances lost = distances(soup, solid, kept * diagonal);
-  const Distances added = distances(made.mesh, *surface, kept * diagonal);
+  const Distances lost =
+      distances(soup, both.shared(soup.triangles, false, of_made), solid, kept * diagonal);
+  const Distances added = distances(made.mesh, both.shared(made.mesh.triangles, true, of_soup),
+                                    *surface, kept * diagonal);
   judged.kept_surface = lost.near;
   judged.input_mean = lost.mean;
   judged.input_max = lost.max;

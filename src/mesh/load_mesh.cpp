@@ -6,6 +6,7 @@
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <exception>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -116,6 +117,7 @@ TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) 
 
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
+  if (ending_of(file.path) != ".stl") refuse_other_format(file);  // its header may be any text
   PolygonMesh polygons = reader_of(file.path)(file);
   if (polygons.ends.empty() && polygons.triangles.empty())
     fail(file, "contains no faces, so it does not bound a solid");
@@ -124,6 +126,9 @@ TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};
   mesh = weld(std::move(mesh), settings.weld_tolerance * bounds.diagonal().norm());
   mesh.declared = polygons.declared;
+  std::set<std::string> said;  // many meshes of a scene may share a note
+  for (std::string& note : polygons.notes)
+    if (said.insert(note).second) mesh.notes.push_back(std::move(note));
   return mesh;
 }
 

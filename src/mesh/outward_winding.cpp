@@ -1,6 +1,7 @@
 #include "mesh/outward_winding.h"
 
 #include <ist/solid.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
@@ -98,16 +99,24 @@ UnitFrame frame_of(const TriangleMesh& soup) {
 
 /// What is seen of each patch from far away, along the three axes both ways.
 std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const UnitFrame& frame) {
-  std::vector<Votes> votes(soup.triangles.size());
-  std::vector<std::array<double, 3>> points(soup.vertices.size());
-  for (int axis = 0; axis < 3; ++axis) {
+  std::array<std::vector<Votes>, 3> along;
+  tbb::parallel_for(0, 3, [&](const int axis) {
+    std::vector<std::array<double, 3>> points(soup.vertices.size());
     for (std::size_t v = 0; v < points.size(); ++v) {
       const Eigen::Vector3d x = frame.to_unit(soup.vertices[v]);
       points[v] = {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
     }
+    std::vector<Votes>& votes = along[static_cast<std::size_t>(axis)];
+    votes.resize(soup.triangles.size());
     look_along(points, soup.triangles, patches, votes);
-  }
-  return votes;
+  });
+  std::vector<Votes>& votes = along[0];
+  for (const std::size_t axis : {1, 2})
+    for (std::size_t t = 0; t < votes.size(); ++t) {
+      votes[t].fronts += along[axis][t].fronts;
+      votes[t].backs += along[axis][t].backs;
+    }
+  return std::move(votes);
 }
 
 /// For each patch the volume between it and the middle of its area: > 0 where it bulges to its
@@ -322,15 +331,19 @@ std::vector<bool> inner_walls(const TriangleMesh& soup, DisjointSets& patches,
   return inner;
 }
 
-OutwardWinding::OutwardWinding(TriangleMesh mesh) {
+TriangleMesh turned_outward(TriangleMesh mesh) {
   reduce_coincident(mesh.triangles, EdgeTable(mesh.triangles));
+  if (!mesh.triangles.empty()) orient_soup(mesh);
+  return mesh;
+}
+
+TriangleWinding::TriangleWinding(TriangleMesh mesh) {
   if (mesh.triangles.empty()) return;
-  orient_soup(mesh);
   surface_ = triangles_as_solid(std::move(mesh));
   winding_.emplace(surface_->view());
 }
 
-double OutwardWinding::at(const Eigen::Vector3d& x) const {
+double TriangleWinding::at(const Eigen::Vector3d& x) const {
   if (!winding_) return 0;
   const Eigen::Vector3d unit = surface_->frame().to_unit(x);
   return winding_->at(unit.data());

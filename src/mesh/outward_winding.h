@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "mesh/disjoint_sets.h"
@@ -48,18 +49,25 @@ class SoupWinding {
 /// Any triangles, to be asked for closest points; inside() and volume() mean nothing.
 std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh);
 
-/// The generalised winding number of any triangles, however they face: coincident ones are reduced
-/// to their signed sum, then patches are turned outward (orient_soup). Ask it from any thread.
-class [[gnu::visibility("hidden")]] OutwardWinding {
- public:
-  explicit OutwardWinding(TriangleMesh mesh);
+/// Coincident triangles reduced to their signed sum, and the patches of the others turned outward.
+TriangleMesh turned_outward(TriangleMesh mesh);
 
-  /// `x`: [u]. 0 where all triangles cancel.
+/// The generalised winding number of triangles as they face. Ask it from any thread.
+class [[gnu::visibility("hidden")]] TriangleWinding {
+ public:
+  explicit TriangleWinding(TriangleMesh mesh);
+
+  /// `x`: [u]. 0 where there are no triangles.
   double at(const Eigen::Vector3d& x) const;
 
  private:
   std::unique_ptr<MeshSolid> surface_;
   std::optional<SoupWinding> winding_;
+};
+
+/// The same of any triangles, however they face.
+struct [[gnu::visibility("hidden")]] OutwardWinding : TriangleWinding{
+  explicit OutwardWinding(TriangleMesh mesh) : TriangleWinding(turned_outward(std::move(mesh))){}
 };
 
 /// [triangle] whether its patch, one of those `asked` for by their first triangles, is an inner

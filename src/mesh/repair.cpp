@@ -17,7 +17,9 @@
 #include "mesh/outward_winding.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
+#include "mesh/usable_mesh.h"
 #include "mesh/weld.h"
+#include "stage/thread_arena.h"
 
 namespace ist {
 
@@ -75,6 +77,8 @@ std::vector<Triangle> cap(const std::vector<Eigen::Vector3d>& vertices, const Bo
 
 namespace {
 
+constexpr double kWidestCrack = 1e-5;  ///< of the diagonal
+
 std::vector<bool> border_vertices(const TriangleMesh& mesh, const EdgeTable& edges) {
   std::vector<bool> border(mesh.vertices.size(), false);
   for (std::size_t e = 0; e < edges.size(); ++e)
@@ -82,13 +86,13 @@ std::vector<bool> border_vertices(const TriangleMesh& mesh, const EdgeTable& edg
   return border;
 }
 
-/// Border vertices, findable by their x.
-class SortedVertices {
+/// Border vertices in a k-d tree: the middle one of a range parts it, along x, y and z in turn.
+class BorderVertices {
  public:
-  SortedVertices(const TriangleMesh& mesh, const std::vector<bool>& border) : mesh_(mesh) {
+  BorderVertices(const TriangleMesh& mesh, const std::vector<bool>& border) : mesh_(mesh) {
     for (std::uint32_t v = 0; v < border.size(); ++v)
-      if (border[v]) order_.emplace_back(mesh.vertices[v][0], v);
-    std::sort(order_.begin(), order_.end());
+      if (border[v]) order_.push_back(v);
+    part(0, order_.size(), 0);
   }
 
   /// Those within `tolerance` of the segment from u to v but not of its ends, in its order.
@@ -99,15 +103,15 @@ class SortedVertices {
     const double length = (b - a).norm();
     const Eigen::Vector3d along = (b - a) / length;
     std::vector<std::pair<double, std::uint32_t>> found;
-    const double first = std::min(a[0], b[0]) - tolerance, last = std::max(a[0], b[0]) + tolerance;
-    for (auto it = std::lower_bound(order_.begin(), order_.end(), std::pair(first, 0u));
-         it != order_.end() && it->first <= last; ++it) {
-      if (it->second == u || it->second == v) continue;
-      const Eigen::Vector3d p = mesh_.vertices[it->second] - a;
-      const double at = p.dot(along);
-      if (at > tolerance && at < length - tolerance && (p - at * along).norm() <= tolerance)
-        found.emplace_back(at, it->second);
-    }
+    visit_near(
+        Range{0, order_.size(), 0}, a, along, -tolerance, length + tolerance, tolerance,
+        [&](const std::uint32_t w) {
+          if (w == u || w == v) return;
+          const Eigen::Vector3d p = mesh_.vertices[w] - a;
+          const double at = p.dot(along);
+          if (at > tolerance && at < length - tolerance && (p - at * along).norm() <= tolerance)
+            found.emplace_back(at, w);
+        });
     std::sort(found.begin(), found.end());
     std::vector<std::uint32_t> result;
     result.reserve(found.size());
@@ -116,15 +120,61 @@ class SortedVertices {
   }
 
  private:
+  struct Range {
+    std::size_t first, last;
+    int axis;
+  };
+
+  double coordinate(const std::uint32_t v, const int axis) const { return mesh_.vertices[v][axis]; }
+
+  void part(const std::size_t first, const std::size_t last, const int axis) {
+    if (last - first < 2) return;
+    const std::size_t middle = first + (last - first) / 2;
+    const auto at = [&](const std::size_t i) {
+      return order_.begin() + static_cast<std::ptrdiff_t>(i);
+    };
+    std::nth_element(at(first), at(middle), at(last), [&](const auto v, const auto w) {
+      return std::pair(coordinate(v, axis), v) < std::pair(coordinate(w, axis), w);
+    });
+    part(first, middle, (axis + 1) % 3);
+    part(middle + 1, last, (axis + 1) % 3);
+  }
+
+  /// The vertices near the part from `begin` to `end` of the line from a, and some others.
+  template <class Visit>
+  void visit_near(const Range range, const Eigen::Vector3d& a, const Eigen::Vector3d& along,
+                  const double begin, const double end, const double tolerance,
+                  const Visit& visit) const {
+    if (range.first == range.last || !(begin <= end)) return;
+    const std::size_t middle = range.first + (range.last - range.first) / 2;
+    visit(order_[middle]);
+    const double plane = coordinate(order_[middle], range.axis);
+    const double slope = along[range.axis];
+    const int next = (range.axis + 1) % 3;
+    // Where the line is below `plane` + tolerance, and above `plane` − tolerance.
+    for (const double side : {-1.0, 1.0}) {
+      const double room = side * (a[range.axis] - plane) + 2 * tolerance;  // ≥ −side·slope·t
+      double from = begin, to = end;
+      if (side * slope > 0)
+        from = std::max(from, -room / (side * slope));
+      else if (side * slope < 0)
+        to = std::min(to, -room / (side * slope));
+      else if (room < 0)
+        continue;
+      visit_near(side < 0 ? Range{range.first, middle, next} : Range{middle + 1, range.last, next},
+                 a, along, from, to, tolerance, visit);
+    }
+  }
+
   const TriangleMesh& mesh_;
-  std::vector<std::pair<double, std::uint32_t>> order_;
+  std::vector<std::uint32_t> order_;
 };
 
 /// Splits border triangles at border vertices on their sides, one side a triangle. Returns whether
 /// there was any to split.
 bool split_once(TriangleMesh& mesh, const double tolerance) {
   const EdgeTable edges(mesh.triangles);
-  const SortedVertices border(mesh, border_vertices(mesh, edges));
+  const BorderVertices border(mesh, border_vertices(mesh, edges));
   std::vector<Triangle> pieces;
   for (std::size_t e = 0; e < edges.size(); ++e) {
     if (edges.sides(e).size() != 1) continue;
@@ -173,7 +223,7 @@ void close_cracks(TriangleMesh& mesh, MeshReport& report) {
   std::size_t fewest = before;
   double best_fraction = 0;
   TriangleMesh best;
-  for (const double fraction : {1e-9, 1e-8, 1e-7, 1e-6, 1e-5}) {
+  for (const double fraction : {1e-9, 1e-8, 1e-7, 1e-6, kWidestCrack}) {
     if (fewest == 0) break;
     TriangleMesh candidate = stitch(mesh, fraction * report.bounds.diagonal().norm());
     tidy(candidate);
@@ -353,6 +403,15 @@ void drop_inner_walls(TriangleMesh& mesh, MeshReport& report) {
                          " removed: there is solid on both sides");
 }
 
+std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges) {
+  const BorderVertices border(mesh, border_vertices(mesh, edges));
+  const double tolerance = kWidestCrack * bounds_of(mesh.vertices).diagonal().norm();
+  return count_where(edges.size(), [&](const std::size_t e) {
+    return edges.sides(e).size() == 1 &&
+           !border.on_segment(edges.low(e), edges.high(e), tolerance).empty();
+  });
+}
+
 TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report) {
   report.repaired = true;
   close_cracks(mesh, report);
@@ -362,9 +421,10 @@ TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& repo
   cap_holes(mesh, report);
   tidy(mesh);
   if (mesh.triangles.empty())
-    throw OpenMeshError(name + ": cannot be repaired: no part of it encloses a volume");
+    throw OpenMeshError(name + ": cannot be repaired: no part of it encloses a volume. " + kWrapIt);
   if (const std::size_t left = odd_edges(mesh); left > 0)
-    throw OpenMeshError(name + ": cannot be repaired: " + counted(left, "edge") + " remain open");
+    throw OpenMeshError(name + ": cannot be repaired: " +
+                        counted(left, "edge remains open", "edges remain open") + ". " + kWrapIt);
   return mesh;
 }
 

@@ -19,6 +19,13 @@ void drop_inner_walls(TriangleMesh& mesh, MeshReport& report);
 /// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.
 TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report);
 
+/// What an error says of a mesh that cannot be repaired.
+inline constexpr const char* kWrapIt =
+    "Close it, or wrap it: --wrap 0.5%, in a manifest wrap = '0.5%', in C++ wrap_mesh()";
+
+/// Edges of one triangle on which a vertex of other such edges lies.
+std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges);
+
 /// A closed walk along edges that have an odd number of sides.
 struct BorderLoop {
   std::vector<std::uint32_t> vertices;  ///< in order, each once

@@ -9,8 +9,10 @@
 #include <atomic>
 #include <bit>
 #include <limits>
+#include <span>
 #include <utility>
 
+#include "mesh/fan_slabs.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/usable_mesh.h"
 #include "numerics/hashing.h"
@@ -47,10 +49,12 @@ struct alignas(64) EightBoxes {
 /// their width and rounded to float, all of which keeps their order: boxes that meet still do.
 class TriangleBoxes {
  public:
-  /// On the caller's TBB threads. At most 2^21 triangles. `margin`: [u] boxes no further apart
-  /// meet.
+  /// On the caller's TBB threads. At most 2^21 triangles. `spread`: as spread_fans() has it; the
+  /// triangles of a large spread fan stand together, and pairs of them are not visited where whole
+  /// nodes belong to it. `margin`: [u] boxes no further apart meet.
   TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
-                const std::vector<Triangle>& triangles, double margin = 0);
+                const std::vector<Triangle>& triangles,
+                const std::vector<std::uint32_t>& spread = {}, double margin = 0);
 
   std::size_t size() const { return order_.size(); }
   /// The triangle at a place of the curve.
@@ -81,6 +85,7 @@ class TriangleBoxes {
 
   template <class Visit>
   void within(const std::size_t level, const std::size_t node, Visit& visit) const {
+    if (!slabs_.empty() && slabs_[level][node].owner != kNoIndex) return;
     const EightBoxes& boxes = levels_[level][node];
     const std::size_t below = level == 0 ? order_.size() : levels_[level - 1].size();
     for (std::size_t k = 0; k < 8 && 8 * node + k < below; ++k) {
@@ -95,6 +100,11 @@ class TriangleBoxes {
   void between(const std::size_t level, const std::size_t a, const std::size_t b,
                Visit& visit) const {
     if (visit.done()) return;
+    if (!slabs_.empty()) {
+      const Slab &slab_a = slabs_[level][a], &slab_b = slabs_[level][b];
+      if (slab_a.owner == slab_b.owner && slab_a.owner != kNoIndex) return;
+      if (slab_a.apart_from(slab_b)) return;
+    }
     const EightBoxes &of_a = levels_[level][a], &of_b = levels_[level][b];
     unsigned near_b = of_a.met_by(levels_[level + 1][b / 8], b % 8);
     for (; near_b != 0; near_b &= near_b - 1)
@@ -114,9 +124,8 @@ class TriangleBoxes {
   std::vector<std::uint32_t> order_;
   std::size_t start_ = 0;                        ///< level
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
+  std::vector<std::vector<Slab>> slabs_;  ///< of the nodes up to the starting level; or none at all
 };
-
-using FloatPoint = std::array<float, 3>;
 
 constexpr std::uint64_t kLeftOut = UINT64_MAX;
 constexpr int kIndexBits = 21;
@@ -174,7 +183,8 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 }
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
-                             const std::vector<Triangle>& triangles, const double margin) {
+                             const std::vector<Triangle>& triangles,
+                             const std::vector<std::uint32_t>& spread, const double margin) {
   const RawArray<FloatPoint> points = placed(vertices);
   float wider = 0;
   if (margin > 0) {
@@ -192,6 +202,11 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   tbb::parallel_for(std::size_t{0}, order_.size(), [&](const std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
   });
+  const std::vector<std::uint32_t> owners = owners_of(triangles, spread);
+  if (!owners.empty())
+    std::stable_sort(
+        order_.begin(), order_.end(),
+        [&](const std::uint32_t a, const std::uint32_t b) { return owners[a] < owners[b]; });
 
   levels_.push_back(in_eights(order_.size(), [&](const std::size_t i, const std::size_t k) {
     const Triangle& t = triangles[order_[i]];
@@ -207,6 +222,16 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   }
   constexpr std::size_t kMostParts = 2048;
   while (levels_[start_].size() > kMostParts) ++start_;
+  if (owners.empty()) return;
+  for (std::size_t level = 0, size = 8; level <= start_; ++level, size *= 8) {
+    std::vector<Slab>& slabs = slabs_.emplace_back(levels_[level].size());
+    tbb::parallel_for(std::size_t{0}, slabs.size(), [&](const std::size_t node) {
+      const std::span<const std::uint32_t> all(order_);
+      slabs[node] =
+          slab_of(points, triangles,
+                  all.subspan(size * node, std::min(size, all.size() - size * node)), owners);
+    });
+  }
 }
 
 /// Whether the exact boxes of two triangles meet.
@@ -224,14 +249,13 @@ bool boxes_meet(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
 }
 
 /// Corners with spread fans, by place; kNoIndex for others.
-std::vector<Triangle> spread_corners(const std::vector<Eigen::Vector3d>& vertices,
-                                     const std::vector<Triangle>& triangles,
+std::vector<Triangle> spread_corners(const std::vector<Triangle>& triangles,
+                                     const std::vector<std::uint32_t>& fans,
                                      const TriangleBoxes& boxes) {
-  const std::vector<std::uint8_t> spread = spread_fans(vertices, triangles);
   std::vector<Triangle> corners(boxes.size());
   tbb::parallel_for(std::size_t{0}, boxes.size(), [&](const std::size_t place) {
     const Triangle& t = triangles[boxes.triangle(place)];
-    for (std::size_t k = 0; k < 3; ++k) corners[place][k] = spread[t[k]] != 0 ? t[k] : kNoIndex;
+    for (std::size_t k = 0; k < 3; ++k) corners[place][k] = fans[t[k]] != 0 ? t[k] : kNoIndex;
   });
   return corners;
 }
@@ -308,8 +332,9 @@ std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt
 std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
   if (triangles.size() > kMostTriangles) return std::nullopt;
-  const TriangleBoxes boxes(vertices, triangles);
-  const std::vector<Triangle> spread = spread_corners(vertices, triangles, boxes);
+  const std::vector<std::uint32_t> fans = spread_fans(vertices, triangles);
+  const TriangleBoxes boxes(vertices, triangles, fans);
+  const std::vector<Triangle> spread = spread_corners(triangles, fans, boxes);
   return search(boxes, [&](const std::size_t i, const std::size_t j) {
     if (share_corner(spread[i], spread[j])) return Look::candidates;
     const Triangle &a = triangles[boxes.triangle(i)], &b = triangles[boxes.triangle(j)];
@@ -323,7 +348,7 @@ std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
     const double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted) {
   if (triangles.size() > kMostTriangles) return std::nullopt;
-  const TriangleBoxes boxes(vertices, triangles, margin);
+  const TriangleBoxes boxes(vertices, triangles, {}, margin);
   auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
     return wanted(boxes.triangle(i), boxes.triangle(j)) ? Look::met : Look::candidates;
   });

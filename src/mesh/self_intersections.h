@@ -22,12 +22,12 @@ bool seen_apart(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
 bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                     const Triangle& b);
 
-/// [vertex] 1 where the triangles about it are proven not to meet elsewhere than in the corners and
-/// sides they share: they follow one another in a closed fan that, seen from some direction, goes
-/// once around the vertex and has all its triangles facing the viewer. 0 says nothing. On the
-/// caller's TBB threads.
-std::vector<std::uint8_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
-                                      const std::vector<Triangle>& triangles);
+/// [vertex] The number of triangles about it where these are proven not to meet elsewhere than in
+/// the corners and sides they share: they follow one another in a closed fan that, seen from some
+/// direction, goes once around the vertex and has all its triangles facing the viewer. 0 says
+/// nothing. On the caller's TBB threads.
+std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
+                                       const std::vector<Triangle>& triangles);
 
 /// Pairs of triangles that meet elsewhere than in shared corners and sides.
 struct SelfIntersections {

@@ -91,6 +91,7 @@ LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths
                              one.mesh.vertices.end());
     for (const auto& t : one.mesh.triangles)
       out.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    out.mesh.notes.insert(out.mesh.notes.end(), one.mesh.notes.begin(), one.mesh.notes.end());
     out.slack = std::max(out.slack, one.slack);
   }
   return out;

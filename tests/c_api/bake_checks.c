@@ -61,7 +61,7 @@ int c_bake_checks(void) {
   ist_tree_t tree = {0};
   ist_tree_info_t info = {.size = sizeof info};
   ist_bake_settings_t settings = {.size = sizeof settings, .spheres = 200};
-  char message[200];
+  char message[300];
   CHECK(ist_bake(kVertices, 8, kTriangles, 12, &settings, &tree, message, sizeof message) ==
         IST_OK);
   CHECK(message[0] == 0 && ist_tree_get_info(&tree, &info) == IST_OK);
@@ -78,8 +78,12 @@ int c_bake_checks(void) {
   /* Open, without vertices, of wrong sizes. */
   CHECK(ist_bake(kVertices, 8, kTriangles, 11, NULL, &tree, message, sizeof message) ==
         IST_NOT_BAKED);
-  CHECK(strstr(message, "open") != NULL || strstr(message, "boundary") != NULL);
+  CHECK(strstr(message, "boundary") != NULL && strstr(message, "repair = 1") != NULL);
   CHECK(ist_tree_get_info(&tree, &info) == IST_NO_HANDLE);
+  settings.repair = 1;
+  CHECK(ist_bake(kVertices, 8, kTriangles, 11, &settings, &tree, NULL, 0) == IST_OK);
+  CHECK(ist_tree_get_info(&tree, &info) == IST_OK && fabs(info.volume - 1) < 1e-12);
+  CHECK(ist_tree_release(&tree) == IST_OK);
   CHECK(ist_bake(kVertices, 7, kTriangles, 12, NULL, &tree, message, 8) == IST_NOT_BAKED);
   CHECK(strlen(message) == 7);
   CHECK(ist_bake(kVertices, 0, kTriangles, 0, NULL, &tree, message, sizeof message) ==

@@ -112,7 +112,7 @@ TEST_F(Library, OneThatFailsFailsAlone) {
                 "meshes/broken.obj: 3 boundary edges"),
             std::string::npos)
       << summary.at("assets")[0];
-  EXPECT_NE(bake("out").err.find("repair = true tries to close"), std::string::npos);
+  EXPECT_NE(bake("out").err.find("in a manifest repair = true"), std::string::npos);
 }
 
 /// What is there and follows from the same mesh and settings is not baked again, without a cache.

@@ -48,9 +48,11 @@ TEST(CloseMesh, CubeIsClosedAsItIs) {
 TEST(CloseMesh, OpenCubeIsRefusedWithPlaceAndWayOut) {
   TriangleMesh open = box_mesh(kZero, Eigen::Vector3d::Ones());
   open.triangles.pop_back();  // {1, 7, 5}
-  EXPECT_EQ(error_of(open),
-            "part: 3 boundary edges, first at vertex 1 (1 0 0): the mesh is not closed. "
-            "Repair or close it");
+  EXPECT_EQ(
+      error_of(open),
+      "part: 3 boundary edges, first at vertex 1 (1 0 0): the mesh is not closed. "
+      "Close it, or have it repaired: --repair, in Python repair=True, in a manifest repair = "
+      "true, in C repair = 1, in C++ OpenMeshPolicy::repair");
 }
 
 TEST(CloseMesh, UnweldedSoupIsWelded) {

@@ -129,6 +129,108 @@ TEST(ReadGltf, NormalizedAndStridedAccessors) {
   EXPECT_NEAR(volume_of(glb(document, buffer + tetrahedron_buffer().substr(48))), 1.0 / 6, 1e-15);
 }
 
+json with_more(json document, std::string& buffer, const std::string& bytes,
+               const std::string& type, const int component, const std::size_t count) {
+  const std::size_t view = document["bufferViews"].size();
+  document["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", buffer.size()}, {"byteLength", bytes.size()}});
+  document["accessors"].push_back(
+      {{"bufferView", view}, {"componentType", component}, {"count", count}, {"type", type}});
+  buffer += bytes;
+  while (buffer.size() % 4 != 0) buffer += '\0';
+  document["buffers"][0]["byteLength"] = buffer.size();
+  return document;
+}
+
+TEST(ReadGltf, JointsPlaceASkin) {
+  // Joint 1 doubles and moves, joint 2 mirrors; the node's own translation does not count.
+  std::string buffer = tetrahedron_buffer();
+  json document = with_more(tetrahedron(), buffer, std::string(16, '\1'), "VEC4", 5121, 4);
+  const std::string all_one = raw<float>({0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0, 0, 2});
+  document = with_more(document, buffer, all_one, "VEC4", 5126, 4);
+  document["meshes"][0]["primitives"][0]["attributes"]["JOINTS_0"] = 2;
+  document["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = 3;
+  document["nodes"] = json::parse(R"([
+    {"mesh": 0, "skin": 0, "translation": [100, 0, 0]},
+    {"scale": [2, 2, 2], "translation": [10, 0, 0], "children": [2]},
+    {"scale": [-1, 1, 1]}])");
+  document["scenes"][0]["nodes"] = {0, 1};
+  document["skins"] = {{{"joints", {2, 1}}}};
+  const TriangleMesh doubled = load_mesh(TempFile("a.glb", glb(document, buffer)).path());
+  EXPECT_EQ(doubled.vertices[1], Eigen::Vector3d(12, 0, 0));
+  EXPECT_TRUE(doubled.notes.empty());
+  document["skins"][0]["joints"] = {1, 2};
+  const TriangleMesh mirrored = load_mesh(TempFile("a.glb", glb(document, buffer)).path());
+  EXPECT_EQ(mirrored.vertices[1], Eigen::Vector3d(8, 0, 0));
+  const ClosedMesh closed = close_mesh(mirrored, "a");
+  EXPECT_NEAR(closed.report.volume, 8.0 / 6, 1e-14);
+  EXPECT_EQ(closed.report.flipped_components, 0u);
+  // The inverse bind matrix comes first.
+  document =
+      with_more(document, buffer, raw<float>({1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0,  0, 0, 1,  //
+                                              1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -1, 0, 0, 1}),
+                "MAT4", 5126, 2);
+  document["skins"][0]["inverseBindMatrices"] = 4;
+  EXPECT_EQ(load_mesh(TempFile("a.glb", glb(document, buffer)).path()).vertices[1],
+            Eigen::Vector3d(10, 0, 0));
+  document["skins"][0]["joints"] = {1};
+  document["skins"][0].erase("inverseBindMatrices");
+  EXPECT_NE(error_of(document).find("ends early"), std::string::npos);
+  try {
+    load_mesh(TempFile("a.glb", glb(document, buffer)).path());
+    ADD_FAILURE() << "a joint that is not there";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("joint 1 of 1"), std::string::npos) << error.what();
+  }
+}
+
+TEST(ReadGltf, WeightsMorphAndNodesComeBeforeMeshes) {
+  std::string buffer = tetrahedron_buffer();
+  json document = with_more(tetrahedron(), buffer, raw<float>({0, 0, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0}),
+                            "VEC3", 5126, 4);
+  // A sparse target: vertex 3 goes up by 1.
+  document = with_more(document, buffer, raw<std::uint16_t>({3}), "SCALAR", 5123, 1);
+  document = with_more(document, buffer, raw<float>({0, 0, 1}), "VEC3", 5126, 1);
+  document["accessors"].push_back({{"componentType", 5126},
+                                   {"count", 4},
+                                   {"type", "VEC3"},
+                                   {"sparse",
+                                    {{"count", 1},
+                                     {"indices", {{"bufferView", 3}, {"componentType", 5123}}},
+                                     {"values", {{"bufferView", 4}}}}}});
+  document["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 2}}, {{"POSITION", 5}}};
+  EXPECT_NEAR(volume_of(glb(document, buffer)), 1.0 / 6, 1e-15);
+  document["meshes"][0]["weights"] = {1, 0};
+  EXPECT_NEAR(volume_of(glb(document, buffer)), 4.0 / 6, 1e-14);
+  document["nodes"][0]["weights"] = {0, 1};
+  EXPECT_NEAR(volume_of(glb(document, buffer)), 2.0 / 6, 1e-14);
+  document["nodes"][0]["weights"] = {1};
+  EXPECT_THROW(volume_of(glb(document, buffer)), Error);
+  document["nodes"][0]["weights"] = {0, 1};
+  document["accessors"][5]["sparse"]["count"] = 2;
+  EXPECT_THROW(volume_of(glb(document, buffer)), Error);
+}
+
+TEST(ReadGltf, InstancesAreCopiesAndOtherExtensionsAreNamed) {
+  std::string buffer = tetrahedron_buffer();
+  json document =
+      with_more(tetrahedron(), buffer, raw<float>({5, 0, 0, 0, 7, 0, 0, 0, 9}), "VEC3", 5126, 3);
+  document["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["TRANSLATION"] = 2;
+  document["nodes"][0]["scale"] = {-1, 1, 1};
+  document["extensionsUsed"] = {"EXT_mesh_gpu_instancing", "KHR_materials_unlit", "X_bent"};
+  document["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
+  document["nodes"].push_back({{"mesh", 0}});
+  const TriangleMesh mesh = load_mesh(TempFile("a.glb", glb(document, buffer)).path());
+  ASSERT_EQ(mesh.vertices.size(), 12u);
+  EXPECT_EQ(mesh.vertices[0], Eigen::Vector3d(-5, 0, 0));
+  ASSERT_EQ(mesh.notes.size(), 2u);
+  EXPECT_NE(mesh.notes[0].find("1 node with a mesh not read"), std::string::npos);
+  EXPECT_NE(mesh.notes[1].find("X_bent"), std::string::npos);
+  const ClosedMesh closed = close_mesh(mesh, "a");
+  EXPECT_NEAR(closed.report.volume, 0.5, 1e-14);
+  EXPECT_EQ(std::vector(closed.report.notes.begin(), closed.report.notes.begin() + 2), mesh.notes);
+}
+
 TEST(ReadGltf, EveryLieIsCaught) {
   struct Lie {
     std::string words;
@@ -180,7 +282,12 @@ TEST(ReadGltf, EveryLieIsCaught) {
        [](json& d) { d["nodes"][0]["matrix"] = {1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; }},
       {"not a multiple of three", [](json& d) { d["accessors"][1]["count"] = 11; }},
       {"names vertex 3 of 3", [](json& d) { d["accessors"][0]["count"] = 3; }},
-      {"sparse", [](json& d) { d["accessors"][0]["sparse"] = json::object(); }},
+      {"\"count\"", [](json& d) { d["accessors"][0]["sparse"] = json::object(); }},
+      {"without data",
+       [](json& d) {
+         d["accessors"][0].erase("bufferView");
+         d["accessors"][0]["count"] = 1 << 20;
+       }},
       {"mode", [](json& d) { d["meshes"][0]["primitives"][0]["mode"] = 7; }},
       {"not valid glTF", [](json& d) { d.erase("asset"); }},
       {"not valid glTF", [](json& d) { d["meshes"][0].erase("primitives"); }},

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <clocale>
 #include <cstring>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <ist/error.h>
@@ -52,6 +54,97 @@ TEST(ReadObj, Grammar) {
                              "f 1 4 \\\n 3"));
   expect_tetrahedron(
       load_text("a.obj", "v 0 0 0 1 0 0\nv +1 0 0\nv 0 1e0 0 # one\nv 0 0 .1e1\n" + kObjFaces));
+}
+
+const std::string kStl = [] {
+  const char* const corners[4] = {"0 0 0", "1 0 0", "0 1 0", "0 0 1"};
+  std::string text = "solid s\n";
+  for (const auto& [a, b, c] : {std::array{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}}) {
+    text += "facet normal 0 0 0\nouter loop\n";
+    for (const int corner : {a, b, c}) text += std::string("vertex ") + corners[corner] + "\n";
+    text += "endloop\nendfacet\n";
+  }
+  return text + "endsolid s\n";
+}();
+const std::string kOff =
+    "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+const std::string kPlyStart =
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+    "property float z\n";
+const std::string kPlyFaces = "element face 4\nproperty list uchar int vertex_indices\n";
+const std::string kPlyVertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
+const std::string kPly =
+    kPlyStart + kPlyFaces + "end_header\n" + kPlyVertices + "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+
+TEST(ReadText, AnyLineEndsAndAByteOrderMark) {
+  const std::pair<const char*, std::string> files[] = {
+      {"a.obj", "# c\n" + kObj + kObjFaces}, {"a.stl", kStl}, {"a.off", kOff}, {"a.ply", kPly}};
+  for (const auto& [name, text] : files)
+    for (const char* const mark : {"", "\xef\xbb\xbf"})
+      for (const char* const end : {"\n", "\r", "\r\n", "\r\r\n"}) {
+        std::string bytes = mark;
+        for (const char c : text) bytes += c == '\n' ? end : std::string(1, c);
+        SCOPED_TRACE(std::string(name) + (*mark ? " marked " : " ") +
+                     std::to_string(std::strlen(end)));
+        expect_tetrahedron(load_text(name, bytes));
+      }
+}
+
+TEST(ReadText, AFileOfAnotherFormatIsNamedAsSuch) {
+  const std::string glb = std::string("glTF\2\0\0\0", 8) + std::string(200, '\7');
+  for (const char* const name : {"a.stl", "a.obj", "a.ply", "a.off", "a.dae"})
+    EXPECT_ERROR(name, glb, "holds a binary glTF");
+  EXPECT_ERROR("a.obj", kStl, "holds STL");
+  EXPECT_ERROR("a.stl", kPly, "holds PLY");
+  EXPECT_ERROR("a.stl", kObj + kObjFaces, "is text, and no STL");
+  EXPECT_ERROR("a.stl", std::string("\xff\xfes\0o\0l\0i\0d\0", 12), "UTF-16");
+  EXPECT_ERROR("a.stl", std::string(100, '\1'), "or is no STL");
+  // A binary STL may say anything in its header.
+  std::string binary = "glTF";
+  binary.resize(80);
+  const std::uint32_t count = 1;
+  binary.append(reinterpret_cast<const char*>(&count), 4);
+  const float facet[12] = {0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0};
+  binary.append(reinterpret_cast<const char*>(facet), 48).append(2, '\0');
+  EXPECT_EQ(load_text("a.stl", binary).triangles.size(), 1u);
+  EXPECT_TRUE(load_text("a.stl", binary).notes.empty());
+  const TriangleMesh more = load_text("a.stl", binary + std::string(100, '\1'));
+  ASSERT_EQ(more.notes.size(), 1u);
+  EXPECT_NE(more.notes[0].find("100 bytes behind the 1 triangle"), std::string::npos);
+}
+
+TEST(ReadText, WhatIsNotReadIsNamed) {
+  const auto notes = [](const std::string& name, const std::string& bytes) {
+    const TriangleMesh mesh = load_text(name, bytes);
+    std::string all;
+    for (const std::string& note : mesh.notes) all += note + "; ";
+    return all;
+  };
+  EXPECT_EQ(notes("a.obj", kObj + kObjFaces + "l 1 2\np 1\nvp 1\ncstype bezier\n"), "");
+  EXPECT_NE(notes("a.obj", kObj + kObjFaces + "surf 0 1 0 1 1 2\nsurf 0 1 0 1 1 2\ncall x\n")
+                .find("\"call\" are not read: they name other files; lines of \"surf\""),
+            std::string::npos);
+  EXPECT_EQ(notes("a.ply", kPly), "");
+  const std::string grid = "element range_grid 1\nproperty list uchar int vertex_indices\n";
+  EXPECT_NE(notes("a.ply", kPlyStart + kPlyFaces + grid + "end_header\n" + kPlyVertices +
+                               "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n1 0\n")
+                .find("\"range_grid\""),
+            std::string::npos);
+}
+
+TEST(ReadPly, StripsOfTriangles) {
+  const std::string strips = "element tristrips 1\nproperty list int int vertex_indices\n";
+  expect_tetrahedron(
+      load_text("a.ply", kPlyStart + strips + "end_header\n" + kPlyVertices + "6 0 2 1 3 0 2\n"));
+  const TriangleMesh parted = load_text(
+      "a.ply", kPlyStart + strips + "end_header\n" + kPlyVertices + "9 0 2 1 3 -1 2 0 3 -1\n");
+  EXPECT_EQ(parted.triangles.size(), 3u);
+  const TriangleMesh whole =
+      load_text("a.ply", kPlyStart + kPlyFaces + strips + "end_header\n" + kPlyVertices +
+                             "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n0\n");
+  expect_tetrahedron(whole);
+  EXPECT_ERROR("a.ply", kPlyStart + strips + "end_header\n" + kPlyVertices + "3 0 1 4\n",
+               "corner 2 is not a vertex");
 }
 
 TEST(ReadObj, KeepsAllDigitsOfADouble) {

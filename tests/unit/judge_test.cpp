@@ -143,7 +143,7 @@ TEST(Judge, WhatWasDroppedCounts) {
   } catch (const OpenMeshError& error) {
     EXPECT_NE(std::string(error.what()).find("confidence below"), std::string::npos)
         << error.what();
-    EXPECT_NE(std::string(error.what()).find("Wrap"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("--wrap"), std::string::npos) << error.what();
   }
 }
 

@@ -67,6 +67,37 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
 }
 
 // Where the map into the unit frame is exact nothing was rounded; elsewhere the bound is tight.
+/// More than 256 blocks share the tip of a cone: they do not all name each other.
+TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
+  constexpr std::uint32_t kSides = 9000;
+  TriangleMesh cone;
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2 * 3.14159265358979 * i / kSides;
+    cone.vertices.emplace_back(std::cos(angle), std::sin(angle), 0);
+    cone.triangles.push_back({kSides, i, (i + 1) % kSides});
+    cone.triangles.push_back({kSides + 1, (i + 1) % kSides, i});
+  }
+  cone.vertices.emplace_back(0.1, 0.2, 1);
+  cone.vertices.emplace_back(0, 0, 0);
+  const ClosedMesh mesh = closed(cone, "cone");
+  const Asset asset = bake_surface(mesh);
+  expect_sound(asset, mesh);
+  EXPECT_LT(asset.bytes().size(), 100u * 2 * kSides);
+  // Half a cone and, of the other half, what a box leaves.
+  const Asset box = bake_surface(closed(testing::box_mesh({-2, -2, -2}, {0, 2, 2}), "box"));
+  const Asset other = bake_surface(closed(testing::box_mesh({0, -2, -2}, {2, 2, 2}), "box"));
+  PenetrationSettings exact;
+  exact.measure = Measure::exact;
+  Workspace workspace;
+  const auto overlap = [&](const Asset& with) {
+    return penetration(PlacedTree{asset.view(), {}, 1}, PlacedTree{with.view(), {}, 1}, exact,
+                       workspace);
+  };
+  const Penetration one = overlap(box), rest = overlap(other);
+  EXPECT_EQ(one.status, QueryStatus::ok);
+  EXPECT_NEAR(one.volume + rest.volume, asset.view().volume(), 1e-9);
+}
+
 TEST(KeptMesh, TellsHowFarVerticesWereRounded) {
   const Asset exact = bake_surface(closed(testing::cube_mesh(), "cube"));
   EXPECT_EQ(exact.view().mesh_error(), 0);

@@ -22,8 +22,8 @@ using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
 /// By the exact test of every pair; what is said without it must agree.
 Pairs all_pairs(const TriangleMesh& mesh) {
-  const auto& [vertices, triangles, declared] = mesh;
-  const std::vector<std::uint8_t> spread = spread_fans(vertices, triangles);
+  const auto& [vertices, triangles, declared, notes] = mesh;
+  const std::vector<std::uint32_t> spread = spread_fans(vertices, triangles);
   Pairs pairs;
   for (std::uint32_t i = 0; i < triangles.size(); ++i)
     for (std::uint32_t j = i + 1; j < triangles.size(); ++j) {
@@ -160,7 +160,9 @@ TEST(SelfIntersections, FansThatGoOnceAround) {
   EXPECT_TRUE(is_spread(fan(6, 1, 0)));
   EXPECT_TRUE(is_spread(fan(6, 1, 0.3)));
   EXPECT_TRUE(is_spread(fan(32, 1, 0.1)));
-  EXPECT_FALSE(is_spread(fan(33, 1, 0.1)));  // not looked at
+  EXPECT_TRUE(is_spread(fan(10'000, 1, 0)));
+  EXPECT_TRUE(is_spread(fan(10'000, 1, 1e-6)));
+  EXPECT_FALSE(is_spread(fan(10'001, 2, 0)));
   for (const std::uint32_t n : {5u, 7u, 9u, 12u, 15u, 31u}) {
     EXPECT_FALSE(is_spread(fan(n, 2, 0.1))) << n;
     if (n > 6) {
@@ -195,6 +197,66 @@ TEST(SelfIntersections, PairsByHand) {
   EXPECT_TRUE(meet({0, 1, 2}, {8, 9, 5}));    // a side lies along a side
   EXPECT_TRUE(meet({0, 1, 2}, {0, 5, 10}));   // shares a corner and passes through
   EXPECT_FALSE(meet({0, 1, 2}, {0, 7, 11}));  // shares a corner only
+}
+
+/// A cylinder, or a cone, of n sides, whose ends are fans about a point of the axis or a corner.
+TriangleMesh fan_body(const std::uint32_t n, const bool cone, const bool about_corner) {
+  TriangleMesh mesh;
+  for (const double z : {-0.3, 0.3})
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const double angle = 2 * 3.14159265358979 * i / n;
+      mesh.vertices.emplace_back(std::cos(angle), std::sin(angle), z);
+    }
+  const std::uint32_t low = 2 * n, high = 2 * n + 1;
+  mesh.vertices.emplace_back(0, 0, -0.3);
+  mesh.vertices.emplace_back(0, 0, cone ? 0.9 : 0.3);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    if (cone) {
+      mesh.triangles.push_back({high, i, j});
+    } else {
+      mesh.triangles.push_back({i, j, n + i});
+      mesh.triangles.push_back({j, n + j, n + i});
+      if (!about_corner) mesh.triangles.push_back({high, n + i, n + j});
+      if (about_corner && i != 0 && j != 0) mesh.triangles.push_back({n, n + i, n + j});
+    }
+    if (!about_corner) mesh.triangles.push_back({low, j, i});
+    if (about_corner && i != 0 && j != 0) mesh.triangles.push_back({0, j, i});
+  }
+  return weld(mesh, 0);
+}
+
+TEST(SelfIntersections, OfLargeFans) {
+  std::mt19937_64 random(55);
+  std::normal_distribution<double> any;
+  for (const bool cone : {false, true})
+    for (const bool about_corner : {false, true})
+      for (const bool turned : {false, true}) {
+        SCOPED_TRACE(::testing::Message() << cone << about_corner << turned);
+        const Eigen::Quaterniond turn =
+            turned ? Eigen::Quaterniond(any(random), any(random), any(random), any(random))
+                         .normalized()
+                   : Eigen::Quaterniond::Identity();
+        // Larger than any search of all pairs could be.
+        TriangleMesh large = fan_body(20'000, cone, about_corner);
+        for (Eigen::Vector3d& v : large.vertices) v = turn * v;
+        const auto none = find_self_intersections(large.vertices, large.triangles);
+        ASSERT_TRUE(none);
+        EXPECT_EQ(none->count, 0u);
+        // A spike through it is found.
+        TriangleMesh pierced = fan_body(150, cone, about_corner);
+        const auto first = static_cast<std::uint32_t>(pierced.vertices.size());
+        for (const auto& [x, y, z] : {std::array{0.5, 0.1, 1.0},
+                                      {0.52, 0.13, -1.0},
+                                      {0.45, 0.12, -1.0},
+                                      {0.48, 0.05, -1.0}})
+          pierced.vertices.emplace_back(x, y, z);
+        for (const auto& t : {Triangle{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}})
+          pierced.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+        for (Eigen::Vector3d& v : pierced.vertices) v = turn * v;
+        expect_all_found(pierced);
+        EXPECT_GT(find_self_intersections(pierced.vertices, pierced.triangles)->count, 3u);
+      }
 }
 
 }  // namespace

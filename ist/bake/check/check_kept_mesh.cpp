@@ -9,6 +9,7 @@
 #include <ist/tree_view.h>
 
 #include "bake/check/check_tally.h"
+#include "bake/kept_surface.h"
 
 namespace ist {
 namespace {
@@ -168,31 +169,54 @@ Invariant blocks(const KeptMesh& mesh) {
   return tally.named("mesh blocks", "parts of a block that share no vertex − 1");
 }
 
-/// A block's list names all blocks that share a vertex with it, and no other.
+/// A block's list names all blocks that share a vertex with it, and no other; at a vertex of more
+/// than kMostAround blocks enough of them for all to hang together.
 Invariant neighbours(const KeptMesh& mesh) {
   std::vector<std::vector<std::uint32_t>> around(mesh.header.vertex_count);
   for (std::uint32_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i)
       around[mesh.blocks[b].vertex[i]].push_back(b);
-  return tally_all(mesh.count,
-                   [&](std::size_t b, Tally& tally) {
-                     const MeshBlock& block = mesh.blocks[b];
-                     std::vector<std::uint32_t> wanted, named;
-                     for (std::uint32_t i = 0; i < block.vertices; ++i)
-                       for (const std::uint32_t other : around[block.vertex[i]])
-                         if (other != b) wanted.push_back(other);
-                     std::sort(wanted.begin(), wanted.end());
-                     wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
-                     for (std::uint32_t k = 0; k < block.neighbours; ++k)
-                       named.push_back(mesh.neighbours[block.first_neighbour + k] / kWidth);
-                     std::sort(named.begin(), named.end());
-                     std::vector<std::uint32_t> wrong;
-                     std::set_symmetric_difference(wanted.begin(), wanted.end(), named.begin(),
-                                                   named.end(), std::back_inserter(wrong));
-                     tally.add(static_cast<double>(wrong.size()), b);
-                   })
-      .named("mesh neighbours",
-             "blocks that share a vertex but are not listed, or are listed but share none");
+  const auto is_large = [&](std::uint32_t v) { return around[v].size() > kMostAround; };
+  const auto named_by = [&](std::size_t b) {
+    std::vector<std::uint32_t> named;
+    for (std::uint32_t k = 0; k < mesh.blocks[b].neighbours; ++k)
+      named.push_back(mesh.neighbours[mesh.blocks[b].first_neighbour + k] / kWidth);
+    std::sort(named.begin(), named.end());
+    return named;
+  };
+  const auto has = [&](std::size_t b, std::uint32_t v) {
+    const MeshBlock& block = mesh.blocks[b];
+    return std::find(block.vertex, block.vertex + kWidth, v) != block.vertex + kWidth;
+  };
+  Tally all = tally_all(mesh.count, [&](std::size_t b, Tally& tally) {
+    const MeshBlock& block = mesh.blocks[b];
+    const std::vector<std::uint32_t> named = named_by(b);
+    std::vector<std::uint32_t> wanted, wrong;
+    for (std::uint32_t i = 0; i < block.vertices; ++i)
+      for (const std::uint32_t other : around[block.vertex[i]])
+        if (other != b && !is_large(block.vertex[i])) wanted.push_back(other);
+    for (const std::uint32_t other : named)
+      if (std::any_of(block.vertex, block.vertex + block.vertices,
+                      [&](std::uint32_t v) { return is_large(v) && has(other, v); }))
+        wanted.push_back(other);
+    std::sort(wanted.begin(), wanted.end());
+    wanted.erase(std::unique(wanted.begin(), wanted.end()), wanted.end());
+    std::set_symmetric_difference(wanted.begin(), wanted.end(), named.begin(), named.end(),
+                                  std::back_inserter(wrong));
+    tally.add(static_cast<double>(wrong.size()), b);
+  });
+  LaneGroups groups(mesh.count);
+  for (std::uint32_t v = 0; v < around.size(); ++v) {
+    if (!is_large(v)) continue;
+    groups = LaneGroups(mesh.count);
+    for (const std::uint32_t b : around[v])
+      for (const std::uint32_t other : named_by(b))
+        if (has(other, v)) groups.join(b, other);
+    for (const std::uint32_t b : around[v])
+      all.add(groups.find(b) == groups.find(around[v][0]) ? 0 : 1, b);
+  }
+  return all.named("mesh neighbours",
+                   "blocks that share a vertex but are not listed, or are listed but share none");
 }
 
 /// How far a block's vertices reach out of a box; ≤ 0: not at all.

@@ -89,6 +89,10 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
   return sum;
 }
 
+/// A vertex of more triangles than this leads to no neighbour: each is found by its other corners,
+/// and looking at all of them for each patch would take the square of their number.
+constexpr std::size_t kLargestStar = 1024;
+
 /// Grows patches one after the other.
 class Growth {
  public:
@@ -155,7 +159,7 @@ class Growth {
     using Score = std::tuple<int, double, std::uint32_t>;
     Score best{4, 0, kNone};
     for (const std::uint32_t v : patch.vertices) {
-      if (left_[v] == 0) continue;
+      if (left_[v] == 0 || stars_[v].size() > kLargestStar) continue;
       for (const std::uint32_t t : stars_[v]) {
         if (taken_[t] != 0) continue;
         int added = 0, last = 0;
@@ -175,7 +179,8 @@ class Growth {
   std::uint32_t beside(const BlockPatch& patch) const {
     using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
     Score best{kNone, 0, kNone};
-    for (const std::uint32_t v : patch.vertices)
+    for (const std::uint32_t v : patch.vertices) {
+      if (stars_[v].size() > kLargestStar) continue;
       for (const std::uint32_t t : stars_[v]) {
         if (taken_[t] != 0) continue;
         std::uint32_t left = 0;
@@ -183,6 +188,7 @@ class Growth {
         best =
             std::min(best, Score{left, distance2(middle_[t], middle_[patch.triangles.front()]), t});
       }
+    }
     return std::get<2>(best);
   }
 

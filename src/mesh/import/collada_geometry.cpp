@@ -23,7 +23,12 @@ class GeometryReader {
 
   PolygonMesh read(const Index geometry) {
     const Index source = xml_.child(geometry, "mesh");
-    if (source == kNoElement) return {};  // a spline has no faces
+    if (source == kNoElement) {  // a spline has no faces
+      for (const char* const solid : {"convex_mesh", "brep"})
+        if (xml_.child(geometry, solid) != kNoElement)
+          mesh_.notes.push_back("a geometry is not read: it is a " + std::string(solid));
+      return std::move(mesh_);
+    }
     for (Index child = xml_[source].first_child; child != kNoElement;
          child = xml_[child].next_sibling) {
       const std::string_view name = xml_[child].name;

@@ -18,14 +18,28 @@ std::uint32_t word_at(const std::string_view bytes, const std::size_t offset) {
   return value;
 }
 
-/// Extensions that change how a surface looks, not where it is; and integer coordinates, which are
-/// read like any others.
+template <std::size_t Count>
+bool starts_with_any(const std::string_view text,
+                     const std::array<std::string_view, Count>& starts) {
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](const std::string_view start) { return text.starts_with(start); });
+}
+
+/// Extensions that change how a surface looks, not where it is; and those that are read: integer
+/// coordinates, like any others, and instances.
 bool is_harmless(const std::string_view extension) {
-  constexpr std::array<std::string_view, 5> kHarmless{
-      "KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"};
-  return std::any_of(kHarmless.begin(), kHarmless.end(), [&](const std::string_view start) {
-    return extension.substr(0, start.size()) == start;
-  });
+  constexpr std::array<std::string_view, 6> kHarmless{
+      "KHR_mesh_quantization", "EXT_mesh_gpu_instancing",
+      "KHR_materials_",        "KHR_texture_",
+      "EXT_texture_",          "KHR_lights_"};
+  return starts_with_any(extension, kHarmless);
+}
+
+/// Where it is not required, a file holds the same numbers without it.
+bool is_compression(const std::string_view extension) {
+  constexpr std::array<std::string_view, 3> kCompressions{
+      "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};
+  return starts_with_any(extension, kCompressions);
 }
 
 std::optional<std::string> decode_base64(const std::string_view text) {
@@ -81,6 +95,10 @@ constexpr ComponentType component(const std::size_t code) {
 constexpr std::array<ComponentType, 6> kComponentTypes = {
     component<std::int8_t>(5120),   component<std::uint8_t>(5121),  component<std::int16_t>(5122),
     component<std::uint16_t>(5123), component<std::uint32_t>(5125), {5126, 4, 1, read_as<float>}};
+
+std::size_t width_of(const std::string_view type) {
+  return type == "SCALAR" ? 1 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
+}
 
 }  // namespace
 
@@ -147,6 +165,14 @@ void GltfDocument::check_extensions() const {
       fail("requires the extension " + in_quotes(name) +
            ", which is not supported. Export it without (no compression)");
   }
+}
+
+std::vector<std::string> GltfDocument::unread_extensions() const {
+  std::vector<std::string> unread;
+  for (const Json& entry : root_.value("extensionsUsed", Json::array()))
+    if (std::string name = entry; !is_harmless(name) && !is_compression(name))
+      unread.push_back(std::move(name));
+  return unread;
 }
 
 void GltfDocument::load_buffers() {
@@ -232,25 +258,18 @@ double GltfDocument::real(const Json& value, const std::string& where) const {
   return number;
 }
 
-std::vector<double> GltfDocument::accessor(const std::size_t index, const std::string_view type,
-                                           const std::string& from) const {
-  const Json& accessor = at("accessors", index, from);
-  const std::string name = "accessor " + std::to_string(index);
-  const std::string stored_type = accessor.at("type");
-  if (stored_type != type)
-    fail(name + " is " + in_quotes(stored_type) + ", not " + in_quotes(type));
-  if (accessor.contains("sparse"))
-    fail(name + " is sparse, which is not supported. Export it without sparse accessors");
-  if (!accessor.contains("bufferView")) fail(name + " has no data");
-  const std::size_t code = whole(accessor, "componentType");
+std::vector<double> GltfDocument::numbers(const Json& where, const Json& type_owner,
+                                          const std::string_view type, const std::size_t count,
+                                          const std::string& name) const {
+  const std::size_t code = whole(type_owner, "componentType");
   const auto component = std::find_if(kComponentTypes.begin(), kComponentTypes.end(),
                                       [&](const auto& c) { return c.code == code; });
   if (component == kComponentTypes.end())
     fail(name + ": unknown componentType " + std::to_string(code));
-  const std::size_t width = type == "SCALAR" ? 1 : 3;
+  const std::size_t width = width_of(type);
   const std::size_t element = width * component->bytes;
 
-  const Json& view = at("bufferViews", whole(accessor, "bufferView"), name);
+  const Json& view = at("bufferViews", whole(where, "bufferView"), name);
   const std::size_t buffer = whole(view, "buffer");
   at("buffers", buffer, name);
   const std::size_t view_offset = whole(view, "byteOffset", 0);
@@ -262,14 +281,14 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
   if (stride < element || (view.contains("byteStride") && (stride % 4 != 0 || stride > 252)))
     fail(name + ": a byteStride of " + std::to_string(stride) + " for elements of " +
          std::to_string(element) + " bytes");
-  const std::size_t offset = whole(accessor, "byteOffset", 0);
-  const std::size_t count = whole(accessor, "count");
+  const std::size_t offset = whole(where, "byteOffset", 0);
   if (count == 0 || offset > view_length || element > view_length - offset ||
       (view_length - offset - element) / stride < count - 1)
     fail(name + ": " + std::to_string(count) + " elements do not fit into its view of " +
          std::to_string(view_length) + " bytes");
+  spend(width, count, name);
 
-  const bool normalized = accessor.value("normalized", false);
+  const bool normalized = type_owner.value("normalized", false);
   std::vector<double> values(width * count);
   for (std::size_t i = 0; i < count; ++i) {
     const char* const start = bytes.data() + view_offset + offset + i * stride;
@@ -279,6 +298,53 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
     }
   }
   return values;
+}
+
+std::vector<double> GltfDocument::accessor(const std::size_t index, const std::string_view type,
+                                           const std::string& from) const {
+  const Json& accessor = at("accessors", index, from);
+  const std::string name = "accessor " + std::to_string(index);
+  const std::string stored_type = accessor.at("type");
+  if (stored_type != type)
+    fail(name + " is " + in_quotes(stored_type) + ", not " + in_quotes(type));
+  const std::size_t count = whole(accessor, "count");
+  const std::size_t width = width_of(type);
+  std::vector<double> values;  // zeros where nothing is stored
+  if (accessor.contains("bufferView")) {
+    values = numbers(accessor, accessor, type, count, name);
+  } else {
+    // As many zeros as the file has bytes: other attributes of as many vertices take more.
+    std::size_t stored = file_.bytes.size();
+    for (const std::string_view buffer : buffers_) stored += buffer.size();
+    if (count > stored) fail(name + ": " + std::to_string(count) + " elements without data");
+    spend(width, count, name);
+    values.resize(width * count);
+  }
+  if (!accessor.contains("sparse")) return values;
+  const Json& patch = accessor.at("sparse");
+  const std::size_t patched = whole(patch, "count");
+  const Json &places = patch.at("indices"), &news = patch.at("values");
+  const std::vector<double> at_place = numbers(places, places, "SCALAR", patched, name);
+  const std::vector<double> replaced = numbers(news, accessor, type, patched, name);
+  for (std::size_t i = 0; i < patched; ++i) {
+    if (!(at_place[i] >= 0 && at_place[i] < static_cast<double>(count)) ||
+        at_place[i] != std::floor(at_place[i]))
+      fail(name + ": its sparse part names element " + std::to_string(at_place[i]) + " of " +
+           std::to_string(count));
+    std::copy_n(replaced.begin() + static_cast<std::ptrdiff_t>(width * i), width,
+                values.begin() +
+                    static_cast<std::ptrdiff_t>(width) * static_cast<std::ptrdiff_t>(at_place[i]));
+  }
+  return values;
+}
+
+void GltfDocument::spend(const std::size_t width, const std::size_t count,
+                         const std::string& name) const {
+  const std::size_t most = 32 * most_corners();
+  if (count > (most - numbers_read_) / width)
+    fail(name + ": the file asks for more than " + std::to_string(most) +
+         " numbers. Flatten or split the scene");
+  numbers_read_ += width * count;
 }
 
 }  // namespace ist

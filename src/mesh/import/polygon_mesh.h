@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <string>
 #include <vector>
 
 #include <ist/mesh.h>
@@ -24,6 +25,7 @@ struct PolygonMesh {
   /// Text files only: the line of each vertex that is not finite.
   std::map<std::uint32_t, std::size_t> line_of_nonfinite;
   DeclaredFrame declared;
+  std::vector<std::string> notes;  ///< as TriangleMesh::notes
 
   void add_triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
     corners.insert(corners.end(), {a, b, c});
@@ -38,7 +40,8 @@ PolygonMesh read_stl(const SourceFile& file);
 PolygonMesh read_ply(const SourceFile& file);
 PolygonMesh read_off(const SourceFile& file);
 
-/// glTF 2.0: the default scene with its node transforms, skins in their bind pose.
+/// glTF 2.0: the default scene with its node transforms, instances, skins where their joints stand
+/// and morph targets by the default weights.
 PolygonMesh read_gltf(const SourceFile& file);
 
 /// COLLADA: the visual scene with its node transforms, in metres and on the file's own axes; skins

@@ -174,10 +174,13 @@ class SceneReader {
       const Index skin = xml_.child(controller, "skin"), morph = xml_.child(controller, "morph");
       if (skin == kNoElement && morph == kNoElement)
         xml_.fail(controller, "is neither skin nor morph");
+      if (skin == kNoElement)
+        out_.notes.emplace_back("morph targets are not applied: the base mesh is read");
       controlled.geometry =
           document_.target(skin == kNoElement ? morph : skin, "source", "geometry");
       if (skin != kNoElement) {
         const Index bind = xml_.child(skin, "bind_shape_matrix");
+        out_.notes.emplace_back("a skin is not posed: its mesh is read as it was modelled");
         controlled.pose =
             bind == kNoElement ? root_transform() : Transform(root_transform() * matrix(bind));
       }
@@ -187,6 +190,7 @@ class SceneReader {
 
   void append(const Index element, const Transform& world, const Index instance) {
     const PolygonMesh& mesh = geometries_[element];
+    out_.notes.insert(out_.notes.end(), mesh.notes.begin(), mesh.notes.end());
     if (out_.corners.size() + mesh.corners.size() > document_.most() ||
         out_.vertices.size() + mesh.vertices.size() >
             std::min<std::size_t>(document_.most(), UINT32_MAX))

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -13,9 +14,16 @@ std::int64_t vertex_of_corner(const TextScanner& scanner, const std::string_view
   return scanner.integer(corner.substr(0, corner.find('/')));
 }
 
+/// Statements other than `f` that make or fetch a surface.
+bool is_surface(const std::string_view keyword) {
+  return keyword == "surf" || keyword == "bsp" || keyword == "bzp" || keyword == "cdp" ||
+         keyword == "call";
+}
+
 }  // namespace
 
-/// Wavefront OBJ: `v` and `f`, lines continued by a backslash; all else is passed over.
+/// Wavefront OBJ: `v` and `f`, lines continued by a backslash. Other surfaces are noted; all else
+/// is passed over.
 PolygonMesh read_obj(const SourceFile& file) {
   if (file.bytes.find('\0') != std::string::npos)
     fail(file, "holds binary data, so it is not an OBJ file. Give it the ending of its format");
@@ -30,6 +38,7 @@ PolygonMesh read_obj(const SourceFile& file) {
   // Faces may come before their vertices, so the largest index is checked at the end.
   std::int64_t largest = 0;
   std::size_t line_of_largest = 0;
+  std::set<std::string> unread;
   while (scanner.next_line()) {
     const std::string_view keyword = next_word();
     if (keyword == "v") {
@@ -56,8 +65,14 @@ PolygonMesh read_obj(const SourceFile& file) {
       }
       if (mesh.corners.size() - begin < 3) scanner.fail("a face needs three or more corners");
       mesh.ends.push_back(mesh.corners.size());
+    } else if (is_surface(keyword)) {
+      unread.emplace(keyword);
     }
   }
+  for (const std::string& keyword : unread)
+    mesh.notes.push_back("lines of " + in_quotes(keyword) +
+                         (keyword == "call" ? " are not read: they name other files"
+                                            : " are not read: free-form surfaces, not polygons"));
   if (line_of_largest > 0 && largest >= static_cast<std::int64_t>(mesh.vertices.size()))
     fail_at_line(file, line_of_largest,
                  "vertex " + std::to_string(largest + 1) + " does not exist: the file has " +

@@ -282,6 +282,40 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
   return true;
 }
 
+/// Throws Error unless the value counts a vertex.
+std::uint32_t vertex_of(const Body& body, const double value, const std::uint64_t vertex_count,
+                        const char* const of_what, const std::uint64_t index,
+                        const std::uint64_t corner) {
+  if (!(value >= 0) || value >= static_cast<double>(vertex_count) || value != std::floor(value))
+    body.fail_here(of_what + std::to_string(index) + ": corner " + std::to_string(corner) +
+                   " is not a vertex: the file has " + std::to_string(vertex_count) +
+                   ", counted from 0");
+  return static_cast<std::uint32_t>(value);
+}
+
+/// Strips of triangles, each turned against the one before; −1 ends one.
+void read_strips(Body& body, const Element& element, const std::uint64_t vertex_count,
+                 PolygonMesh& mesh) {
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    for (const Property& property : element.properties) {
+      const std::uint64_t values = property.is_list ? body.read_list_count(property) : 1;
+      std::uint64_t length = 0;  // of the strip so far
+      std::array<std::uint32_t, 2> last{};
+      for (std::uint64_t k = 0; k < values; ++k) {
+        const double value = body.read(property.type);
+        if (!is_corners(property)) continue;
+        if (value == -1) {
+          length = 0;
+          continue;
+        }
+        const std::uint32_t v = vertex_of(body, value, vertex_count, "strip ", i, k);
+        if (++length >= 3) mesh.add_triangle(last[length % 2 == 0 ? 1 : 0], last[length % 2], v);
+        last = {last[1], v};
+      }
+    }
+  }
+}
+
 void read_faces(Body& body, const Element& element, const std::uint64_t vertex_count,
                 PolygonMesh& mesh) {
   if (element.properties.empty()) return;  // any number of nothing
@@ -295,12 +329,7 @@ void read_faces(Body& body, const Element& element, const std::uint64_t vertex_c
       for (std::uint64_t k = 0; k < values; ++k) {
         const double value = body.read(property.type);
         if (!corners) continue;
-        if (!(value >= 0) || value >= static_cast<double>(vertex_count) ||
-            value != std::floor(value))
-          body.fail_here("face " + std::to_string(i) + ": corner " + std::to_string(k) +
-                         " is not a vertex: the file has " + std::to_string(vertex_count) +
-                         ", counted from 0");
-        mesh.corners.push_back(static_cast<std::uint32_t>(value));
+        mesh.corners.push_back(vertex_of(body, value, vertex_count, "face ", i, k));
       }
       if (!corners) continue;
       if (values >= 3)
@@ -323,8 +352,8 @@ void skip(Body& body, const Element& element) {
 
 }  // namespace
 
-/// Polygon file format, text or binary of either byte order; elements other than vertices and faces
-/// and properties other than position and corners are passed over.
+/// Polygon file format, text or binary of either byte order; elements other than vertices, faces
+/// and strips and properties other than position and corners are passed over.
 PolygonMesh read_ply(const SourceFile& file) {
   const Header header = parse_header(file);
   std::uint64_t vertex_count = 0;
@@ -342,9 +371,18 @@ PolygonMesh read_ply(const SourceFile& file) {
     } else if (element.name == "face") {
       if (std::exchange(has_faces, true)) fail(file, "the header lists faces twice");
       read_faces(body, element, vertex_count, mesh);
+    } else if (element.name == "tristrips") {
+      read_strips(body, element, vertex_count, mesh);
     } else {
       skip(body, element);
+      if (element.count > 0 && element.name != "edge" && element.name != "material")
+        mesh.notes.push_back("the element " + in_quotes(element.name) + " is not read");
     }
+  }
+  if (!mesh.triangles.empty() &&
+      !mesh.ends.empty()) {  // faces alone were triangles, strips came too
+    for (const auto& t : mesh.triangles) mesh.add_triangle(t[0], t[1], t[2]);
+    mesh.triangles.clear();
   }
   return mesh;
 }

@@ -8,6 +8,7 @@
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"
+#include "mesh/message_text.h"
 
 namespace ist {
 namespace {
@@ -21,17 +22,31 @@ std::uint64_t triangles_announced(const SourceFile& file) {
   return count;
 }
 
+/// Whether the count in a binary file's header fits its size.
+bool has_binary_size(const SourceFile& file) {
+  return file.bytes.size() >= kHeaderBytes &&
+         kHeaderBytes + kFacetBytes * triangles_announced(file) == file.bytes.size();
+}
+
 PolygonMesh read_binary(const SourceFile& file) {
+  if (!has_binary_size(file)) refuse_other_format(file);
+  if (file.bytes.find('\0') == std::string::npos)
+    fail(file,
+         "is text, and no STL: that begins with \"solid\", not with " +
+             in_quotes(std::string_view(file.bytes).substr(0, file.bytes.find_first_of("\r\n"))));
   if (file.bytes.size() < kHeaderBytes)
     fail(file, "the file ends early: binary STL begins with " + std::to_string(kHeaderBytes) +
                    " bytes, here are " + std::to_string(file.bytes.size()));
   const std::uint64_t count = triangles_announced(file);
   const std::uint64_t needed = kHeaderBytes + kFacetBytes * count;
   if (needed > file.bytes.size())
-    fail(file, "the file ends early: " + std::to_string(count) + " triangles need " +
-                   std::to_string(needed) + " bytes, here are " +
+    fail(file, "the file ends early, or is no STL: as a binary one, its " + std::to_string(count) +
+                   " triangles need " + std::to_string(needed) + " bytes, here are " +
                    std::to_string(file.bytes.size()));
   PolygonMesh mesh;
+  if (file.bytes.size() >= needed + kFacetBytes)
+    mesh.notes.push_back(std::to_string(file.bytes.size() - needed) + " bytes behind the " +
+                         counted(count, "triangle") + " that the header announces are not read");
   mesh.vertices.resize(3 * count);
   mesh.triangles.resize(count);
   tbb::parallel_for(std::uint64_t{0}, count, [&](const std::uint64_t i) {
@@ -96,10 +111,8 @@ PolygonMesh read_text(const SourceFile& file) {
 }
 
 bool is_text(const SourceFile& file) {
-  const std::string_view bytes = file.bytes;
-  if (bytes.size() >= kHeaderBytes &&
-      kHeaderBytes + kFacetBytes * triangles_announced(file) == bytes.size())
-    return false;  // many binary files begin with "solid" too
+  if (has_binary_size(file)) return false;  // many binary files begin with "solid" too
+  const std::string_view bytes = without_byte_order_mark(file.bytes);
   const std::size_t first = bytes.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && same_letters(bytes.substr(first, 5), "solid") &&
          bytes.find('\0') == std::string_view::npos;

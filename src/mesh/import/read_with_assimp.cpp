@@ -28,7 +28,10 @@ AssimpTransform to_double(const aiMatrix4x4& m) {
 
 void append(const aiMesh& mesh, const AssimpTransform& world, PolygonMesh& out) {
   const auto first = out.vertices.size();
-  if (first + mesh.mNumVertices > UINT32_MAX) return;
+  if (mesh.HasBones())
+    out.notes.emplace_back("a skin is not posed: its mesh is read as it was modelled");
+  if (mesh.mNumAnimMeshes > 0)
+    out.notes.emplace_back("morph targets are not applied: the base mesh is read");
   for (unsigned i = 0; i < mesh.mNumVertices; ++i) {
     const aiVector3D& v = mesh.mVertices[i];
     out.vertices.push_back((world * Eigen::Vector4d(v.x, v.y, v.z, 1)).head<3>());
@@ -78,13 +81,19 @@ PolygonMesh read_with_assimp(const SourceFile& file) {
     fail(file, "cannot be read as a mesh: " + std::string(importer.GetErrorString()));
   PolygonMesh mesh;
   mesh.declared = declared_frame(*scene);
+  if ((scene->mFlags & AI_SCENE_FLAGS_INCOMPLETE) != 0)
+    mesh.notes.emplace_back("assimp read only a part of the file");
   std::vector<std::pair<const aiNode*, AssimpTransform>> open{
       {scene->mRootNode, own_axes(ending) * to_double(scene->mRootNode->mTransformation)}};
   while (!open.empty()) {
     const auto [node, world] = open.back();
     open.pop_back();
-    for (unsigned i = 0; i < node->mNumMeshes; ++i)
-      append(*scene->mMeshes[node->mMeshes[i]], world, mesh);
+    for (unsigned i = 0; i < node->mNumMeshes; ++i) {
+      const aiMesh& one = *scene->mMeshes[node->mMeshes[i]];
+      if (mesh.vertices.size() + one.mNumVertices > UINT32_MAX)
+        fail(file, "more than 2^32 vertices. Split the mesh");
+      append(one, world, mesh);
+    }
     for (unsigned i = node->mNumChildren; i-- > 0;)
       open.emplace_back(node->mChildren[i], world * to_double(node->mChildren[i]->mTransformation));
   }

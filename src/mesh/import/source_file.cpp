@@ -34,6 +34,27 @@ std::string lower_case(std::string text) {
   return text;
 }
 
+/// How files of a mesh format begin, and what they are named.
+struct MeshSignature {
+  std::string_view start, meaning, endings;
+};
+
+constexpr std::array kMeshes{
+    MeshSignature{"glTF"sv, "a binary glTF (.glb)", ".glb .gltf"},
+    MeshSignature{"solid "sv, "STL", ".stl"},
+    MeshSignature{"OFF\n"sv, "OFF", ".off"},
+    MeshSignature{"ply\n"sv, "PLY", ".ply"},
+    MeshSignature{"ply\r"sv, "PLY", ".ply"},
+    MeshSignature{"Kaydara FBX Binary"sv, "FBX", ".fbx"},
+    MeshSignature{"PK\x03\x04"sv, "a ZIP archive", ".3mf .zae .usdz .zip"},
+    MeshSignature{"#usda "sv, "USD, which is not supported", ".usd .usda"},
+    MeshSignature{"PXR-USDC"sv, "USD, which is not supported", ".usd .usdc"},
+    MeshSignature{"ISO-10303-21;"sv, "STEP, which is not supported", ".step .stp .ifc"},
+    MeshSignature{"\xff\xfe"sv, "text in UTF-16, not UTF-8", ""},
+    MeshSignature{"\xfe\xff"sv, "text in UTF-16, not UTF-8", ""},
+};
+constexpr std::string_view kOurEndings = ".obj .stl .ply .off .glb .gltf .dae .vdb";
+
 bool looks_like_web_page(std::string_view bytes) {
   const std::string start = lower_case(std::string(bytes.substr(0, 512)));
   const auto first = start.find_first_not_of(" \t\r\n\xef\xbb\xbf");
@@ -42,6 +63,11 @@ bool looks_like_web_page(std::string_view bytes) {
 }
 
 }  // namespace
+
+std::string_view without_byte_order_mark(const std::string_view text) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  return text.starts_with(kByteOrderMark) ? text.substr(kByteOrderMark.size()) : text;
+}
 
 SourceFile read_source_file(const std::string& path) {
   std::error_code error;
@@ -69,6 +95,17 @@ void refuse_other_content(const SourceFile& file) {
       fail(file, "is " + std::string(foreign.meaning));
   if (looks_like_web_page(bytes))
     fail(file, "is a web page, perhaps a saved error message: download the file again");
+}
+
+void refuse_other_format(const SourceFile& file) {
+  const std::string ending = ending_of(file.path);
+  if (kOurEndings.find(ending) == std::string_view::npos) return;
+  for (const MeshSignature& mesh : kMeshes)
+    if (std::string_view(file.bytes).starts_with(mesh.start) &&
+        mesh.endings.find(ending) == std::string_view::npos)
+      fail(file, "is named " + ending + " and holds " + std::string(mesh.meaning) +
+                     (mesh.endings.empty() ? ". Save it as UTF-8"
+                                           : ". Give it the ending of its format, or convert it"));
 }
 
 void fail(const SourceFile& file, const std::string& what) { throw Error(file.path + ": " + what); }

@@ -15,9 +15,16 @@ struct SourceFile {
 /// Throws Error if the file is missing, a folder, unreadable or empty.
 SourceFile read_source_file(const std::string& path);
 
+/// The text behind a UTF-8 byte order mark, or all of it.
+std::string_view without_byte_order_mark(std::string_view text);
+
 /// Throws Error if the bytes are plainly something else than a mesh: an image, an archive, a web
 /// page, a Git LFS pointer. Says which, and what to do.
 void refuse_other_content(const SourceFile& file);
+
+/// Throws Error if a file that is named as one of this library's formats begins as one of another,
+/// as a .glb that is named .obj.
+void refuse_other_format(const SourceFile& file);
 
 /// Throws Error "path: what".
 [[noreturn]] void fail(const SourceFile& file, const std::string& what);

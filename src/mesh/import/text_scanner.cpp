@@ -20,9 +20,11 @@ std::string_view without_plus(const std::string_view word) {
 TextScanner::TextScanner(const SourceFile& file, const char comment, const std::size_t start,
                          const std::size_t line)
     : file_(file), text_(file.bytes), position_(start), line_number_(line - 1), comment_(comment) {
-  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
-  if (start == 0 && text_.substr(0, kByteOrderMark.size()) == kByteOrderMark)
-    position_ = kByteOrderMark.size();
+  if (start == 0) position_ = text_.size() - without_byte_order_mark(text_).size();
+  // As the first line ends, all do: by a carriage return alone in old files.
+  const std::size_t end = text_.find_first_of("\r\n");
+  const std::size_t beyond = text_.find_first_not_of('\r', end);
+  if (end != beyond && (beyond == std::string_view::npos || text_[beyond] != '\n')) end_ = '\r';
 }
 
 bool TextScanner::next_line() {
@@ -30,7 +32,7 @@ bool TextScanner::next_line() {
     rest_ = {};
     return false;
   }
-  const std::size_t end = std::min(text_.find('\n', position_), text_.size());
+  const std::size_t end = std::min(text_.find(end_, position_), text_.size());
   rest_ = text_.substr(position_, end - position_);
   position_ = std::min(end + 1, text_.size());
   ++line_number_;

@@ -17,6 +17,7 @@ class TextScanner {
  public:
   /// Text from byte `start` of the file on, whose first line is number `line`. Everything from
   /// `comment` to the end of a line is skipped (0: no comments). A byte-order mark is skipped.
+  /// Lines end by LF, CR LF or CR.
   TextScanner(const SourceFile& file, char comment, std::size_t start = 0, std::size_t line = 1);
 
   bool next_line();                  ///< false at the end of the file
@@ -39,6 +40,7 @@ class TextScanner {
   std::size_t position_ = 0;  ///< start of the next line
   std::size_t line_number_ = 0;
   char comment_;
+  char end_ = '\n';  ///< of a line
 };
 
 /// Calls visit(word) for every word of a text, which blanks and ends of lines keep apart.

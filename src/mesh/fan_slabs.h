@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "mesh/edge_table.h"
+#include "stage/raw_array.h"
+
+namespace ist {
+
+using FloatPoint = std::array<float, 3>;
+
+/// What is known of the triangles under a node besides its box, where there are large fans: their
+/// triangles are long and thin, and their boxes meet nearly all others'.
+struct Slab {
+  std::uint32_t owner = kNoIndex;  ///< the vertex in whose spread fan all of them are
+  Eigen::Vector3d centre;          ///< of a box around them
+  Eigen::Matrix3d axes;            ///< its axes, in columns
+  Eigen::Vector3d half;            ///< and half its sizes
+
+  /// A plane along a side of either box has them on different sides.
+  bool apart_from(const Slab& other) const {
+    constexpr double kRounding = 1e-6;  // of coordinates within [0, 1], rounded to float, and more
+    const Eigen::Vector3d between = other.centre - centre;
+    const Eigen::Matrix3d turn = (axes.transpose() * other.axes).cwiseAbs();
+    const Eigen::Vector3d reach = half + turn * other.half;
+    const Eigen::Vector3d reach_of_other = other.half + turn.transpose() * half;
+    return (((axes.transpose() * between).cwiseAbs() - reach).array() > kRounding).any() ||
+           (((other.axes.transpose() * between).cwiseAbs() - reach_of_other).array() > kRounding)
+               .any();
+  }
+};
+
+/// [triangle] The corner with the largest spread fan (as spread_fans() has them), if that is large;
+/// nothing at all if none is.
+std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
+                                     const std::vector<std::uint32_t>& spread);
+
+/// A box around a group of triangles, one of whose axes is along their longest side, one along
+/// their normal. `points`: vertices, in [0, 1].
+Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners);
+
+}  // namespace ist
