@@ -88,6 +88,15 @@ SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere
 /// Measures how far spheres protrude from the solid of a closed mesh.
 SphereProtrusion sphere_protrusion(const ClosedMesh& mesh, std::span<const CoverSphere> spheres);
 
+/// Makes a cover contain every triangle of a surface too, such as one that a mesh was repaired
+/// from: spheres that nearly hold a part of it grow by a tenth of the largest protrusion at most,
+/// others are added, at most as many as there are or 8. Every part lies in one sphere by
+/// construction.
+///
+/// `surface`: in the cover's frame. protrusion.largest then bounds the distance from the solid and
+/// the surface; the mean, the 95th percentile and the volume stay those of the cover before.
+void extend_cover(const TriangleMesh& surface, SphereCover& cover);
+
 /// Every point within `radius` of a segment.
 struct CoverCapsule {
   Eigen::Vector3d begin = Eigen::Vector3d::Zero(), end = begin;  ///< [u] of the segment

@@ -80,6 +80,7 @@ void require_folder(const std::string& folder) {
 void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
   const auto start = std::chrono::steady_clock::now();
   const RobotModel robot = read_robot_for(options.robot, options.mesh);
+  warn_of_left_out(links_seen_only(robot, options.robot), options.mesh);
   Job like;
   like.settings = settings;
   const RobotAssets all = robot_assets(robot, options.robot.shapes(), "", like);
@@ -178,7 +179,7 @@ void add_bake(CLI::App& app) {
       "bake", "Pack a closed mesh with spheres and write an .ist asset, or many with --manifest");
   CLI::Option* const mesh =
       add_input(command, "MESH", options->mesh,
-                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf")
+                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf, .xml")
           ->required(false);
   add_output(command, options->output,
              "The .ist file to write. With --manifest: the folder for NAME.ist. For a robot: the "

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <ist/error.h>
 #include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
 
 #include <unistd.h>
 #include <algorithm>
@@ -51,8 +52,9 @@ std::string in_words(double time) {
 /// what failed above it; elsewhere a line an asset.
 class LibraryProgress final : public RunObserver {
  public:
-  LibraryProgress(std::size_t jobs, bool quiet)
-      : jobs_(jobs), quiet_(quiet), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
+  /// `lines`: a line of JSON an asset on stdout.
+  LibraryProgress(std::size_t jobs, bool quiet, bool lines)
+      : jobs_(jobs), quiet_(quiet), lines_(lines), line_(!quiet && isatty(STDERR_FILENO) == 1) {}
 
   void finished(const JobResult& result) override {
     ++done_;
@@ -60,6 +62,10 @@ class LibraryProgress final : public RunObserver {
     ends_.push_back(Clock::now());
     if (line_) fmt::print(stderr, "{}", kWipe);
     std::fflush(stderr);
+    if (lines_) {
+      fmt::print("{}\n", json_text(to_json(result), -1));
+      std::fflush(stdout);
+    }
     const std::string place = fmt::format("[{}/{}] {}", done_, jobs_, result.name);
     if (result.status == JobStatus::failed) {
       ++failed_;
@@ -103,7 +109,7 @@ class LibraryProgress final : public RunObserver {
   }
 
   const std::size_t jobs_;
-  const bool quiet_, line_;
+  const bool quiet_, lines_, line_;
   const Clock::time_point start_ = Clock::now();
   std::size_t done_ = 0, cached_ = 0, failed_ = 0;
   std::deque<Clock::time_point> ends_;  ///< of the last half minute
@@ -193,6 +199,17 @@ std::string cache_folder(const LibraryOptions& options) {
   return from_environment != nullptr ? from_environment : "";
 }
 
+/// What a run would bake.
+void print_jobs(const std::vector<Job>& jobs, bool json) {
+  if (json) {
+    auto assets = nlohmann::ordered_json::array();
+    for (const Job& job : jobs) assets.push_back({{"name", job.name}, {"mesh", job.mesh}});
+    return fmt::print("{}\n", json_text({{"assets", assets}}));
+  }
+  for (const Job& job : jobs) fmt::print("{}  {}\n", job.name, job.mesh);
+  fmt::print("{} assets; nothing was baked\n", jobs.size());
+}
+
 RunSettings settings_for(const LibraryRun& run) {
   RunSettings settings;
   settings.output = run.output;
@@ -246,6 +263,15 @@ void add_library_options(CLI::App* command, LibraryOptions& options) {
                  "With --manifest: remove assets from the folder that the manifest does not name, "
                  "or whose bake failed")
       ->needs(manifest);
+  command
+      ->add_flag("--list", options.list,
+                 "With --manifest: print the assets and their meshes, and bake nothing")
+      ->needs(manifest);
+  command
+      ->add_flag("--json-lines", options.lines,
+                 "With --manifest: print a line of JSON as each asset is done, then the summary as "
+                 "the last line")
+      ->needs(manifest);
   constexpr unsigned kMostJobs = 1024;
   add_whole(command, "--jobs", options.jobs,
             "With --manifest: number of assets baked at once; 0 = as many as threads. The result "
@@ -262,6 +288,13 @@ void run_library(const LibraryRun& run) {
   const auto start = std::chrono::steady_clock::now();
   if (run.quiet) spdlog::set_level(spdlog::level::err);
   const Manifest manifest = read_sound_manifest(run.library.manifest);
+  for (const std::string& warning : manifest.warnings) spdlog::warn("{}", warning);
+  Shard shard;
+  if (!run.library.shard.empty()) shard = *parse_shard(run.library.shard);
+  std::vector<Job> jobs;
+  for (const Job& job : manifest.jobs)
+    if (shard.holds(job.name)) jobs.push_back(job);
+  if (run.library.list) return print_jobs(jobs, run.json);
   RunSettings settings = settings_for(run);
   const std::string cache = cache_folder(run.library);
   const std::uint64_t cache_size = run.library.cache_size.value_or(0);
@@ -277,13 +310,10 @@ void run_library(const LibraryRun& run) {
   Summary summary;
   summary.manifest = run.library.manifest;
   summary.library_hash = hash_of_library(manifest.jobs);
-  if (!run.library.shard.empty()) summary.shard = *parse_shard(run.library.shard);
-  std::vector<Job> jobs;
-  for (const Job& job : manifest.jobs)
-    if (summary.shard.holds(job.name)) jobs.push_back(job);
+  summary.shard = shard;
 
   const InterruptGuard guard;
-  LibraryProgress progress(jobs.size(), run.quiet);
+  LibraryProgress progress(jobs.size(), run.quiet, run.library.lines);
   RunOutcome outcome = run_jobs(jobs, settings, progress);
   progress.end();
   if (settings.cache && cache_size != 0 && !outcome.stopped) prune_cache(cache, cache_size);
@@ -293,7 +323,10 @@ void run_library(const LibraryRun& run) {
         settle_stale(stale_assets(run.output, manifest, summary.results), run.library.remove_stale);
   for (const RobotAssets& robot : manifest.robots) write_index(robot, run.output, summary.results);
   summary.seconds = seconds_since(start);
-  print_summary(summary, run.json, run.quiet);
+  if (run.library.lines)
+    fmt::print("{}\n", json_text(to_json(summary), -1));
+  else
+    print_summary(summary, run.json, run.quiet);
   if (outcome.abandoned) {
     std::fflush(stdout);
     _exit(kExitInterrupted);

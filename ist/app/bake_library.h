@@ -17,7 +17,7 @@ struct LibraryOptions {
   std::string manifest, cache, shard;
   unsigned jobs = 0;
   std::optional<std::uint64_t> memory, cache_size;
-  bool remove_stale = false;
+  bool remove_stale = false, list = false, lines = false;
 };
 
 /// Adds --manifest and the options that need it.
@@ -39,6 +39,7 @@ void run_library(const LibraryRun& run);
 std::vector<std::string> warnings_of(const TreeView& tree);
 
 /// On stdout, as JSON or as a table for a person; nothing where a person wants quiet.
-void print_summary(const Summary& summary, bool json, bool quiet);
+/// `failed`: only assets that are not done are listed; all are counted.
+void print_summary(const Summary& summary, bool json, bool quiet, bool failed = false);
 
 }  // namespace ist::app

@@ -18,14 +18,41 @@ std::string without_numbers(std::string text) {
   return text;
 }
 
+/// close_as_asked(); a mesh that repair closed is wrapped too, if that is asked for, and the
+/// better of both is taken.
+ClosedMesh close_better(TriangleMesh mesh, const std::string& name, const MeshSettings& settings) {
+  if (!settings.repair || settings.wrap == 0)
+    return close_as_asked(std::move(mesh), name, settings);
+  ClosedMesh repaired = close_as_asked(mesh, name, settings);
+  if (!repaired.report.judged || repaired.report.wrapped) return repaired;
+  ClosedMesh wrapped = wrap_mesh(std::move(mesh), name, settings.wrap);
+  const double by_repair = repaired.report.judged->confidence,
+               by_wrap = wrapped.report.judged->confidence;
+  if (by_repair >= by_wrap) return repaired;
+  wrapped.report.notes.insert(
+      wrapped.report.notes.begin(),
+      fmt::format("wrapped with confidence {:.2f}; repair had {:.2f}", by_wrap, by_repair));
+  return wrapped;
+}
+
 }  // namespace
 
 std::optional<ClosedMesh> LinkMeshes::close(const std::vector<std::string>& links,
-                                            const std::function<TriangleMesh()>& make) {
+                                            const std::function<TriangleMesh()>& make,
+                                            const Otherwise& otherwise) {
   for (const std::string& name : links) {
     try {
-      ClosedMesh closed =
-          close_as_asked(make(), fmt::format("{}: link {}", robot_, name), settings_);
+      const std::string whose = fmt::format("{}: link {}", robot_, name);
+      TriangleMesh mesh = make();
+      ClosedMesh closed = [&] {
+        try {
+          return close_better(std::move(mesh), whose, settings_);
+        } catch (const OpenMeshError& error) {
+          if (otherwise)
+            if (auto other = otherwise(error.what())) return std::move(*other);
+          throw;
+        }
+      }();
       for (const std::string& link : links)
         for (const std::string& note : closed.report.notes) warn(link, note);
       return closed;
@@ -57,6 +84,12 @@ void LinkMeshes::finish() const {
   for (const std::string& fault : faults_) spdlog::error("{}", fault);
   throw Error(fmt::format("{}: {} links failed; nothing was written. --skip LINK leaves one out",
                           robot_, faults_.size()));
+}
+
+void warn_of_left_out(const std::vector<std::string>& links, const std::string& robot) {
+  if (!links.empty())
+    spdlog::warn("{}: left out, because they have visual shapes alone: {}; --visual uses these",
+                 robot, fmt::join(links, ", "));
 }
 
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings) {

@@ -21,10 +21,15 @@ class LinkMeshes {
   LinkMeshes(std::string robot, MeshSettings settings)
       : robot_(std::move(robot)), settings_(settings) {}
 
-  /// The mesh of these links that `make` returns, closed; nothing where that or closing it throws
-  /// Error, which is a fault of each link.
+  /// What stands for a mesh that cannot be closed, and why it cannot; nothing: that is a fault.
+  using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
+
+  /// The mesh of these links that `make` returns, closed; by repair or by a wrap, whichever has the
+  /// higher confidence, if both are asked for. Nothing where that or closing it throws Error, which
+  /// is a fault of each link.
   std::optional<ClosedMesh> close(const std::vector<std::string>& links,
-                                  const std::function<TriangleMesh()>& make);
+                                  const std::function<TriangleMesh()>& make,
+                                  const Otherwise& otherwise = {});
 
   /// Throws Error if any link failed.
   void finish() const;
@@ -43,6 +48,9 @@ class LinkMeshes {
   std::vector<std::string> faults_;
   std::map<std::string, Warning> warnings_;
 };
+
+/// Says which links of a robot are left out, because they have visual shapes alone.
+void warn_of_left_out(const std::vector<std::string>& links, const std::string& robot);
 
 /// read_input_mesh(); notes about the mesh go to stderr as warnings. Throws Error.
 InputMesh read_mesh_aloud(const std::string& path, const MeshSettings& settings);

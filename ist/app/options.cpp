@@ -81,7 +81,7 @@ void refuse_idle_options(const RobotOptions& options, const std::string& input) 
   throw CLI::ValidationError(options.visual             ? "--visual"
                              : options.packages.empty() ? "--skip"
                                                         : "--package",
-                             "has no effect: '" + input + "' is not a robot (.urdf)");
+                             "has no effect: '" + input + "' is not a robot (.urdf, .xml)");
 }
 
 bool is_robot_file(const std::string& path) {
@@ -89,7 +89,7 @@ bool is_robot_file(const std::string& path) {
   if (ending == ".xacro")
     throw Error(path + ": is a macro file, not a URDF; expand it: xacro " + path +
                 " -o robot.urdf");
-  return ending == ".urdf";
+  return ending == ".urdf" || ending == ".xml" || ending == ".mjcf";
 }
 
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,

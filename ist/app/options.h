@@ -40,7 +40,8 @@ void add_robot_options(CLI::App* command, RobotOptions& options);
 /// Throws (exit code 2) where options of a robot are given with what is none.
 void refuse_idle_options(const RobotOptions& options, const std::string& input);
 
-/// It ends in .urdf. Throws Error for .xacro, which is to be expanded.
+/// It ends in .urdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which is to
+/// be expanded.
 bool is_robot_file(const std::string& path);
 
 /// An argument or option that names a file to read, required unless the caller says otherwise; ""

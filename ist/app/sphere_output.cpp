@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include <ist/error.h>
 
 #include "app/glb_scene.h"
+#include "app/mesh_notes.h"
 #include "app/options.h"
 #include "library/text.h"
 #include "robot/kinematics.h"
@@ -24,7 +27,17 @@ const std::vector<CoverSphere>& spheres_of(const SphereLink& link) {
   return link.capsules.empty() ? link.cover.spheres : link.given;
 }
 
-Json link_json(const SphereLink& link, const SelfCollision& self) {
+/// How a link that was not closed was closed; method "capsule": it could not be.
+Json link_closing_json(const SphereLink& link) {
+  Json json = closing_json(link.closing);
+  if (link.bounding_capsule) json["method"] = "capsule";
+  return json;
+}
+
+/// Numbers that are not known become null.
+Json number_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+
+Json link_json(const SphereLink& link) {
   const SphereProtrusion& p = link.cover.protrusion;
   Json spheres = Json::array(), capsules = Json::array();
   for (const CoverSphere& s : spheres_of(link))
@@ -33,24 +46,59 @@ Json link_json(const SphereLink& link, const SelfCollision& self) {
     capsules.push_back({a.x(), a.y(), a.z(), b.x(), b.y(), b.z(), radius});
   return {{"spheres", spheres},
           {"capsules", capsules},
-          {"protrusion", p.largest},
-          {"protrusion_mean", p.mean},
-          {"protrusion_p95", p.p95},
-          {"volume_ratio", link.has_mesh ? Json(p.volume_ratio) : nullptr},
+          {"protrusion", number_or_null(p.largest)},
+          {"protrusion_mean", number_or_null(p.mean)},
+          {"protrusion_p95", number_or_null(p.p95)},
+          {"volume_ratio", link.has_mesh ? number_or_null(p.volume_ratio) : nullptr},
           {"covered", link.proof.covered},
-          {"self_collision_buffer", self.buffer(link.name)}};
+          {"covered_by", !link.proof.covered     ? Json()
+                         : link.capsules.empty() ? Json("spheres")
+                         : link.given.empty()    ? Json("capsules")
+                                                 : Json("capsules and spheres")},
+          {"closing", link_closing_json(link)},
+          {"self_collision_buffer", 0.0}};
 }
 
 Json robot_json(const SphereRobot& robot) {
   Json links = Json::object();
-  for (const SphereLink& link : robot.links) links[link.name] = link_json(link, robot.self);
-  Json ignored = Json::array();
-  for (const IgnoredPair& pair : robot.self.ignored)
-    ignored.push_back({{"links", {pair.a, pair.b}}, {"reason", pair.reason}});
+  for (const SphereLink& link : robot.links) links[link.name] = link_json(link);
+  const SelfCollision& self = robot.self;
+  Json ignored = Json::array(), wrong = Json::array();
+  for (const LinkPair& pair : self.pairs) {
+    if (!pair.ignored.empty())
+      ignored.push_back(
+          {{"links", {pair.a, pair.b}}, {"reason", pair.ignored}, {"tried", pair.tried}});
+    if (pair.missed + pair.falsely > 0)
+      wrong.push_back({{"links", {pair.a, pair.b}},
+                       {"colliding", pair.colliding},
+                       {"missed", pair.missed},
+                       {"false", pair.falsely}});
+  }
+  Json positions = Json::object(), overlapping = Json::array(), locked = Json::array();
+  for (const auto& [joint, position] : self.locked)
+    locked.push_back(robot.robot.joints[joint].name);
+  for (std::size_t j = 0; j < self.pose.positions.size(); ++j)
+    if (robot.robot.joints[j].is_free())
+      positions[robot.robot.joints[j].name] = self.pose.positions[j];
+  for (const auto& [a, b] : self.pose.overlapping) overlapping.push_back({a, b});
   return {{"robot", robot.name},
           {"links", links},
+          {"left_out", robot.left_out},
+          {"default_pose",
+           {{"positions", positions},
+            {"from", self.pose.from},
+            {"links_free", self.pose.solids_free},
+            {"spheres_free", self.pose.overlapping.empty()},
+            {"overlapping", overlapping},
+            {"locked", locked}}},
           {"self_collision",
-           {{"pairs", robot.self.pairs}, {"ignored", ignored}, {"samples", robot.self.samples}}}};
+           {{"pairs", self.pairs.size()},
+            {"ignored", ignored},
+            {"samples", self.samples},
+            {"colliding", self.colliding},
+            {"missed", self.missed},
+            {"false", self.falsely},
+            {"wrong", wrong}}}};
 }
 
 /// Links and spheres, each a node, in the default pose. glTF's Y is up, a robot's Z.
@@ -58,7 +106,7 @@ std::string robot_glb(const SphereRobot& robot) {
   const double half = std::numbers::sqrt2 / 2;
   GlbScene scene(GlbScene::Json{{"name", robot.name}, {"rotation", {-half, 0, 0, half}}});
   const std::size_t ball = scene.add_ball("spheres", {0.90, 0.45, 0.15, 0.35});
-  const auto frames = link_frames(robot.robot, default_positions(robot.robot));
+  const auto frames = link_frames(robot.robot, robot.self.pose.positions);
   std::size_t mesh = 0;
   for (const SphereLink& link : robot.links) {
     const auto at = std::find_if(robot.robot.links.begin(), robot.robot.links.end(),
@@ -85,8 +133,47 @@ std::string robot_glb(const SphereRobot& robot) {
 
 std::string robot_yaml(const SphereRobot& robot) {
   if (!robot.is_robot()) return curobo_spheres(robot.spheres());
-  return curobo_robot(robot.robot, std::filesystem::absolute(robot.input).string(), robot.spheres(),
-                      robot.self);
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::absolute(robot.output).lexically_normal().parent_path();
+  const fs::path urdf = fs::absolute(robot.input).lexically_normal().lexically_relative(folder);
+  return curobo_robot(robot.robot, urdf.generic_string(), robot.spheres(), robot.self);
+}
+
+/// What planners are told of pairs of links, and how right they will be.
+std::string self_collision_text(const SphereRobot& robot) {
+  const SelfCollision& self = robot.self;
+  std::map<std::string, std::size_t> ignored;
+  std::vector<const LinkPair*> wrong;
+  for (const LinkPair& pair : self.pairs) {
+    if (!pair.ignored.empty()) ++ignored[pair.ignored];
+    if (pair.missed + pair.falsely > 0) wrong.push_back(&pair);
+  }
+  std::string reasons;
+  for (const auto& [reason, count] : ignored)
+    reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, reason);
+  std::string out = fmt::format("  self-collision: {} pairs of links, ignored: {}\n",
+                                self.pairs.size(), reasons.empty() ? "none" : reasons);
+  out += fmt::format(
+      "    in {} sampled poses: of {} truly colliding {} are called free, of {} free ones {} "
+      "({:.1f} %) are called colliding\n",
+      self.samples, self.colliding, self.missed, self.samples - self.colliding, self.falsely,
+      100 * self.false_share());
+  std::sort(wrong.begin(), wrong.end(), [](const LinkPair* a, const LinkPair* b) {
+    return std::pair(a->missed, a->falsely) > std::pair(b->missed, b->falsely);
+  });
+  constexpr std::size_t kShown = 4;
+  for (std::size_t i = 0; i < std::min(kShown, wrong.size()); ++i)
+    out += fmt::format("    {} and {}: collide in {}, missed in {}, falsely in {}\n", wrong[i]->a,
+                       wrong[i]->b, wrong[i]->colliding, wrong[i]->missed, wrong[i]->falsely);
+  std::string locked;
+  for (const auto& [joint, position] : self.locked)
+    locked += fmt::format("{}{} at {:g}", locked.empty() ? "; gripper locked: " : ", ",
+                          robot.robot.joints[joint].name, position);
+  return out + fmt::format("  default pose: {}, {}{}\n", self.pose.from,
+                           self.pose.overlapping.empty() ? "free"
+                           : self.pose.solids_free ? "where spheres of different links overlap"
+                                                   : "where links overlap",
+                           locked);
 }
 
 }  // namespace
@@ -110,8 +197,10 @@ SphereWriter sphere_writer(const std::string& output) {
     return [](const SphereRobot& r) { return srdf(r.robot, r.spheres(), r.self); };
   if (ending == ".urdf")
     return [](const SphereRobot& r) {
-      return r.is_robot() ? urdf_with_spheres(r.robot, r.spheres())
-                          : urdf_of_spheres(r.spheres()[0]);
+      return r.is_robot()
+                 ? urdf_with_spheres(r.robot, r.spheres(),
+                                     std::filesystem::absolute(r.output).parent_path().string())
+                 : urdf_of_spheres(r.spheres()[0]);
     };
   throw Error(output + ": unknown format '" + ending +
               "'; use .urdf, .yml, .xrdf, .srdf, .glb or .json");
@@ -153,11 +242,20 @@ std::string spheres_table(const SphereRobot& robot, const std::string& output, d
   if (robot.links.size() > 1)
     out += fmt::format("  {:<{}} {:>7} {:>8} {:>10} {:>10} {:>10.4g}\n", "total", width, count, "",
                        "", "", largest);
-  if (robot.self.pairs > 0)
-    out += fmt::format(
-        "  self-collision: {} of {} pairs of links are ignored, {} links have a "
-        "buffer\n",
-        robot.self.ignored.size(), robot.self.pairs, robot.self.buffers.size());
+  for (const SphereLink& link : robot.links)
+    if (!link.capsules.empty() && !link.given.empty())
+      out += fmt::format("  {}: its capsules and its {} spheres cover it together\n", link.name,
+                         link.given.size());
+  for (const SphereLink& link : robot.links) {
+    const std::string how =
+        link.bounding_capsule ? "a bounding capsule stands for it" : describe_closing(link.closing);
+    if (how.empty()) continue;
+    out += fmt::format("  {} was not closed: {}", link.name, how);
+    if (link.closing.judged)
+      out += fmt::format("; it deviates by up to {:.4g}", link.closing.judged->input_max);
+    out += "; the proof includes the mesh as read\n";
+  }
+  if (!robot.self.pairs.empty()) out += self_collision_text(robot);
   return out + fmt::format("  time {:.2f} s\n", seconds);
 }
 

@@ -15,7 +15,10 @@ struct SphereLink {
   std::string name;
   std::vector<CoverSphere> given;  ///< spheres of the description itself
   bool has_mesh = false;
-  double slack = 0;  ///< [u] by which the mesh may be wider than the shapes
+  double slack = 0;               ///< [u] by which the mesh may be wider than the shapes
+  TriangleMesh read = {};         ///< as read, if it was not closed; the cover contains it too
+  MeshReport closing = {};        ///< how it was closed, if it was not
+  bool bounding_capsule = false;  ///< that stands for a mesh that could not be closed
   SphereCover cover;
   std::vector<CoverCapsule> capsules = {};  ///< if any, `cover` has spheres that contain them
   SphereCoverProof proof;
@@ -23,11 +26,12 @@ struct SphereLink {
 
 /// What `ist spheres` reads and makes.
 struct SphereRobot {
-  std::string name, input;         ///< of the robot or the mesh; path
-  std::vector<SphereLink> links;   ///< those with shapes
-  std::vector<ClosedMesh> meshes;  ///< of the links that have one, in their order
-  RobotModel robot;                ///< of a mesh: one link; its file is empty
+  std::string name, input, output;  ///< of the robot or the mesh; paths
+  std::vector<SphereLink> links;    ///< those with shapes
+  std::vector<ClosedMesh> meshes;   ///< of the links that have one, in their order
+  RobotModel robot;                 ///< of a mesh: one link; its file is empty
   SelfCollision self;
+  std::vector<std::string> left_out;  ///< links with visual shapes alone
 
   bool has_capsules() const {
     return std::any_of(links.begin(), links.end(),

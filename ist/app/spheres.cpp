@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <memory>
+#include <tuple>
 
 #include <ist/bake.h>
 #include <ist/cover_spheres.h>
@@ -18,6 +20,10 @@
 #include "app/progress_line.h"
 #include "app/sphere_output.h"
 #include "library/exported_spheres.h"
+#include "library/link_solids.h"
+#include "library/settings/spelling.h"
+#include "mesh/import/text_scanner.h"
+#include "robot/group_states.h"
 #include "robot/link_mesh.h"
 
 namespace ist::app {
@@ -32,8 +38,15 @@ struct SpheresOptions {
   std::map<std::string, std::size_t> counts;  ///< of links by name
   Kind kind = Kind::cover;
   RobotOptions robot;
+  std::map<std::string, double> pose;  ///< positions of joints by name
+  std::string srdf;
   SettingOptions closing;
   bool json = false, quiet = false;
+
+  /// Whether the number of spheres was left open: then links get more where planners need them.
+  bool refined() const {
+    return kind == Kind::cover && count == 0 && cover.total == 0 && cover.max_protrusion == 0;
+  }
 };
 
 SphereRobot read_mesh_input(const SpheresOptions& options) {
@@ -49,7 +62,26 @@ SphereRobot read_mesh_input(const SpheresOptions& options) {
   out.robot.joint_of = {kNone};
   out.robot.order = {0};
   out.meshes.push_back(read_mesh_aloud(options.input, options.closing.settings.mesh).closed);
+  if (out.meshes[0].report.judged) {
+    out.links[0].closing = out.meshes[0].report;
+    out.links[0].read = load_mesh(options.input);
+  }
   return out;
+}
+
+/// Says so where a link is so large beside the robot that its unit is probably another.
+void warn_of_size(const RobotModel& robot, const std::string& link, const TriangleMesh& mesh) {
+  constexpr double kLarge = 10, kBeside = 50;
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Vector3d& v : mesh.vertices) box.extend(v);
+  double apart = 0;
+  for (const RobotJoint& joint : robot.joints)
+    apart = std::max(apart, joint.origin.translation().norm());
+  if (box.isEmpty() || !(box.diagonal().norm() > std::max(kLarge, kBeside * apart))) return;
+  spdlog::warn(
+      "{}: link {} is {:.4g} m large, its joints at most {:.4g} m apart: if its mesh is in "
+      "millimetres, write scale=\"0.001 0.001 0.001\" in the URDF",
+      robot.file.path, link, box.diagonal().norm(), apart);
 }
 
 SphereRobot read_robot_input(const SpheresOptions& options) {
@@ -60,6 +92,8 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   for (const auto& [name, count] : options.counts) require_link(out.robot, name);
   const PackagePaths paths = package_paths(options.input, options.robot);
   LinkMeshes meshes(options.input, options.closing.settings.mesh);
+  out.left_out = links_seen_only(out.robot, options.robot);
+  warn_of_left_out(out.left_out, options.input);
   for (const RobotLink& link : out.robot.links) {
     const auto& shapes = link.shapes(options.robot.shapes());
     if (shapes.empty()) continue;
@@ -72,12 +106,29 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
       LinkGeometry all = geometry_of(shapes, paths, options.input);
       one.given = std::move(all.spheres);
       one.slack = all.slack;
+      one.read = all.mesh;
+      warn_of_size(out.robot, link.name, all.mesh);
       return std::move(all.mesh);
     };
-    if (!one.has_mesh)
+    if (!one.has_mesh) {
       geometry();
-    else if (std::optional<ClosedMesh> closed = meshes.close({link.name}, geometry))
+      continue;
+    }
+    // What cannot be closed is enclosed, if that is asked for.
+    const auto otherwise = [&](const std::string& why) -> std::optional<ClosedMesh> {
+      if (!options.closing.settings.mesh.repair) return std::nullopt;
+      spdlog::warn("{}; a bounding capsule stands for link {}", why, link.name);
+      one.bounding_capsule = true;
+      const ClosedMesh open = {one.read, {}, link.name, {}};
+      return close_mesh(capsule_mesh(cover_with_capsules(open).front()).mesh, link.name);
+    };
+    if (std::optional<ClosedMesh> closed = meshes.close({link.name}, geometry, otherwise)) {
+      if (closed->report.judged)
+        one.closing = closed->report;
+      else if (!one.bounding_capsule)
+        one.read = {};
       out.meshes.push_back(std::move(*closed));
+    }
   }
   meshes.finish();
   return out;
@@ -107,8 +158,7 @@ std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, std::size_t count
 SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOptions& options) {
   constexpr std::size_t kOfALink = 8;
   SphereCoverSettings cover = options.cover;
-  const bool shared = cover.total > 0 || (options.kind == Kind::cover && options.count == 0 &&
-                                          cover.max_protrusion == 0 && input.is_robot());
+  const bool shared = cover.total > 0 || (options.refined() && input.is_robot());
   if (options.count > 0) cover.count = options.count;
   if (cover.max_protrusion > 0 && options.count == 0) cover.count = 1024;
   for (const SphereLink& link : input.links) {
@@ -146,20 +196,178 @@ std::vector<SphereCover> make_spheres(const SphereRobot& input, const SpheresOpt
   const SphereCoverSettings settings = cover_settings(input, options);
   if (options.kind == Kind::cover) return cover_with_spheres(input.meshes, settings, progress);
   std::vector<SphereCover> covers;
-  for (const ClosedMesh& mesh : input.meshes) {
+  for (const SphereLink& link : input.links) {
+    if (!link.has_mesh) continue;
+    const ClosedMesh& mesh = input.meshes[covers.size()];
     const auto start = std::chrono::steady_clock::now();
     const std::size_t own = settings.counts[covers.size()];
     SphereCover cover;
-    if (options.kind == Kind::capsules)
+    if (options.kind == Kind::capsules) {
+      ClosedMesh all = mesh;
+      append_mesh(all.mesh, link.read);
       cover.spheres = spheres_around(capsules.emplace_back(cover_with_capsules(
-          mesh, own > 0 ? own : std::max<std::size_t>(options.count, 1), settings.threads)));
-    else
+          all, own > 0 ? own : std::max<std::size_t>(options.count, 1), settings.threads)));
+    } else
       cover.spheres = baked_spheres(mesh, own > 0 ? own : settings.count, options, progress);
     cover.protrusion = sphere_protrusion(mesh, cover.spheres);
     cover.seconds = seconds_since(start);
     covers.push_back(std::move(cover));
   }
   return covers;
+}
+
+/// The joint of that name, which must be one whose position is free and allow this one.
+std::size_t joint_at(const RobotModel& robot, const std::string& name, double position) {
+  std::vector<std::string> names;
+  for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+    const RobotJoint& joint = robot.joints[j];
+    if (!joint.is_free()) continue;
+    names.push_back(joint.name);
+    if (joint.name != name) continue;
+    if (position >= joint.lower && position <= joint.upper) return j;
+    throw Error(fmt::format("{}: --pose {}={:g}: the joint's limits are {:g} to {:g}",
+                            robot.file.path, name, position, joint.lower, joint.upper));
+  }
+  const std::string nearest = nearest_word(name, names);
+  throw Error(fmt::format("{}: --pose: no joint that moves freely is called '{}'{}",
+                          robot.file.path, name,
+                          nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+}
+
+WantedPose wanted_pose(const RobotModel& robot, const SpheresOptions& options) {
+  WantedPose wanted;
+  for (const auto& [name, position] : options.pose)
+    wanted.positions[joint_at(robot, name, position)] = position;
+  if (!options.srdf.empty()) wanted.states = group_states(robot, options.srdf);
+  return wanted;
+}
+
+std::vector<CoverSphere> with_given(const SphereLink& link, std::vector<CoverSphere> spheres) {
+  spheres.insert(spheres.begin(), link.given.begin(), link.given.end());
+  return spheres;
+}
+
+/// What the mesh that was covered lacks of the one that was read.
+void cover_what_was_read(SphereLink& link) {
+  extend_cover(link.read, link.cover);
+  if (!link.bounding_capsule) return;
+  SphereProtrusion& p = link.cover.protrusion;  // known of the capsule alone
+  p.largest = p.mean = p.p95 = p.volume_ratio = std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Covers the links again whose spheres call most free poses colliding, with more spheres, until
+/// few are.
+void refine(SphereRobot& input, const SpheresOptions& options, SelfCollisionStudy& study,
+            const ProgressCallback& progress) {
+  constexpr double kEnough = 0.1, kWorse = 0.5, kMore = 1.6;
+  constexpr std::size_t kMostOfALink = 32;  // on average
+  constexpr int kRounds = 8;
+  const auto links_of = [&] {
+    std::vector<LinkSpheres> links = input.spheres();
+    for (std::size_t i = 0; i < links.size(); ++i) links[i].spheres = input.links[i].cover.spheres;
+    return links;
+  };
+  input.self = study.of(links_of(), options.kind == Kind::cover || options.kind == Kind::capsules);
+  if (!options.refined()) return;
+  std::size_t count = 0;
+  std::map<std::string, std::size_t> counts;
+  for (const SphereLink& link : input.links)
+    count += counts[link.name] = link.cover.spheres.size() - link.given.size();
+  const std::size_t most = std::max(count, kMostOfALink * input.links.size());
+  double least = input.self.false_share();
+  std::pair best(input.links, input.self);
+  for (int round = 0; round < kRounds && input.self.false_share() > kEnough; ++round) {
+    // Of two links the one whose spheres protrude more is to blame more.
+    std::map<std::string, double> protrusions, faults;
+    for (const SphereLink& link : input.links)
+      protrusions[link.name] = link.has_mesh ? link.cover.protrusion.largest : 0;
+    double worst = 0;
+    for (const LinkPair& pair : input.self.pairs) {
+      const double both = protrusions[pair.a] + protrusions[pair.b];
+      for (const std::string& link : {pair.a, pair.b})
+        if (both > 0)
+          worst = std::max(
+              worst, faults[link] += static_cast<double>(pair.falsely) * protrusions[link] / both);
+    }
+    std::vector<ClosedMesh> meshes;
+    std::vector<SphereLink*> links;
+    SphereCoverSettings settings = options.cover;
+    std::size_t next = 0;
+    for (SphereLink& link : input.links) {
+      const ClosedMesh* const mesh = link.has_mesh ? &input.meshes[next++] : nullptr;
+      if (mesh == nullptr || options.counts.contains(link.name) || link.bounding_capsule ||
+          !(faults[link.name] > kWorse * worst))
+        continue;
+      const std::size_t own = counts[link.name];
+      const auto more = static_cast<std::size_t>(std::ceil(kMore * static_cast<double>(own)));
+      settings.counts.push_back(std::min(more, kMostCoverSpheres));
+      counts[link.name] = settings.counts.back();
+      count += settings.counts.back() - own;
+      meshes.push_back(*mesh);
+      links.push_back(&link);
+    }
+    if (links.empty() || count > most) break;
+    std::vector<SphereCover> covers = cover_with_spheres(meshes, settings, progress);
+    for (std::size_t i = 0; i < links.size(); ++i) {
+      covers[i].seconds += links[i]->cover.seconds;
+      covers[i].protrusion.largest += links[i]->slack;
+      links[i]->proof = prove_cover(meshes[i], covers[i].spheres);
+      covers[i].spheres = with_given(*links[i], std::move(covers[i].spheres));
+      links[i]->cover = std::move(covers[i]);
+      cover_what_was_read(*links[i]);
+    }
+    input.self = study.of(links_of(), true);
+    if (input.self.false_share() < least) {
+      least = input.self.false_share();
+      best = {input.links, input.self};
+    }
+  }
+  if (input.self.false_share() > least) std::tie(input.links, input.self) = std::move(best);
+}
+
+void compare_links(SphereRobot& input, const SpheresOptions& options,
+                   const ProgressCallback& progress) {
+  LinkSolids solids;
+  std::vector<std::string> names;
+  std::size_t next = 0;
+  for (const SphereLink& link : input.links) {
+    names.push_back(link.name);
+    const std::string why = solids.add(link.has_mesh ? &input.meshes[next++] : nullptr, link.given);
+    if (!why.empty())
+      spdlog::warn(
+          "{}: link {}: collisions with other links are judged by its spheres, because "
+          "its mesh bounds no exact solid: {}",
+          options.input, link.name, why);
+  }
+  SelfCollisionStudy study(
+      input.robot, names,
+      [&](std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) {
+        return solids.overlap(a, b, b_in_a);
+      },
+      wanted_pose(input.robot, options));
+  refine(input, options, study, progress);
+  if (constexpr double kMany = 0.1; input.self.false_share() > kMany)
+    spdlog::warn(
+        "{}: the spheres call {:.0f} % of the free poses colliding: they are too coarse for "
+        "the gaps between some links (the report names the pairs); use more spheres "
+        "(--total, --count LINK=N)",
+        options.input, 100 * input.self.false_share());
+  const DefaultPose& pose = input.self.pose;
+  if (pose.overlapping.empty()) return;
+  std::string pairs;
+  for (const auto& [a, b] : pose.overlapping)
+    pairs += fmt::format("{}{} and {}", pairs.empty() ? "" : ", ", a, b);
+  if (pose.solids_free)
+    spdlog::warn(
+        "{}: no default pose was found in which no spheres of different links overlap, "
+        "though the links do not: {}; use more spheres (--total), or give a pose "
+        "(--pose JOINT=POSITION)",
+        options.input, pairs);
+  else
+    spdlog::warn(
+        "{}: no default pose was found in which no links overlap: {}; give one (--pose "
+        "JOINT=POSITION, --srdf FILE)",
+        options.input, pairs);
 }
 
 void fill_links(SphereRobot& input, const SpheresOptions& options) {
@@ -184,7 +392,8 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
       link.cover.protrusion.largest += link.slack;
       ++next;
     }
-    link.cover.spheres.insert(link.cover.spheres.begin(), link.given.begin(), link.given.end());
+    link.cover.spheres = with_given(link, std::move(link.cover.spheres));
+    if (options.kind == Kind::cover) cover_what_was_read(link);
     if (options.kind == Kind::cover && !link.proof.covered)
       throw Error(
           fmt::format("{}: link {}: cannot prove that the spheres contain it near ({:g}, {:g}, "
@@ -197,10 +406,11 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
           link.name, link.cover.spheres.size(), link.cover.protrusion.largest,
           link.cover.spheres.size() < kMostCoverSpheres ? "increase --count" : "increase it"));
   }
-  if (!input.is_robot()) return;
-  std::vector<LinkSpheres> links = input.spheres();
-  for (std::size_t i = 0; i < links.size(); ++i) links[i].spheres = input.links[i].cover.spheres;
-  input.self = self_collision(input.robot, links);
+  if (input.is_robot())
+    interruptibly(kPatience, options.quiet, false, [&](const ProgressCallback& progress) {
+      compare_links(input, options, progress);
+      return 0;
+    });
 }
 
 void run_spheres(const SpheresOptions& options) {
@@ -213,6 +423,11 @@ void run_spheres(const SpheresOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   SphereRobot input =
       is_robot_file(options.input) ? read_robot_input(options) : read_mesh_input(options);
+  input.output = options.output;
+  if (const std::string ending = ending_of(options.output);
+      !input.robot.is_urdf && (ending == ".urdf" || ending == ".yml" || ending == ".yaml"))
+    throw Error(options.output + ": this format needs the robot as a URDF; " + options.input +
+                " can become .json, .xrdf, .srdf or .glb");
   fill_links(input, options);
   const std::string text = writer(input);
   {
@@ -243,7 +458,8 @@ void add_spheres(CLI::App& app) {
   const auto options = std::make_shared<SpheresOptions>();
   CLI::App* const command = app.add_subcommand(
       "spheres", "Write few spheres that provably contain each link of a robot, or a mesh");
-  add_input(command, "INPUT", options->input, "A robot (.urdf) or a mesh (OBJ, STL, PLY, …)");
+  add_input(command, "INPUT", options->input,
+            "A robot (.urdf, or .xml of MuJoCo) or a mesh (OBJ, STL, PLY, …)");
   add_output(command, options->output,
              "The file to write: .urdf (spheres as collisions), .yml (cuRobo), .xrdf, .srdf "
              "(MoveIt), .glb (links and spheres, for viewers) or .json",
@@ -293,6 +509,28 @@ void add_spheres(CLI::App& app) {
   matched->excludes(cover)->excludes(inner)->excludes(most)->excludes(total);
   most->excludes(total);
   add_robot_options(command, options->robot);
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--pose",
+          [options](const std::vector<std::string>& given) {
+            for (const std::string& one : given) {
+              const std::size_t equals = one.rfind('=');
+              const auto position =
+                  equals == std::string::npos ? std::nullopt : parse_real(one.substr(equals + 1));
+              if (equals == 0 || !position || !std::isfinite(*position))
+                throw CLI::ValidationError("--pose", fmt::format("'{}' is not JOINT=NUMBER", one));
+              options->pose[one.substr(0, equals)] = *position;
+            }
+          },
+          "Robots: position of a joint in the default pose [rad or u]. Repeatable. Default: 0 or "
+          "the middle of its limits, or searched, so that no links overlap")
+      ->type_name("JOINT=NUMBER")
+      ->expected(1)
+      ->take_all();
+  add_input(command, "--srdf", options->srdf,
+            "Robots: an SRDF, whose group_states are tried first as the default pose")
+      ->required(false)
+      ->type_name("FILE");
   add_whole(command, "--seed", options->cover.seed,
             "Random seed of the search; any value works equally well");
   add_whole(command, "--threads", options->cover.threads,
@@ -314,6 +552,10 @@ void add_spheres(CLI::App& app) {
       throw CLI::ValidationError(
           "--count", fmt::format("{} with --capsules; at most {}", most, kMostCoverCapsules));
     refuse_idle_options(options->robot, options->input);
+    if (!is_robot_file(options->input) && !(options->pose.empty() && options->srdf.empty()))
+      throw CLI::ValidationError(
+          options->pose.empty() ? "--srdf" : "--pose",
+          "has no effect: '" + options->input + "' is not a robot (.urdf, .xml)");
     run_spheres(*options);
   });
 }

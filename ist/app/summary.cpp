@@ -12,7 +12,9 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -44,13 +46,14 @@ std::string counts_in_words(const Summary& summary) {
                      grouped(summary.count(JobStatus::not_baked)), summary.seconds);
 }
 
-void print_table(const Summary& summary) {
+void print_table(const Summary& summary, bool failed) {
   std::size_t width = 4;
   for (const JobResult& result : summary.results) width = std::max(width, result.name.size());
   fmt::print("{:<{}}  {:<9} {:>8} {:>10} {:>8} {:>7}  {}\n", "name", width, "status", "seconds",
              "spheres", "covered", "error", "remarks");
   for (const JobResult& result : summary.results) {
     const bool done = result.done();
+    if (failed && done) continue;
     fmt::print("{:<{}}  {:<9} {:>8.2f} {:>10} {:>8} {:>7}  {}\n", result.name, width,
                name_of(result.status), result.seconds, done ? grouped(result.spheres) : "-",
                done ? fmt::format("{:.1f} %", 100 * result.coverage) : "-",
@@ -67,11 +70,11 @@ void print_table(const Summary& summary) {
 
 }  // namespace
 
-void print_summary(const Summary& summary, bool json, bool quiet) {
+void print_summary(const Summary& summary, bool json, bool quiet, bool failed) {
   if (json)
-    fmt::print("{}\n", json_text(to_json(summary)));
+    fmt::print("{}\n", json_text(to_json(summary, failed)));
   else if (!quiet)
-    print_table(summary);
+    print_table(summary, failed);
 }
 
 namespace {
@@ -175,47 +178,96 @@ std::string row(const JobResult& r) {
   return out + fmt::format("<td class=t>{}</tr>\n", remarks);
 }
 
-/// A page of a library for a browser, all in one file: a table with a picture of each asset that
-/// keeps its mesh and can be read, failures first.
-std::string summary_page(const Summary& summary) {
-  std::string out = fmt::format(
-      "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>{0}</title>\n<style>"
-      "body{{font:14px sans-serif;margin:2em}}table{{border-collapse:collapse}}"
-      "td,th{{padding:4px 10px;border-bottom:1px solid #ddd;text-align:right}}"
-      "td:nth-child(-n+3),.t{{text-align:left}}th{{position:sticky;top:0;background:#fff}}"
-      ".failed,.not_baked{{background:#fdd}}</style>\n<h1>{0}</h1>\n"
-      "<p>{1} assets: {2}\n",
-      escaped(summary.manifest), grouped(summary.results.size()), counts_in_words(summary));
-  out += "<table><tr><th><th class=t>name<th class=t>status";
-  for (const char* const head :
-       {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "surface error [u]", "mesh",
-        "error [%]", "confidence", "time [s]"})
-    out += fmt::format("<th>{}", head);
-  out += "<th class=t>remarks</tr>\n";
-  for (const bool done : {false, true})
-    for (const JobResult& result : summary.results)
-      if (result.done() == done) out += row(result);
-  return out + "</table></html>\n";
-}
-
 struct SummaryOptions {
   std::vector<std::string> files;
   std::string page;
   bool json = false, failed = false;
 };
 
+/// Sorts by a column at a click on its head, and hides rows without the text that is typed.
+constexpr const char* kScript = R"(<script>
+const body = document.querySelector('tbody'), rows = [...body.rows];
+document.querySelectorAll('th').forEach((head, i) => head.onclick = () => {
+  const key = row => row.cells[i].textContent, n = text => parseFloat(text.replace(/,/g, ''));
+  const down = head.dataset.down = head.dataset.down === '1' ? '0' : '1';
+  rows.sort((a, b) => {
+    const x = n(key(a)), y = n(key(b));
+    const by = isNaN(x) || isNaN(y) ? isNaN(x) - isNaN(y) || key(a).localeCompare(key(b)) : x - y;
+    return down === '1' ? by : -by;
+  });
+  body.append(...rows);
+});
+document.querySelector('input').oninput = event => rows.forEach(row => {
+  row.hidden = !row.textContent.toLowerCase().includes(event.target.value.toLowerCase());
+});
+</script>)";
+
+/// Of page `page` of `pages`, in a folder with the others.
+std::string links_of_pages(const std::vector<std::string>& files, std::size_t page) {
+  std::string out;
+  for (std::size_t i = 0; i < files.size() && files.size() > 1; ++i) {
+    const std::string name = escaped(std::filesystem::path(files[i]).filename().string());
+    out += i == page ? fmt::format("<b>{}</b> ", i + 1)
+                     : fmt::format("<a href=\"{}\">{}</a> ", name, i + 1);
+  }
+  return out.empty() ? "" : "<p>pages: " + out + "\n";
+}
+
+/// A page of a library for a browser, all in one file: a table of some assets with a picture of
+/// each that keeps its mesh and can be read.
+std::string summary_page(const Summary& summary, std::span<const JobResult* const> results,
+                         const std::string& pages) {
+  std::string out = fmt::format(
+      "<!DOCTYPE html>\n<html lang=en><meta charset=utf-8><title>{0}</title>\n<style>"
+      "body{{font:14px sans-serif;margin:2em}}table{{border-collapse:collapse}}"
+      "td,th{{padding:4px 10px;border-bottom:1px solid #ddd;text-align:right}}"
+      "td:nth-child(-n+3),.t{{text-align:left}}"
+      "th{{position:sticky;top:0;background:#fff;cursor:pointer}}"
+      ".failed,.not_baked{{background:#fdd}}</style>\n<h1>{0}</h1>\n"
+      "<p>{1} assets: {2}\n{3}<p><input placeholder=\"filter this page\">\n",
+      escaped(summary.manifest), grouped(summary.results.size()), counts_in_words(summary), pages);
+  out += "<table><thead><tr><th><th class=t>name<th class=t>status";
+  for (const char* const head :
+       {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "surface error [u]", "mesh",
+        "error [%]", "confidence", "time [s]"})
+    out += fmt::format("<th>{}", head);
+  out += "<th class=t>remarks</tr></thead><tbody>\n";
+  for (const JobResult* const result : results) out += row(*result);
+  return out + "</tbody></table>" + kScript + "</html>\n";
+}
+
+/// A page for some hundred assets, failures first: FILE.html, FILE-2.html and so on.
+void write_pages(const Summary& summary, const SummaryOptions& options) {
+  constexpr std::size_t kOfAPage = 500;
+  std::vector<const JobResult*> results;
+  for (const bool done : {false, true})
+    for (const JobResult& result : summary.results)
+      if (result.done() == done && !(options.failed && done)) results.push_back(&result);
+  const std::filesystem::path first = options.page;
+  std::vector<std::string> files = {options.page};
+  while (files.size() * kOfAPage < results.size())
+    files.push_back(
+        (first.parent_path() / fmt::format("{}-{}{}", first.stem().string(), files.size() + 1,
+                                           first.extension().string()))
+            .string());
+  if (is_standard_output(options.page)) files.resize(1);
+  const InterruptGuard guard;
+  for (std::size_t i = 0; i < files.size() && !interrupted(); ++i) {
+    const std::size_t begin = i * kOfAPage, end = files.size() == 1
+                                                      ? results.size()
+                                                      : std::min(results.size(), begin + kOfAPage);
+    write_text(files[i], summary_page(summary, std::span(results).subspan(begin, end - begin),
+                                      links_of_pages(files, i)));
+  }
+}
+
 void run_summary(const SummaryOptions& options) {
   std::vector<Summary> shards;
   for (const std::string& file : options.files) shards.push_back(read_summary(file));
   Summary whole = merge(std::move(shards));
-  if (options.failed)
-    std::erase_if(whole.results, [](const JobResult& result) { return result.done(); });
-  if (!options.page.empty()) {
-    const InterruptGuard guard;
-    write_text(options.page, summary_page(whole));
-  }
+  if (!options.page.empty()) write_pages(whole, options);
   exit_if_interrupted();
-  print_summary(whole, options.json, !options.page.empty() && !options.json);
+  print_summary(whole, options.json, !options.page.empty() && !options.json, options.failed);
   if (!whole.complete()) throw ExitCode{kExitError};
 }
 
@@ -230,7 +282,8 @@ void add_summary(CLI::App& app) {
   command->add_flag("--failed", options->failed, "Show only assets that failed or were not baked");
   command->add_flag("--json", options->json, "Print JSON");
   command->add_option("--html", options->page,
-                      "Write an HTML page instead, with a picture and the numbers of each asset");
+                      "Write an HTML page instead, with a picture and the numbers of each asset: "
+                      "FILE.html, then FILE-2.html and so on for each 500 more");
   command->footer(
       "Exits 1 if an asset failed, or if a shard is missing, given twice or of another library.\n"
       "Example: ist summary shard-1.json shard-2.json\n"

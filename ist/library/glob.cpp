@@ -5,6 +5,8 @@
 
 #include <ist/error.h>
 #include <algorithm>
+#include <functional>
+#include <iterator>
 #include <system_error>
 
 namespace ist {
@@ -90,6 +92,21 @@ bool is_pattern(const std::string& path) { return path.find_first_of("*?[") != s
 std::vector<fs::path> matching_files(const fs::path& folder, const fs::path& pattern) {
   if (pattern.relative_path().empty()) return {};
   return Search(pattern).run(pattern.is_absolute() ? pattern.root_path() : folder);
+}
+
+bool matches(const fs::path& path, const fs::path& pattern) {
+  const fs::path names = path.lexically_normal(), parts = pattern.lexically_normal();
+  const std::function<bool(fs::path::iterator, fs::path::iterator)> from =
+      [&](fs::path::iterator name, fs::path::iterator part) {
+        if (part == parts.end() || name == names.end())
+          return part == parts.end() && name == names.end();
+        if (*part == "**")
+          return from(std::next(name), part) || from(name, std::next(part)) ||
+                 (std::next(name) == names.end() && std::next(part) == parts.end());
+        return fnmatch(part->c_str(), name->c_str(), FNM_PERIOD) == 0 &&
+               from(std::next(name), std::next(part));
+      };
+  return from(names.begin(), parts.begin());
 }
 
 std::string name_for(const std::string& pattern, const fs::path& file, const fs::path& root) {

@@ -18,6 +18,10 @@ bool is_pattern(const std::string& path);
 std::vector<std::filesystem::path> matching_files(const std::filesystem::path& folder,
                                                   const std::filesystem::path& pattern);
 
+/// Whether a path is one that the pattern stands for, folder by folder, whatever the folders are:
+/// those that are links too. Both relative to one folder, or both absolute.
+bool matches(const std::filesystem::path& path, const std::filesystem::path& pattern);
+
 /// A name in which {stem}, {ext}, {parent} and {dir} stand for the parts of a file's path: its name
 /// without and with its extension alone, its folder's name, and the names of all folders from
 /// `root` to it, joined by '-'. Throws Error for any other {word}.

@@ -110,11 +110,16 @@ class Reader {
       return finish();
     }
     for (const auto& [key, value] : root) {
-      if (key.str() != "defaults" && key.str() != "asset" && key.str() != "robot")
-        fault(key.source().begin.line,
-              fmt::format("unknown '{}': a manifest has [defaults] and, for each asset or pattern, "
-                          "[[asset]], for each robot [[robot]]",
-                          key.str()));
+      static const std::vector<std::string> kTables = {"defaults", "asset", "robot"};
+      const std::string name(key.str());
+      if (std::count(kTables.begin(), kTables.end(), name) != 0) continue;
+      const std::string nearest = nearest_word(name, kTables);
+      fault(key.source().begin.line,
+            nearest.empty()
+                ? fmt::format("unknown '{}': a manifest has [defaults] and, for each asset or "
+                              "pattern, [[asset]], for each robot [[robot]]",
+                              name)
+                : fmt::format("unknown '{}': did you mean '{}'?", name, nearest));
     }
     read_defaults(root);
     if (!root.contains("asset") && !root.contains("robot"))
@@ -144,6 +149,10 @@ class Reader {
   }
 
   void fault(Line line, const std::string& what) { faults_.emplace(line, what); }
+
+  void warn(Line line, const std::string& what) {
+    manifest_.warnings.push_back(fmt::format("{}:{}: {}", path_, line, what));
+  }
 
   void read_defaults(const toml::table& root) {
     const toml::node* const node = root.get("defaults");
@@ -274,6 +283,10 @@ class Reader {
       const std::string path = (folder_ / *urdf).lexically_normal().string();
       const RobotModel robot = read_robot_for(options, path);
       const PackagePaths paths = package_paths(path, options);
+      if (const auto unseen = links_seen_only(robot, options); !unseen.empty())
+        warn(line, fmt::format("{}: left out, because they have visual shapes alone: {}; visual = "
+                               "true uses these",
+                               path, fmt::join(unseen, ", ")));
       RobotAssets made =
           robot_assets(robot, options.shapes(), file_name_of(robot.name) + "-", like);
       for (Job& job : made.jobs) {
@@ -332,15 +345,18 @@ class Reader {
     }
   }
 
-  /// Takes out the files that patterns match, of which each must match some.
+  /// Takes out the files that patterns match; one that matches none is a warning.
   void exclude(const toml::node& node, const std::string& mesh, std::vector<std::string>& files) {
     for (const std::string& pattern : texts_of("exclude", node)) {
-      std::size_t gone = 0;
-      for (const fs::path& found : matching_files(folder_, pattern))
-        gone += std::erase(files, found.string());
+      const bool absolute = fs::path(pattern).is_absolute();
+      const auto gone = std::erase_if(files, [&](const std::string& file) {
+        return matches(absolute ? fs::absolute(file)
+                                : fs::path(file).lexically_relative(folder_.lexically_normal()),
+                       pattern);
+      });
       if (gone == 0)
-        fault(node.source().begin.line,
-              fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern, mesh));
+        warn(node.source().begin.line,
+             fmt::format("exclude: '{}' excludes none of the files of '{}'", pattern, mesh));
     }
   }
 

@@ -10,9 +10,10 @@ namespace ist {
 
 /// A library of assets as a TOML file describes it (docs/library.md).
 struct Manifest {
-  std::vector<Job> jobs;            ///< by name, sorted; complete where there are no faults
-  std::vector<RobotAssets> robots;  ///< whose assets are among the jobs
-  std::vector<std::string> faults;  ///< "scene.toml:12: …": all that can be told without baking
+  std::vector<Job> jobs;              ///< by name, sorted; complete where there are no faults
+  std::vector<RobotAssets> robots;    ///< whose assets are among the jobs
+  std::vector<std::string> faults;    ///< "scene.toml:12: …": all that can be told without baking
+  std::vector<std::string> warnings;  ///< alike: what is probably not meant
 };
 
 /// Paths in it are relative to its folder. Throws Error where it cannot be read.

@@ -46,11 +46,21 @@ RobotModel read_robot_for(const RobotOptions& options, const std::string& input)
       link.visual.clear();
     }
     any = any || !link.shapes(options.shapes()).empty();
+    for (const PlacedShape& placed : link.shapes(options.shapes()))
+      if (const auto* fault = std::get_if<LinkFault>(&placed.shape)) throw Error(fault->what);
   }
   if (any) return robot;
   throw Error(input + (options.visual
                            ? ": no link has a visual shape"
                            : ": no link has a collision shape; --visual uses the visual shapes"));
+}
+
+std::vector<std::string> links_seen_only(const RobotModel& robot, const RobotOptions& options) {
+  std::vector<std::string> names;
+  for (const RobotLink& link : robot.links)
+    if (!options.visual && link.collision.empty() && !link.visual.empty())
+      names.push_back(link.name);
+  return names;
 }
 
 void require_link(const RobotModel& robot, const std::string& name) {

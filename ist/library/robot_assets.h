@@ -26,6 +26,9 @@ struct RobotOptions {
 /// shape of the kind that is asked for.
 RobotModel read_robot_for(const RobotOptions& options, const std::string& input);
 
+/// Links without a collision shape that have a visual one, if it is collision shapes that are used.
+std::vector<std::string> links_seen_only(const RobotModel& robot, const RobotOptions& options);
+
 /// Throws Error where no link of the robot has that name.
 void require_link(const RobotModel& robot, const std::string& name);
 

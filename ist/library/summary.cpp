@@ -61,16 +61,6 @@ Json json_of(const std::optional<T>& value) {
 }
 Json json_of(JobStatus status) { return name_of(status); }
 
-Json to_json(const JobResult& result) {
-  Json json;
-  for_each_field(result,
-                 [&](const char* key, const auto& value, bool if_done = false, bool = false) {
-                   json[key] = if_done && !result.done() ? Json() : json_of(value);
-                 });
-  if (result.message.empty()) json["message"] = nullptr;
-  return json;
-}
-
 template <class T>
 void take(const Json& from, const char* key, T& to) {
   if (!from.at(key).is_null()) to = from.at(key).get<T>();
@@ -97,6 +87,16 @@ JobResult result_from(const Json& json) {
 
 }  // namespace
 
+Json to_json(const JobResult& result) {
+  Json json;
+  for_each_field(result,
+                 [&](const char* key, const auto& value, bool if_done = false, bool = false) {
+                   json[key] = if_done && !result.done() ? Json() : json_of(value);
+                 });
+  if (result.message.empty()) json["message"] = nullptr;
+  return json;
+}
+
 bool Shard::holds(const std::string& name) const {
   return XXH3_64bits(name.data(), name.size()) % count == index - 1;
 }
@@ -122,10 +122,11 @@ std::uint64_t hash_of_library(const std::vector<Job>& jobs) {
   return XXH3_64bits_digest(&state);
 }
 
-Json to_json(const Summary& summary) {
+Json to_json(const Summary& summary, bool failed) {
   Json counts, assets = Json::array();
   for (const JobStatus status : kStatuses) counts[name_of(status)] = summary.count(status);
-  for (const JobResult& result : summary.results) assets.push_back(to_json(result));
+  for (const JobResult& result : summary.results)
+    if (!failed || !result.done()) assets.push_back(to_json(result));
   return {{"schema", kSchema},
           {"manifest", summary.manifest},
           {"library_hash", fmt::format("{:016x}", summary.library_hash)},

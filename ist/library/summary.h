@@ -34,8 +34,11 @@ struct Summary {
 /// Of names and settings.
 std::uint64_t hash_of_library(const std::vector<Job>& jobs);
 
-/// docs/json.md describes it.
-nlohmann::ordered_json to_json(const Summary& summary);
+/// An entry of `assets` of the next.
+nlohmann::ordered_json to_json(const JobResult& result);
+
+/// docs/json.md describes it. `failed`: only assets that are not done are listed; all are counted.
+nlohmann::ordered_json to_json(const Summary& summary, bool failed = false);
 
 /// Reads what to_json() gave. Throws Error (file, what is wrong).
 Summary read_summary(const std::string& path);

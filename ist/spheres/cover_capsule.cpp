@@ -68,19 +68,22 @@ class Fit {
   const Eigen::Matrix3d start_;
 };
 
-/// Steps along each number as long as that helps, then shorter ones.
-Axis improved(const Fit& fit, double finest) {
+/// Steps along each number as long as that helps by a share `gain`, then shorter ones. Around a
+/// flat layer ever smaller steps towards infinity would help for ever: their number is bounded.
+Axis improved(const Fit& fit, double finest, double gain) {
+  constexpr int kMostRounds = 24;
   Axis best = {0, 0, 0, 0, 0};
   double least = fit.volume(best);
   for (double step = 0.25; step > finest; step /= 2) {
-    for (bool better = true; better;) {
+    bool better = true;
+    for (int round = 0; better && round < kMostRounds; ++round) {
       better = false;
       for (std::size_t k = 0; k < best.size(); ++k)
         for (const double sign : {-1.0, 1.0}) {
           Axis tried = best;
           tried[k] += sign * step;
           const double volume = fit.volume(tried);
-          if (!(volume < least * (1 - 1e-9))) continue;
+          if (!(volume < least * (1 - gain))) continue;
           best = tried;
           least = volume;
           better = true;
@@ -111,7 +114,8 @@ CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false
       Eigen::Matrix3d start;
       start << axes.col(k), axes.col((k + 1) % 3), axes.col((k + 2) % 3);
       const Fit fit(points, box.center(), size, start);
-      const CoverCapsule found = fit.at(improved(fit, rough ? 0.03 : 1e-5));
+      const CoverCapsule found =
+          fit.at(rough ? improved(fit, 0.03, 1e-3) : improved(fit, 1e-5, 1e-9));
       const double volume = volume_of(found);
       if (!(volume < least)) continue;
       best = found;

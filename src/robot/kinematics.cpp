@@ -57,21 +57,30 @@ Positions default_positions(const RobotModel& robot) {
   return positions;
 }
 
+Positions middle_positions(const RobotModel& robot) {
+  Positions positions;
+  for (const RobotJoint& joint : robot.joints)
+    positions.push_back(joint.lower + (joint.upper - joint.lower) / 2);
+  return positions;
+}
+
+Eigen::Isometry3d joint_frame(const RobotModel& robot, std::size_t j, const Positions& positions) {
+  const RobotJoint& joint = robot.joints[j];
+  const double position = joint.mimics == kNone
+                              ? positions[j]
+                              : joint.multiplier * positions[joint.mimics] + joint.offset;
+  if (joint.motion == Motion::turning)
+    return joint.origin * Eigen::AngleAxisd(position, joint.axis);
+  if (joint.motion == Motion::sliding)
+    return joint.origin * Eigen::Translation3d(position * joint.axis);
+  return joint.origin;
+}
+
 std::vector<Eigen::Isometry3d> link_frames(const RobotModel& robot, const Positions& positions) {
   std::vector<Eigen::Isometry3d> frames(robot.links.size(), Eigen::Isometry3d::Identity());
-  for (const std::size_t link : robot.order) {
-    const std::size_t j = robot.joint_of[link];
-    if (j == kNone) continue;
-    const RobotJoint& joint = robot.joints[j];
-    const double position = joint.mimics == kNone
-                                ? positions[j]
-                                : joint.multiplier * positions[joint.mimics] + joint.offset;
-    frames[link] = frames[joint.parent] * joint.origin;
-    if (joint.motion == Motion::turning)
-      frames[link] = frames[link] * Eigen::AngleAxisd(position, joint.axis);
-    if (joint.motion == Motion::sliding)
-      frames[link] = frames[link] * Eigen::Translation3d(position * joint.axis);
-  }
+  for (const std::size_t link : robot.order)
+    if (const std::size_t j = robot.joint_of[link]; j != kNone)
+      frames[link] = frames[robot.joints[j].parent] * joint_frame(robot, j, positions);
   return frames;
 }
 
@@ -79,6 +88,31 @@ std::vector<std::size_t> tool_links(const RobotModel& robot) {
   std::vector<std::size_t> tools;
   Limbs(robot).add_tools(robot.order.front(), 0, tools);
   return tools;
+}
+
+std::vector<std::size_t> path_to(const RobotModel& robot, std::size_t link) {
+  std::vector<std::size_t> path;
+  for (std::size_t j = robot.joint_of[link]; j != kNone; j = robot.joint_of[robot.joints[j].parent])
+    path.push_back(j);
+  std::reverse(path.begin(), path.end());
+  return path;
+}
+
+std::vector<std::size_t> gripper_joints(const RobotModel& robot) {
+  constexpr std::size_t kMost = 2;
+  std::vector<std::size_t> joints;
+  for (const std::size_t tool : tool_links(robot)) {
+    std::vector<std::size_t> own;
+    for (std::size_t j = 0; j < robot.joints.size(); ++j) {
+      const std::vector<std::size_t> path = path_to(robot, robot.joints[j].child);
+      if (robot.joints[j].is_free() && std::any_of(path.begin(), path.end(), [&](std::size_t up) {
+            return robot.joints[up].parent == tool;
+          }))
+        own.push_back(j);
+    }
+    if (own.size() <= kMost) joints.insert(joints.end(), own.begin(), own.end());
+  }
+  return joints;
 }
 
 }  // namespace ist

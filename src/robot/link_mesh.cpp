@@ -56,6 +56,57 @@ TriangleMesh scaled_mesh(const LinkMesh& shape, const PackagePaths& paths) {
 
 }  // namespace
 
+ShapeMesh capsule_mesh(const CoverCapsule& capsule) {
+  constexpr std::uint32_t kRings = 24, kAround = 48;  // without poles; two are the equator
+  const double across = std::numbers::pi / kRings;    // a facet at most spans it both ways
+  const double radius = capsule.radius / std::cos(0.75 * across);
+  const Vector3d axis = capsule.end - capsule.begin;
+  const bool ball = axis.isZero(0);
+  const Eigen::Matrix3d turn =
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), ball ? Vector3d::UnitZ() : axis)
+          .toRotationMatrix();
+  ShapeMesh out;
+  out.slack = radius - capsule.radius;
+  TriangleMesh& mesh = out.mesh;
+  const auto add = [&](double down, double around, bool end) {
+    mesh.vertices.push_back(
+        (end ? capsule.end : capsule.begin) +
+        turn * (radius * Vector3d(std::sin(down) * std::cos(around),
+                                  std::sin(down) * std::sin(around), -std::cos(down))));
+  };
+  add(0, 0, false);
+  add(std::numbers::pi, 0, true);
+  std::uint32_t rings = 0;
+  const auto add_ring = [&](std::uint32_t ring, bool end) {
+    for (std::uint32_t i = 0; i < kAround; ++i)
+      add(across * ring, 2 * std::numbers::pi * i / kAround, end);
+    ++rings;
+  };
+  for (std::uint32_t ring = 1; ring <= kRings / 2; ++ring) add_ring(ring, false);
+  for (std::uint32_t ring = kRings / 2 + (ball ? 1 : 0); ring < kRings; ++ring)
+    add_ring(ring, true);
+  const auto at = [](std::uint32_t ring, std::uint32_t i) {
+    return 2 + ring * kAround + i % kAround;
+  };
+  for (std::uint32_t i = 0; i < kAround; ++i) {
+    mesh.triangles.push_back({0, at(0, i + 1), at(0, i)});
+    mesh.triangles.push_back({1, at(rings - 1, i), at(rings - 1, i + 1)});
+    for (std::uint32_t ring = 0; ring + 1 < rings; ++ring) {
+      mesh.triangles.push_back({at(ring, i), at(ring, i + 1), at(ring + 1, i + 1)});
+      mesh.triangles.push_back({at(ring, i), at(ring + 1, i + 1), at(ring + 1, i)});
+    }
+  }
+  return out;
+}
+
+void append_mesh(TriangleMesh& mesh, const TriangleMesh& more) {
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), more.vertices.begin(), more.vertices.end());
+  for (const auto& t : more.triangles)
+    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  mesh.notes.insert(mesh.notes.end(), more.notes.begin(), more.notes.end());
+}
+
 ShapeMesh mesh_of(const PlacedShape& placed, const PackagePaths& paths, const std::string& file) {
   ShapeMesh out;
   try {
@@ -65,6 +116,9 @@ ShapeMesh mesh_of(const PlacedShape& placed, const PackagePaths& paths, const st
       out.mesh = box_mesh(box->half_extents);
     } else if (const auto* cylinder = std::get_if<LinkCylinder>(&placed.shape)) {
       out = cylinder_mesh(*cylinder);
+    } else if (const auto* capsule = std::get_if<LinkCapsule>(&placed.shape)) {
+      const Vector3d end(0, 0, capsule->half_height);
+      out = capsule_mesh({-end, end, capsule->radius});
     } else {
       throw Error("a sphere has no mesh");
     }
@@ -86,12 +140,7 @@ LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths
       continue;
     }
     const ShapeMesh one = mesh_of(placed, paths, file);
-    const auto first = static_cast<std::uint32_t>(out.mesh.vertices.size());
-    out.mesh.vertices.insert(out.mesh.vertices.end(), one.mesh.vertices.begin(),
-                             one.mesh.vertices.end());
-    for (const auto& t : one.mesh.triangles)
-      out.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
-    out.mesh.notes.insert(out.mesh.notes.end(), one.mesh.notes.begin(), one.mesh.notes.end());
+    append_mesh(out.mesh, one.mesh);
     out.slack = std::max(out.slack, one.slack);
   }
   return out;

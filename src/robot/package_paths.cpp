@@ -1,5 +1,7 @@
 #include "robot/package_paths.h"
 
+#include <algorithm>
+#include <charconv>
 #include <system_error>
 #include <utility>
 
@@ -15,6 +17,23 @@ namespace fs = std::filesystem;
 bool is_file(const fs::path& path) {
   std::error_code none;
   return fs::exists(path, none) && !fs::is_directory(path, none);
+}
+
+/// With %XX as the byte that it stands for.
+std::string decoded(const std::string& name) {
+  std::string out;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    unsigned byte = 0;
+    const char* const end = name.data() + std::min(name.size(), i + 3);
+    if (name[i] == '%' && end - name.data() == static_cast<std::ptrdiff_t>(i + 3) &&
+        std::from_chars(name.data() + i + 1, end, byte, 16).ptr == end) {
+      out += static_cast<char>(byte);
+      i += 2;
+    } else {
+      out += name[i];
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -33,16 +52,28 @@ PackagePaths::PackagePaths(const fs::path& urdf, std::map<std::string, std::stri
 }
 
 std::string PackagePaths::find(const std::string& name) const {
+  const std::string meant = decoded(name);
+  if (meant == name) return find_as_written(name);
+  try {
+    return find_as_written(name);
+  } catch (const Error&) {
+    return find_as_written(meant);
+  }
+}
+
+std::string PackagePaths::find_as_written(const std::string& name) const {
   const auto begins = [&](const std::string& with) {
     return name.compare(0, with.size(), with) == 0;
   };
-  if (!begins("package://")) {
+  const bool model = begins("model://");
+  if (!begins("package://") && !model) {
     fs::path path = begins("file://") ? name.substr(7) : name;
     if (path.is_relative()) path = folder_ / path;
     if (!is_file(path)) throw Error(in_quotes(name) + ": no such file: " + path.string());
     return path.string();
   }
-  const std::string rest = name.substr(10);
+  std::string rest = name.substr(model ? 8 : 10);
+  rest.erase(0, rest.find_first_not_of('/'));
   const std::size_t slash = rest.find('/');
   const std::string package = rest.substr(0, slash);
   if (package.empty() || slash == std::string::npos)

@@ -17,11 +17,14 @@ class PackagePaths {
   PackagePaths(const std::filesystem::path& urdf, std::map<std::string, std::string> named,
                const std::string& ros_path);
 
-  /// The file of a name: package://NAME/REST, file://PATH or a path. Throws Error that tells where
-  /// it was looked for; the file exists.
+  /// The file of a name: package://NAME/REST (or model://, or with a third slash), file://PATH or a
+  /// path; where that is not there, the same with %20 and the like decoded. Throws Error that tells
+  /// where it was looked for; the file exists.
   std::string find(const std::string& name) const;
 
  private:
+  std::string find_as_written(const std::string& name) const;
+
   std::filesystem::path folder_;
   std::map<std::string, std::string> named_;
   std::vector<std::filesystem::path> ros_path_;

@@ -8,8 +8,11 @@
 #include <tuple>
 #include <utility>
 
+#include <ist/error.h>
+
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
+#include "robot/read_mjcf.h"
 
 namespace ist {
 namespace {
@@ -39,7 +42,7 @@ class RobotReader {
 
   void read() {
     if (xml_[0].name != "robot")
-      xml_.fail(0, "is not a robot: a URDF begins with <robot name=\"…\">");
+      xml_.fail(0, "is not a robot: a URDF begins with <robot name=\"…\">, an MJCF with <mujoco>");
     robot_.name = decoded(xml_.attribute(0, "name"));
     for (std::uint32_t e = xml_[0].first_child; e != kNoElement; e = xml_[e].next_sibling) {
       if (xml_[e].name == "link") read_link(e);
@@ -75,7 +78,11 @@ class RobotReader {
         link.collision.push_back(read_placed(e));
         link.collision_bytes.emplace_back(xml_[e].offset, xml_[e].end);
       } else if (xml_[e].name == "visual") {
-        link.visual.push_back(read_placed(e));
+        try {
+          link.visual.push_back(read_placed(e));
+        } catch (const Error& error) {  // most robots are never read by these shapes
+          link.visual.emplace_back().shape = LinkFault{error.what()};
+        }
       }
     }
     robot_.links.push_back(std::move(link));
@@ -109,7 +116,12 @@ class RobotReader {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
       LinkMesh mesh;
-      mesh.file = decoded(xml_.attribute(e, "filename"));
+      const std::string_view name = xml_.attribute(e, "filename");
+      mesh.file = decoded(name);
+      if (!name.empty()) {
+        mesh.name_begin = static_cast<std::size_t>(name.data() - robot_.file.bytes.data());
+        mesh.name_end = mesh.name_begin + name.size();
+      }
       if (mesh.file.empty()) xml_.fail(e, "has no file. Add filename=\"…\"");
       mesh.scale = vector(e, "scale", Vector3d::Ones());
       if ((mesh.scale.array() == 0).any())
@@ -119,7 +131,8 @@ class RobotReader {
     if (kind == "box") return LinkBox{0.5 * lengths(e, "size")};
     if (kind == "cylinder") return LinkCylinder{length(e, "radius"), 0.5 * length(e, "length")};
     if (kind == "sphere") return LinkBall{length(e, "radius")};
-    xml_.fail(e, "is an unknown shape. Use mesh, box, cylinder or sphere");
+    if (kind == "capsule") return LinkCapsule{length(e, "radius"), 0.5 * length(e, "length")};
+    xml_.fail(e, "is an unknown shape. Use mesh, box, cylinder, sphere or capsule");
   }
 
   /// Finite numbers, as many as there are places.
@@ -272,6 +285,7 @@ class RobotReader {
 }  // namespace
 
 RobotModel read_robot(SourceFile file) {
+  if (XmlDocument(file)[0].name == "mujoco") return read_mjcf(std::move(file));
   RobotModel robot;
   robot.file = std::move(file);
   RobotReader(robot).read();

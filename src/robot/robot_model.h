@@ -18,6 +18,8 @@ namespace ist {
 struct LinkMesh {
   std::string file;  ///< as the URDF names it: a path, file://… or package://…
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();  ///< not 0; below 0 it mirrors
+  /// Bytes of the URDF: the name, first and behind the last.
+  std::size_t name_begin = 0, name_end = 0;
 };
 struct LinkBox {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
@@ -28,7 +30,14 @@ struct LinkCylinder {
 struct LinkBall {
   double radius = 1;  ///< [u] > 0
 };
-using Shape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall>;
+struct LinkCapsule {
+  double radius = 1, half_height = 1;  ///< [u] > 0, of the segment along z
+};
+/// A visual shape that is not as it should be: an error where it is used.
+struct LinkFault {
+  std::string what;  ///< with file and line
+};
+using Shape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkFault>;
 
 /// A shape of a link: x_link = rotation · x + translation.
 struct PlacedShape {
@@ -75,17 +84,19 @@ struct RobotJoint {
 /// Links and joints in the order of the file; its bytes are kept.
 struct RobotModel {
   SourceFile file;
+  bool is_urdf = true;  ///< else of MuJoCo
   std::string name;
   std::vector<RobotLink> links;
   std::vector<RobotJoint> joints;
   std::vector<std::size_t>
       joint_of;                    ///< of each link, the joint it is the child of; kNone: the root
   std::vector<std::size_t> order;  ///< links, parents before children
+  std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
 };
 
-/// Reads a URDF. Strict where a mistake would move or lose a shape: numbers must be finite, lengths
-/// above 0, joints must make one tree of the links. What is neither a link's shape nor a joint is
-/// not looked at.
+/// Reads a URDF, or an MJCF as read_mjcf() does. Strict where a mistake would move or lose a shape:
+/// numbers must be finite, lengths above 0, joints must make one tree of the links. A visual shape
+/// that is wrong becomes a LinkFault. What is neither a link's shape nor a joint is not looked at.
 /// Document types are refused, and with them entities. Throws Error (file, line, what, way out).
 RobotModel read_robot(const std::string& path);
 

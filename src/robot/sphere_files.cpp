@@ -115,17 +115,19 @@ std::string yaml_list(const std::vector<std::string>& items) {
 void append_ignored(const SelfCollision& self, const std::string& key, const std::string& indent,
                     std::string& out) {
   std::map<std::string, std::vector<std::string>> ignored;
-  for (const IgnoredPair& pair : self.ignored) ignored[pair.a].push_back(yaml_text(pair.b));
+  for (const LinkPair& pair : self.pairs)
+    if (!pair.ignored.empty()) ignored[pair.a].push_back(yaml_text(pair.b));
   out += indent + key + (ignored.empty() ? ": {}\n" : ":\n");
   for (const auto& [link, others] : ignored)
     out += indent + "  " + yaml_text(link) + ": " + yaml_list(others) + "\n";
 }
 
-void append_buffers(std::span<const LinkSpheres> links, const SelfCollision& self,
-                    const std::string& key, const std::string& indent, std::string& out) {
+/// Spheres are compared as they are: smaller ones would miss collisions of the link with all
+/// others.
+void append_buffers(std::span<const LinkSpheres> links, const std::string& key,
+                    const std::string& indent, std::string& out) {
   out += indent + key + ":\n";
-  for (const LinkSpheres& link : links)
-    out += indent + "  " + yaml_text(link.link) + ": " + real(self.buffer(link.link)) + "\n";
+  for (const LinkSpheres& link : links) out += indent + "  " + yaml_text(link.link) + ": 0.0\n";
 }
 
 // What a URDF does not state, as cuRobo's own robots have it.
@@ -134,18 +136,20 @@ constexpr double kJerk = 500;         // [rad/s³, u/s³]
 
 /// Free joints: names, default positions, and a number for each.
 struct Cspace {
-  explicit Cspace(const RobotModel& robot) {
-    const Positions all = default_positions(robot);
+  Cspace(const RobotModel& robot, const SelfCollision& self) {
     for (std::size_t j = 0; j < robot.joints.size(); ++j) {
       if (!robot.joints[j].is_free()) continue;
       names.push_back(yaml_text(robot.joints[j].name));
-      positions.push_back(real(all[j]));
+      positions.push_back(real(self.pose.positions[j]));
+      (self.locked.contains(j) ? locked : moving).push_back(names.back());
+      if (self.locked.contains(j)) locked.back() += ": " + positions.back();
     }
   }
-  std::string each(double value) const {
-    return yaml_list(std::vector<std::string>(names.size(), real(value)));
+  static std::string each(const std::vector<std::string>& joints, double value) {
+    return yaml_list(std::vector<std::string>(joints.size(), real(value)));
   }
   std::vector<std::string> names, positions;
+  std::vector<std::string> moving, locked;  ///< names; "name: position"
 };
 
 std::vector<std::string> tool_names(const RobotModel& robot) {
@@ -157,39 +161,59 @@ std::vector<std::string> tool_names(const RobotModel& robot) {
 
 }  // namespace
 
-std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links) {
+std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links,
+                              const std::string& folder) {
+  namespace fs = std::filesystem;
   const std::string_view bytes = robot.file.bytes;
-  std::string out;
-  std::size_t copied = 0;
-  const auto copy_to = [&](std::size_t to) {
-    out += bytes.substr(copied, to - copied);
-    copied = to;
+  struct Edit {
+    std::size_t begin, end;
+    std::string text;
   };
+  std::vector<Edit> edits;
+  const fs::path from = fs::absolute(robot.file.path).lexically_normal().parent_path();
+  const fs::path to = fs::absolute(fs::path(folder) / "x").lexically_normal().parent_path();
+  const bool moved = !folder.empty() && from != to;
   for (const RobotLink& link : robot.links) {
     const auto found = std::find_if(links.begin(), links.end(),
                                     [&](const LinkSpheres& one) { return one.link == link.name; });
-    if (found == links.end()) continue;
+    const bool replaced = found != links.end();
+    for (const auto* const shapes : {&link.collision, &link.visual})
+      for (const PlacedShape& placed : *shapes) {
+        const auto* const mesh = std::get_if<LinkMesh>(&placed.shape);
+        if (!moved || mesh == nullptr || (replaced && shapes == &link.collision) ||
+            mesh->file.find("://") != std::string::npos || fs::path(mesh->file).is_absolute())
+          continue;
+        const fs::path file = (from / mesh->file).lexically_normal().lexically_relative(to);
+        edits.push_back({mesh->name_begin, mesh->name_end, xml_text(file.generic_string())});
+      }
+    if (!replaced) continue;
     bool written = false;
     for (const auto& [begin, end] : link.collision_bytes) {
       const std::string indent = indent_before(bytes, begin);
-      if (!written) {
-        copy_to(begin);
-        out += collisions(*found, indent);
-      } else {
-        std::size_t line = begin - indent.size();  // an empty line is not left behind
-        if (line > copied && bytes[line - 1] == '\n') --line;
-        copy_to(line);
+      std::size_t first = begin;
+      if (written) {  // an empty line is not left behind
+        first -= indent.size();
+        if (bytes[first - 1] == '\n') --first;
       }
-      copied = end;
+      edits.push_back({first, end, written ? "" : collisions(*found, indent)});
       written = true;
     }
     if (written) continue;
     // Spheres of visual shapes: the link had no collision.
-    copy_to(bytes.rfind("</", link.end));
-    out += "  " + collisions(*found, "    ") + "\n  ";
+    const std::size_t at = bytes.rfind("</", link.end);
+    edits.push_back({at, at, "  " + collisions(*found, "    ") + "\n  "});
   }
-  copy_to(bytes.size());
-  return out;
+  std::sort(edits.begin(), edits.end(),
+            [](const Edit& a, const Edit& b) { return a.begin < b.begin; });
+  std::string out;
+  std::size_t copied = 0;
+  for (const Edit& edit : edits) {
+    const std::size_t begin = std::max(copied, edit.begin);
+    out += bytes.substr(copied, begin - copied);
+    out += edit.text;
+    copied = std::max(copied, edit.end);
+  }
+  return out + std::string(bytes.substr(copied));
 }
 
 std::string urdf_of_spheres(const LinkSpheres& link) {
@@ -205,29 +229,32 @@ std::string curobo_spheres(std::span<const LinkSpheres> links) {
 
 std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
                          std::span<const LinkSpheres> links, const SelfCollision& self) {
-  const Cspace cspace(robot);
+  const Cspace cspace(robot, self);
   std::vector<std::string> names;
   for (const LinkSpheres& link : links) names.push_back(yaml_text(link.link));
   const std::string all = yaml_list(names);
   std::string out = "robot_cfg:\n  kinematics:\n";
   const auto line = [&](const std::string& text) { out += "    " + text + "\n"; };
   line("format_version: 2.0");
-  line("urdf_path: " + yaml_text(urdf));
-  line("asset_root_path: " + yaml_text(std::filesystem::path(urdf).parent_path().string()));
+  line("urdf_path: " + yaml_text(urdf) + "  # as is the next, relative to this file");
+  const std::string folder = std::filesystem::path(urdf).parent_path().string();
+  line("asset_root_path: " + yaml_text(folder.empty() ? "." : folder));
   line("base_link: " + yaml_text(robot.links[robot.order.front()].name));
   line("tool_frames: " + yaml_list(tool_names(robot)));
-  line("lock_joints: null");
+  const std::string locked = yaml_list(cspace.locked);
+  line("lock_joints: " +
+       (cspace.locked.empty() ? "null" : "{" + locked.substr(1, locked.size() - 2) + "}"));
   line("extra_links: null");
   line("collision_link_names: " + all);
   line("mesh_link_names: " + all);
   line("collision_sphere_buffer: 0.0");
   append_ignored(self, "self_collision_ignore", "    ", out);
-  append_buffers(links, self, "self_collision_buffer", "    ", out);
+  append_buffers(links, "self_collision_buffer", "    ", out);
   line("cspace:");
   line("  joint_names: " + yaml_list(cspace.names));
   line("  default_joint_position: " + yaml_list(cspace.positions));
-  line("  null_space_weight: " + cspace.each(1));
-  line("  cspace_distance_weight: " + cspace.each(1));
+  line("  null_space_weight: " + cspace.each(cspace.names, 1));
+  line("  cspace_distance_weight: " + cspace.each(cspace.names, 1));
   line("  max_acceleration: " + real(kAcceleration) + "  # a URDF has none; set your robot's");
   line("  max_jerk: " + real(kJerk) + "  # a URDF has none; set your robot's");
   line("collision_spheres:");
@@ -238,19 +265,19 @@ std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
 std::string xrdf(const RobotModel& robot, std::span<const LinkSpheres> links,
                  const SelfCollision& self) {
   const std::string geometry = yaml_text((robot.name.empty() ? "robot" : robot.name) + "_spheres");
-  const Cspace cspace(robot);
+  const Cspace cspace(robot, self);
   std::string out = "format: xrdf\nformat_version: 1.0\n\ndefault_joint_positions:";
   if (cspace.names.empty()) out += " {}";
   for (std::size_t j = 0; j < cspace.names.size(); ++j)
     out += "\n  " + cspace.names[j] + ": " + cspace.positions[j];
   out += "\n\n# A URDF has no limits of acceleration and jerk: set your robot's.\ncspace:";
-  out += "\n  joint_names: " + yaml_list(cspace.names);
-  out += "\n  acceleration_limits: " + cspace.each(kAcceleration);
-  out += "\n  jerk_limits: " + cspace.each(kJerk);
+  out += "\n  joint_names: " + yaml_list(cspace.moving);
+  out += "\n  acceleration_limits: " + cspace.each(cspace.moving, kAcceleration);
+  out += "\n  jerk_limits: " + cspace.each(cspace.moving, kJerk);
   out += "\n\ntool_frames: " + yaml_list(tool_names(robot)) + "\n\n";
   out += "collision:\n  geometry: " + geometry + "\n  buffer_distance: {}\n\n";
   out += "self_collision:\n  geometry: " + geometry + "\n";
-  append_buffers(links, self, "buffer_distance", "  ", out);
+  append_buffers(links, "buffer_distance", "  ", out);
   append_ignored(self, "ignore", "  ", out);
   out += "\ngeometry:\n  " + geometry + ":\n    spheres:\n";
   append_yaml(links, "      ", out);
@@ -267,9 +294,10 @@ std::string srdf(const RobotModel& robot, std::span<const LinkSpheres> links,
              "\"/>\n";
     out += "  </link_sphere_approximation>\n";
   }
-  for (const IgnoredPair& pair : self.ignored)
-    out += "  <disable_collisions link1=\"" + xml_text(pair.a) + "\" link2=\"" + xml_text(pair.b) +
-           "\" reason=\"" + pair.reason + "\"/>\n";
+  for (const LinkPair& pair : self.pairs)
+    if (!pair.ignored.empty())
+      out += "  <disable_collisions link1=\"" + xml_text(pair.a) + "\" link2=\"" +
+             xml_text(pair.b) + "\" reason=\"" + pair.ignored + "\"/>\n";
   return out + "</robot>\n";
 }
 

@@ -24,8 +24,10 @@ struct LinkSpheres {
 struct SelfCollision;
 
 /// The URDF with every collision of these links replaced by spheres; all else is kept, byte for
-/// byte.
-std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links);
+/// byte, but for relative names of meshes, so that they are found from `folder`, where it will lie
+/// ("": beside the robot's file).
+std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpheres> links,
+                              const std::string& folder = "");
 
 /// A URDF of one link that is spheres, for a mesh that belongs to no robot.
 std::string urdf_of_spheres(const LinkSpheres& link);
@@ -34,7 +36,8 @@ std::string urdf_of_spheres(const LinkSpheres& link);
 /// no robot.
 std::string curobo_spheres(std::span<const LinkSpheres> links);
 
-/// cuRobo 0.8: a whole robot_cfg. `urdf`: where the robot's file will be found.
+/// cuRobo 0.8: a whole robot_cfg. `urdf`: the robot's file, seen from where this one will lie.
+/// Joints of fingers are locked where the default pose has them.
 std::string curobo_robot(const RobotModel& robot, const std::string& urdf,
                          std::span<const LinkSpheres> links, const SelfCollision& self);
 

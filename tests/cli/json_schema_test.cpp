@@ -19,7 +19,8 @@ void add_paths(const nlohmann::json& json, const std::string& prefix, Paths& pat
       add_paths(value, prefix.empty() ? key : prefix + "." + key, paths);
   } else if (json.is_array() && !json.empty() && json[0].is_object()) {
     for (const auto& entry : json) add_paths(entry, prefix + "[]", paths);
-  } else if (!json.is_array() || !json.empty() || prefix == "notes") {
+  } else if (!json.is_array() || !json.empty() || prefix == "notes" || prefix == "left_out" ||
+             prefix.starts_with("default_pose.")) {
     paths.insert(prefix);
   }
 }
@@ -91,11 +92,16 @@ TEST_F(JsonSchema, Robots) {
         "<collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
         "<collision><geometry><sphere radius='1'/></geometry></collision></link>"
         "<link name='b'><collision><geometry><sphere radius='1'/></geometry></collision></link>"
-        "<joint name='j' type='fixed'><parent link='NAME'/><child link='b'/></joint></robot>");
+        "<link name='c'><collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
+        "</link><joint name='j' type='fixed'><parent link='NAME'/><child link='b'/></joint>"
+        "<joint name='NAME' type='prismatic'><parent link='b'/><child link='c'/>"
+        "<limit lower='1.2' upper='4'/></joint></robot>");
   Paths report, file, bake;
   add({"spheres", "r.urdf", "-o", "s.json", "--count", "8", "--json"}, report);
   const auto without_b = [](Paths& paths) {
-    std::erase_if(paths, [](const std::string& path) { return path.starts_with("links.b"); });
+    std::erase_if(paths, [](const std::string& path) {
+      return path.starts_with("links.b") || path.starts_with("links.c");
+    });
   };
   without_b(report);
   Paths expected = documented("`ist spheres --json`");

@@ -134,22 +134,24 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   const YAML::Node curobo = YAML::LoadFile((folder_ / "a.yml").string())["robot_cfg"]["kinematics"];
   using Words = std::vector<std::string>;
   const Words joints = {"j1", "j2", "l"};
-  EXPECT_EQ(curobo["urdf_path"].as<std::string>(), (folder_ / "arm.urdf").string());
+  EXPECT_EQ(curobo["urdf_path"].as<std::string>(), "arm.urdf");
+  EXPECT_EQ(curobo["lock_joints"]["l"].as<double>(), 0.04);  // the gripper, open
   EXPECT_EQ(curobo["base_link"].as<std::string>(), "base");
   EXPECT_EQ(curobo["tool_frames"].as<Words>(), Words{"hand"});
   EXPECT_EQ(curobo["collision_link_names"].as<Words>(),
             (Words{"base", "upper", "lower", "hand", "left", "right"}));
   EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
   EXPECT_EQ(curobo["cspace"]["default_joint_position"].as<std::vector<double>>(),
-            (std::vector<double>{1.5, 0, 0}));
+            (std::vector<double>{1.5, 0, 0.04}));
   // What cuRobo's converter of XRDF asks for.
   EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
   EXPECT_EQ(xrdf["self_collision"]["geometry"].as<std::string>(),
             xrdf["collision"]["geometry"].as<std::string>());
   EXPECT_EQ(xrdf["tool_frames"].as<Words>(), Words{"hand"});
-  EXPECT_EQ(xrdf["cspace"]["joint_names"].as<Words>(), joints);
+  EXPECT_EQ(xrdf["cspace"]["joint_names"].as<Words>(), (Words{"j1", "j2"}));
   for (const char* limits : {"acceleration_limits", "jerk_limits"})
-    EXPECT_EQ(xrdf["cspace"][limits].size(), 3u);
+    EXPECT_EQ(xrdf["cspace"][limits].size(), 2u);
+  EXPECT_EQ(xrdf["default_joint_positions"]["l"].as<double>(), 0.04);
   EXPECT_EQ(xrdf["default_joint_positions"]["j1"].as<double>(), 1.5);
   // All three ignore the same pairs, neighbours among them.
   const Json json = Json::parse(read("a.json"));
@@ -169,8 +171,84 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   EXPECT_EQ(adjacent, 5u);
   EXPECT_EQ(json["self_collision"]["pairs"], 15);
   for (const auto& [name, link] : json["links"].items())
-    EXPECT_GE(curobo["self_collision_buffer"][name].as<double>(),
-              -link["protrusion"].get<double>());
+    EXPECT_EQ(curobo["self_collision_buffer"][name].as<double>(), 0);
+  EXPECT_EQ(json["self_collision"]["missed"], 0);
+  EXPECT_TRUE(json["default_pose"]["links_free"].get<bool>());
+  EXPECT_EQ(json["default_pose"]["locked"], Json::parse("[\"l\"]"));
+}
+
+TEST_F(RobotCommands, TheDefaultPoseIsAskedFor) {
+  write("arm.urdf", kArm);
+  write("arm.srdf",
+        "<robot name='arm'><group_state name='home' group='g'><joint name='j2' value='0.5'/>"
+        "</group_state></robot>");
+  const auto pose = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"spheres", "arm.urdf", "-o", "p.json", "--count", "2"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return Json::parse(read("p.json"))["default_pose"];
+  };
+  EXPECT_EQ(pose({"--pose", "j2=1"})["positions"]["j2"], 1.0);
+  const Json home = pose({"--srdf", "arm.srdf"});
+  EXPECT_EQ(home["from"], "home");
+  EXPECT_EQ(home["positions"]["j2"], 0.5);
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--pose", "j3=1"}, 1, "is called 'j3'");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--pose", "j2=4"}, 1, "limits are -3 to 3");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--pose", "r=0"}, 1, "moves freely");
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--pose", "j2"}, 2, "JOINT=NUMBER");
+  expect_error({"spheres", "cube.obj", "-o", "o.json", "--pose", "j2=1"}, 2, "is not a robot");
+}
+
+/// Repair drops the sheet; the spheres contain it all the same.
+TEST_F(RobotCommands, WhatRepairDroppedIsCovered) {
+  std::string cube = read("cube.obj");
+  const auto corners = static_cast<int>(std::count(cube.begin(), cube.end(), 'v'));
+  cube += "v 2 0 0\nv 3 0 0\nv 2 1 0\nf " + std::to_string(corners + 1) + " " +
+          std::to_string(corners + 2) + " " + std::to_string(corners + 3) + "\n";
+  write("fin.obj", cube);
+  write("fin.urdf",
+        "<robot name='r'><link name='a'><collision><geometry><mesh filename='fin.obj'/>"
+        "</geometry></collision></link></robot>");
+  for (const std::string input : {"fin.urdf", "fin.obj"}) {
+    const Outcome outcome = ist({"spheres", input, "-o", "f.json", "--count", "8", "--repair"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const Json link = Json::parse(read("f.json"))["links"].begin().value();
+    EXPECT_EQ(link["closing"]["method"], "repair");
+    for (const Eigen::Vector3d& x :
+         {Eigen::Vector3d(2, 0, 0), Eigen::Vector3d(3, 0, 0), Eigen::Vector3d(2.3, 0.3, 0)}) {
+      bool held = false;
+      for (const Json& s : link["spheres"])
+        held = held || (x - Eigen::Vector3d(s[0], s[1], s[2])).norm() <= s[3].get<double>();
+      EXPECT_TRUE(held) << x.transpose();
+    }
+    ASSERT_EQ(ist({"spheres", input, "-o", "g.json", "--capsules", "--repair"}).exit_code, 0);
+    const Json whole = Json::parse(read("g.json"))["links"].begin().value();
+    EXPECT_EQ(whole["covered_by"], "capsules");
+    const Json& c = whole["capsules"][0];
+    const Eigen::Vector3d a(c[0], c[1], c[2]), b(c[3], c[4], c[5]), x(3, 0, 0);
+    const double t = std::clamp((x - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+    EXPECT_LE((x - a - t * (b - a)).norm(), c[6].get<double>());
+  }
+}
+
+TEST_F(RobotCommands, WhatCannotBeClosedGetsABoundingCapsule) {
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  write(
+      "open.urdf",
+      "<robot name='r'><link name='a'><collision><geometry><mesh filename='open.obj'/></geometry>"
+      "</collision></link><link name='seen'><visual><geometry><box size='1 1 1'/></geometry>"
+      "</visual></link><joint name='j' type='fixed'><parent link='a'/><child link='seen'/></joint>"
+      "</robot>");
+  const Outcome outcome = ist({"spheres", "open.urdf", "-o", "o.json", "--repair"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("a bounding capsule stands for link a"), std::string::npos)
+      << outcome.err;
+  EXPECT_NE(outcome.err.find("visual shapes alone: seen; --visual"), std::string::npos);
+  const Json json = Json::parse(read("o.json"));
+  EXPECT_EQ(json["left_out"], Json::parse("[\"seen\"]"));
+  EXPECT_EQ(json["links"]["a"]["closing"]["method"], "capsule");
+  EXPECT_TRUE(json["links"]["a"]["protrusion"].is_null());
 }
 
 TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {

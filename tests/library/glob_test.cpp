@@ -62,5 +62,14 @@ TEST_F(Glob, AnAbsolutePatternIsItself) {
   EXPECT_EQ(matching_files("elsewhere", "/et?/passw?"), std::vector<fs::path>{"/etc/passwd"});
 }
 
+TEST(GlobMatch, FollowsAPathFolderByFolder) {
+  for (const char* const pattern : {"a/b.obj", "a/*.obj", "**/b.obj", "**/*.obj", "a/**", "**"})
+    EXPECT_TRUE(matches("a/b.obj", pattern)) << pattern;
+  for (const char* const pattern : {"b.obj", "*.obj", "a/*.stl", "a", "a/b.obj/**/c", "**/a"})
+    EXPECT_FALSE(matches("a/b.obj", pattern)) << pattern;
+  EXPECT_TRUE(matches("b.obj", "**/b.obj"));
+  EXPECT_FALSE(matches("a/.b.obj", "a/*"));
+}
+
 }  // namespace
 }  // namespace ist

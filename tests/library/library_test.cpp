@@ -1,3 +1,5 @@
+#include <sstream>
+
 #include "library/library_folder.h"
 
 // `ist bake --manifest` and `ist summary`, end to end.
@@ -152,6 +154,17 @@ TEST_F(Library, StaleAssetsAreReportedAndRemovedOnRequest) {
   EXPECT_TRUE(exists("out/dice.ist"));
 }
 
+TEST_F(Library, ALineOfJsonAnAsset) {
+  const Outcome outcome = bake("out", {"--json-lines", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::istringstream lines(outcome.out);
+  std::vector<nlohmann::json> all;
+  for (std::string line; std::getline(lines, line);) all.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(all.size(), names().size() + 1);
+  for (std::size_t i = 0; i < names().size(); ++i) EXPECT_EQ(all[i].at("status"), "baked");
+  EXPECT_EQ(all.back().at("assets").size(), names().size());
+}
+
 TEST_F(Library, FailuresAloneAndTheQualityOfAssets) {
   write("meshes/broken.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const nlohmann::json summary = summary_of("out", {}, 1);
@@ -160,6 +173,8 @@ TEST_F(Library, FailuresAloneAndTheQualityOfAssets) {
   EXPECT_EQ(failed.exit_code, 1);
   EXPECT_NE(failed.out.find("broken"), std::string::npos) << failed.out;
   EXPECT_EQ(failed.out.find("gear"), std::string::npos) << failed.out;
+  EXPECT_NE(failed.out.find(" 1 failed"), std::string::npos) << failed.out;
+  EXPECT_EQ(failed.out.find(" 0 baked"), std::string::npos) << failed.out;
   // A page with a picture of each asset, failures first.
   EXPECT_EQ(ist({"summary", "summary.json", "--html", "page.html"}).exit_code, 1);
   const std::string page = read("page.html");

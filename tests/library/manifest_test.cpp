@@ -141,8 +141,26 @@ TEST_F(Mistakes, InNamesAndExclusions) {
                 {"3: name: '{stm}' stands for nothing; use {stem}, {ext}, {parent} or {dir}"});
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = 3\n",
                 {"3: exclude: 3 is not a quoted string"});
-  expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = [\"meshes/c*.obj\", \"none*\"]\n",
-                {"3: exclude: 'none*' excludes none of the files"});
+  expect_faults("[[assets]]\nmesh = \"meshes/*.obj\"\n",
+                {"unknown 'assets': did you mean 'asset'?"});
+}
+
+TEST_F(Mistakes, AnExclusionOfNothingIsAWarning) {
+  std::filesystem::create_directory(folder_ / "there");
+  write("there/bad.obj", "");
+  std::filesystem::create_directory_symlink("there", folder_ / "link");
+  write("e.toml",
+        "[[asset]]\nmesh = \"*/*.obj\"\nexclude = [\"**/bad.obj\", \"none*\"]\nspheres = 5\n");
+  const Outcome outcome = bake("out", {"--list"}, {}, "e.toml");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("e.toml:3: exclude: 'none*' excludes none of the files"),
+            std::string::npos)
+      << outcome.err;
+  // Folders that are links are left out alike.
+  EXPECT_EQ(outcome.out.find("bad"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("cube  meshes/cube.obj\n"), std::string::npos) << outcome.out;
+  EXPECT_NE(outcome.out.find("nothing was baked"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
 TEST_F(Mistakes, NamesAreMadeOfFoldersAndExtensions) {

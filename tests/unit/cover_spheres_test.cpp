@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <utility>
+
 #include <cmath>
 #include <random>
 
@@ -359,6 +364,59 @@ TEST(CoverCapsules, DivideAnElbow) {
   const std::vector<CoverCapsule> two = cover_with_capsules(elbow, 2);
   ASSERT_EQ(two.size(), 2u);
   EXPECT_LT(volume_of(two[0]) + volume_of(two[1]), 0.3 * volume_of(cover_with_capsules(elbow)[0]));
+}
+
+/// A sheet as large as the solid, which is no part of it.
+TEST(ExtendCover, ContainsASheetBesideTheSolid) {
+  TriangleMesh sheet;
+  for (int i = 0; i < 4; ++i) sheet.vertices.emplace_back(i & 1 ? 4 : 1, i & 2 ? 1 : -1, 0.3);
+  sheet.triangles = {{0, 1, 2}, {2, 1, 3}};
+  SphereCover cover;
+  cover.spheres = {{{0, 0, 0}, 1.2}};
+  cover.protrusion.largest = 0.2;
+  extend_cover(sheet, cover);
+  EXPECT_GT(cover.spheres.size(), 2u);
+  EXPECT_LE(cover.spheres.size(), 9u);
+  for (int i = 0; i <= 30; ++i)
+    for (int j = 0; j <= 20; ++j) {
+      const Eigen::Vector3d x(1 + 0.1 * i, 0.1 * j - 1, 0.3);
+      EXPECT_TRUE(std::any_of(cover.spheres.begin(), cover.spheres.end(), [&](const auto& s) {
+        return (x - s.centre).norm() <= s.radius;
+      })) << x.transpose();
+    }
+  // No sphere that was added reaches further from the sheet than is told.
+  for (std::size_t k = 1; k < cover.spheres.size(); ++k)
+    EXPECT_LE(cover.spheres[k].radius, cover.protrusion.largest);
+
+  // What is covered stays as it is.
+  for (Eigen::Vector3d& x : sheet.vertices) x *= 0.2;
+  cover.spheres = {{{0, 0, 0}, 1.2}};
+  cover.protrusion.largest = 0.2;
+  extend_cover(sheet, cover);
+  EXPECT_EQ(cover.spheres.size(), 1u);
+  EXPECT_EQ(cover.protrusion.largest, 0.2);
+}
+
+/// Flat layers once made the search creep towards infinity.
+TEST(CoverCapsules, OfAFlatRingTakeNoTime) {
+  ClosedMesh ring;
+  for (std::uint32_t i = 0; i < 400; ++i)
+    for (const double z : {0.0, 0.01})
+      for (const double r : {0.9, 1.0})
+        ring.mesh.vertices.emplace_back(r * std::cos(i * 0.0157079632679),
+                                        r * std::sin(i * 0.0157079632679), z);
+  for (std::uint32_t i = 0; i < 400; ++i) {
+    const std::uint32_t a = 4 * i, b = 4 * ((i + 1) % 400);
+    for (const auto& [p, q] : {std::pair{0u, 1u}, {1u, 3u}, {3u, 2u}, {2u, 0u}}) {
+      ring.mesh.triangles.push_back({a + p, b + p, b + q});
+      ring.mesh.triangles.push_back({a + p, b + q, a + q});
+    }
+  }
+  for (const std::size_t count : {1, 2, 3}) {
+    const std::clock_t start = std::clock();
+    EXPECT_LE(cover_with_capsules(ring, count).size(), count);
+    EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 10) << count;
+  }
 }
 
 }  // namespace

@@ -1,15 +1,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <set>
 #include <string>
 
 #include <ist/error.h>
 
+#include "robot/group_states.h"
 #include "robot/kinematics.h"
 #include "robot/robot_model.h"
 #include "robot/self_collision.h"
+#include "support/temp_file.h"
 
 // Joints, and what a planner is told about links that touch each other.
 
@@ -116,67 +119,154 @@ struct Chain {
   std::vector<LinkSpheres> spheres;
 };
 
-Chain chain(double radius, double protrusion) {
+Chain chain(double radius, const std::string& limits = "<limit lower='-3' upper='3'/>") {
   Chain out;
   const std::vector<std::string> names = {"a", "b", "c", "d"};
   std::string joints;
   for (std::size_t i = 1; i < names.size(); ++i)
     joints += joint("j" + names[i], "revolute", names[i - 1], names[i],
-                    at(1, 0, 0) + "<axis xyz='0 0 1'/><limit lower='-3' upper='3'/>");
+                    at(1, 0, 0) + "<axis xyz='0 0 1'/>" + limits);
   out.robot = robot_of(links(names) + joints);
   for (const std::string& name : names)
-    out.spheres.push_back(
-        {name, {{Vector3d(0.25, 0, 0), radius}, {Vector3d(0.75, 0, 0), radius}}, protrusion});
+    out.spheres.push_back({name, {{Vector3d(0.25, 0, 0), radius}, {Vector3d(0.75, 0, 0), radius}}});
   return out;
+}
+
+/// Solids that are balls of that radius in the spheres' middles.
+LinksOverlap balls(const std::vector<LinkSpheres>& links, double radius) {
+  return [links, radius](std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) {
+    for (const CoverSphere& p : links[a].spheres)
+      for (const CoverSphere& q : links[b].spheres)
+        if ((p.centre - b_in_a * q.centre).norm() < 2 * radius) return true;
+    return false;
+  };
+}
+
+std::vector<std::string> names_of(const std::vector<LinkSpheres>& links) {
+  std::vector<std::string> names;
+  for (const LinkSpheres& link : links) names.push_back(link.link);
+  return names;
+}
+
+SelfCollision study(const RobotModel& robot, const std::vector<LinkSpheres>& links, double solids,
+                    const WantedPose& wanted = {}) {
+  return SelfCollisionStudy(robot, names_of(links), balls(links, solids), wanted).of(links, true);
 }
 
 std::set<std::string> ignored_of(const SelfCollision& self) {
   std::set<std::string> out;
-  for (const IgnoredPair& pair : self.ignored) out.insert(pair.a + pair.b + " " + pair.reason);
+  for (const LinkPair& pair : self.pairs)
+    if (!pair.ignored.empty()) out.insert(pair.a + pair.b + " " + pair.ignored);
   return out;
 }
 
-TEST(SelfCollision, IgnoresNeighboursAndWhatAlwaysTouches) {
-  const Chain thin = chain(0.2, 0.01);
-  const SelfCollision self = self_collision(thin.robot, thin.spheres);
+TEST(SelfCollision, IgnoresNeighboursAndPairsWhoseSolidsNeverOrAlwaysOverlap) {
+  const Chain thin = chain(0.2);
+  const SelfCollision self = study(thin.robot, thin.spheres, 0.15);
   EXPECT_EQ(ignored_of(self), (std::set<std::string>{"ab Adjacent", "bc Adjacent", "cd Adjacent"}));
-  EXPECT_TRUE(self.buffers.empty());
-  EXPECT_EQ(self.pairs, 6u);
+  EXPECT_EQ(self.pairs.size(), 6u);
   EXPECT_GE(self.samples, 1000u);
+  EXPECT_EQ(self.missed, 0u);
+  EXPECT_GT(self.colliding, 0u);
+  EXPECT_GT(self.falsely, 0u);
 
   // The second link has no spheres: its neighbours become neighbours.
   const std::vector<LinkSpheres> without = {thin.spheres[0], thin.spheres[2], thin.spheres[3]};
-  EXPECT_EQ(ignored_of(self_collision(thin.robot, without)),
+  EXPECT_EQ(ignored_of(study(thin.robot, without, 0.15)),
             (std::set<std::string>{"ac Adjacent", "cd Adjacent"}));
 
-  // Balls so large that links two apart overlap at any angle.
-  const Chain fat = chain(0.95, 0.01);
-  const auto ignored = ignored_of(self_collision(fat.robot, fat.spheres));
-  EXPECT_TRUE(ignored.contains("ac Always")) << ignored.size();
-  EXPECT_TRUE(ignored.contains("bd Always")) << ignored.size();
+  // Spheres so large that links two apart overlap at any angle, around solids that never do.
+  const Chain fat = chain(0.95, "<limit lower='-1' upper='1'/>");
+  for (const LinkPair& pair : study(fat.robot, fat.spheres, 0.05).pairs)
+    if (pair.a == "a" && pair.b == "c") {
+      EXPECT_EQ(pair.ignored, "Never");
+      EXPECT_GE(pair.tried, 10000u);
+    }
+  // The same around solids that always do.
+  EXPECT_TRUE(ignored_of(study(fat.robot, fat.spheres, 0.9)).contains("ac Always"));
 }
 
-/// Balls of `a` and `c` turn about one axis; they are nearest, 1.5 apart, in the default pose.
-SelfCollision turning_balls(double protrusion) {
-  const std::string limits = "<axis xyz='0 0 1'/><limit lower='-3' upper='3'/>";
-  const RobotModel robot =
-      robot_of(links({"a", "b", "c"}) + joint("j", "revolute", "a", "b", limits) +
-               joint("k", "revolute", "b", "c", limits));
-  const std::vector<LinkSpheres> spheres = {{"a", {{{1, 0, 0}, 0.8}}, protrusion},
-                                            {"b", {{{0, 0, 5}, 0.1}}, protrusion},
-                                            {"c", {{{2.5, 0, 0}, 0.8}}, 2 * protrusion}};
-  return self_collision(robot, spheres);
+TEST(SelfCollision, NoPairIsIgnoredThatOverlapsInAFewPoses) {
+  // The ends meet only where all three joints are folded almost wholly.
+  const Chain rare = chain(0.4, "<limit lower='-3.14' upper='3.14'/>");
+  const SelfCollision self = study(rare.robot, rare.spheres, 0.02);
+  EXPECT_EQ(self.missed, 0u);
+  for (const LinkPair& pair : self.pairs)
+    if (pair.ignored != "Adjacent") {
+      EXPECT_EQ(pair.ignored, "") << pair.a << pair.b;
+    }
 }
 
-TEST(SelfCollision, PartsTheDefaultPoseByBuffersUpToTheProtrusion) {
-  EXPECT_EQ(ignored_of(turning_balls(0.01)),
-            (std::set<std::string>{"ab Adjacent", "bc Adjacent", "ac Default"}));
-  const SelfCollision self = turning_balls(0.06);
-  EXPECT_EQ(ignored_of(self), (std::set<std::string>{"ab Adjacent", "bc Adjacent"}));
-  ASSERT_EQ(self.buffers.size(), 2u);
-  EXPECT_NEAR(self.buffers.at("a"), -0.1 / 3, 1e-6);
-  EXPECT_NEAR(self.buffers.at("c"), -0.2 / 3, 1e-6);
-  EXPECT_LT(0.8 + self.buffers.at("a") + 0.8 + self.buffers.at("c"), 1.5);
+/// Balls of `a` and `c` turn about one axis and overlap where they are nearest, at 0.
+struct Turning {
+  RobotModel robot;
+  std::vector<LinkSpheres> links;
+};
+
+Turning turning() {
+  const std::string limits = "<axis xyz='0 0 1'/><limit lower='-1' upper='3'/>";
+  return {robot_of(ist::testing::links({"a", "b", "c"}) + joint("j", "revolute", "a", "b", limits) +
+                   joint("k", "revolute", "b", "c", limits)),
+          {{"a", {{{1, 0, 0}, 0.5}}}, {"b", {{{0, 0, 5}, 0.1}}}, {"c", {{{1.2, 0, 0}, 0.5}}}}};
+}
+
+TEST(SelfCollision, TheDefaultPoseIsFree) {
+  const Turning robot = turning();
+  SelfCollision self = study(robot.robot, robot.links, 0.45);
+  EXPECT_EQ(self.pose.from, "middle");
+  EXPECT_EQ(self.pose.positions, (Positions{1, 1}));
+  EXPECT_TRUE(self.pose.solids_free && self.pose.overlapping.empty());
+
+  WantedPose wanted;
+  wanted.positions[0] = 2;
+  self = study(robot.robot, robot.links, 0.45, wanted);
+  EXPECT_EQ(self.pose.from, "given");
+  EXPECT_EQ(self.pose.positions, (Positions{2, 0}));
+
+  // What is given is kept, and the rest searched: they overlap with the other at 0 or the middle.
+  wanted.positions[0] = -0.8;
+  self = study(robot.robot, robot.links, 0.45, wanted);
+  EXPECT_EQ(self.pose.from, "search");
+  EXPECT_EQ(self.pose.positions[0], -0.8);
+  EXPECT_TRUE(self.pose.solids_free);
+
+  wanted.states = {{"folded", {0, 0}}, {"ready", {0, 2.5}}};
+  wanted.positions.clear();
+  EXPECT_EQ(study(robot.robot, robot.links, 0.45, wanted).pose.from, "ready");
+
+  // Nothing is free: that is told.
+  wanted.states.clear();
+  wanted.positions = {{0, 0}, {1, 0}};
+  self = study(robot.robot, robot.links, 0.45, wanted);
+  EXPECT_FALSE(self.pose.solids_free);
+  EXPECT_EQ(self.pose.overlapping.size(), 1u);
+}
+
+TEST(SelfCollision, GrippersAreLockedOpen) {
+  const RobotModel robot = robot_of(
+      links({"base", "arm", "hand", "left", "right"}) + joint("j1", "revolute", "base", "arm") +
+      joint("j2", "revolute", "arm", "hand", at(1, 0, 0) + "<limit lower='-1' upper='1'/>") +
+      joint("l", "prismatic", "hand", "left",
+            at(0, 0.01, 0) + "<axis xyz='0 1 0'/><limit lower='0' upper='0.04'/>") +
+      joint("r", "prismatic", "hand", "right",
+            at(0, -0.01, 0) + "<axis xyz='0 -1 0'/><limit lower='0' upper='0.04'/>"
+                              "<mimic joint='l'/>"));
+  std::vector<LinkSpheres> spheres;
+  for (const RobotLink& link : robot.links) spheres.push_back({link.name, {{{0.1, 0, 0}, 0.005}}});
+  const SelfCollision self = study(robot, spheres, 0.004);
+  EXPECT_EQ(self.locked, (std::map<std::size_t, double>{{2, 0.04}}));
+  EXPECT_EQ(self.pose.positions[2], 0.04);
+}
+
+TEST(GroupStates, AreReadFromAnSrdf) {
+  const Turning robot = turning();
+  const TempFile file("r.srdf",
+                      "<robot name='r'><group_state name='up' group='g'><joint name='k' "
+                      "value='0.5'/><joint name='none' value='1'/></group_state></robot>");
+  const auto states = group_states(robot.robot, file.path());
+  ASSERT_EQ(states.size(), 1u);
+  EXPECT_EQ(states[0].first, "up");
+  EXPECT_EQ(states[0].second, (Positions{0, 0.5}));
 }
 
 }  // namespace

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <filesystem>
+#include <regex>
 #include <string>
 
 #include <ist/error.h>
@@ -107,6 +110,41 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
   EXPECT_EQ(make_solid(closed)->bounds().min().x(), 3);
 }
 
+/// What public robots hold.
+TEST(RobotModel, UnusedFaultsAndUnusualNames) {
+  const RobotModel robot = model_of(
+      "<robot name='r'><link name='a'><visual><geometry><box size='0 0 0'/></geometry></visual>"
+      "<collision><geometry><capsule radius='1' "
+      "length='4'/></geometry></collision></link></robot>");
+  EXPECT_NE(std::get<LinkFault>(robot.links[0].visual[0].shape).what.find("must be above 0"),
+            std::string::npos);
+  EXPECT_EQ(std::get<LinkCapsule>(robot.links[0].collision[0].shape).half_height, 2);
+
+  const TempFile mesh("a b.obj", kTetrahedron);
+  const std::filesystem::path path = mesh.path(), folder = path.parent_path();
+  const std::string package = folder.filename().string(), file = path.filename().string(),
+                    coded = std::regex_replace(file, std::regex(" "), "%20");
+  const PackagePaths here(folder / "r.urdf", {}, "");
+  EXPECT_EQ(here.find(coded), mesh.path());
+  EXPECT_EQ(here.find("package:///" + package + "/" + coded), mesh.path());
+  EXPECT_EQ(here.find("model://" + package + "/" + file), mesh.path());
+  EXPECT_THROW(here.find("no%2"), Error);
+}
+
+TEST(RobotModel, ACapsulesMeshHoldsIt) {
+  PlacedShape placed;
+  placed.shape = LinkCapsule{2, 3};
+  const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
+  const auto solid = make_solid(close_mesh(shape.mesh, "capsule"));
+  for (int i = 0; i < 1000; ++i) {
+    const double z = 0.002 * i - 1, r = std::sqrt(1 - z * z), a = 2.4 * i;
+    const Eigen::Vector3d x(2 * r * std::cos(a), 2 * r * std::sin(a), 2 * z + (z < 0 ? -3 : 3));
+    EXPECT_GE(solid->signed_distance(x), -1e-12);
+    EXPECT_LE(solid->signed_distance(x), shape.slack);
+  }
+  EXPECT_LT(shape.slack, 0.01);
+}
+
 TEST(RobotModel, ACylindersMeshHoldsIt) {
   PlacedShape placed;
   placed.shape = LinkCylinder{2, 3};
@@ -128,6 +166,19 @@ TEST(SphereFiles, UrdfKeepsAllButItsCollisions) {
             "<robot name='r'>\n  <link name='a'>\n    <inertial/>\n    <collision "
             "name=\"a_sphere_0\"><origin xyz=\"1 2 3\" rpy=\"0 0 0\"/><geometry><sphere "
             "radius=\"0.25\"/></geometry></collision>\n  </link>\n  <!-- kept -->\n</robot>\n");
+}
+
+TEST(SphereFiles, RelativeMeshesAreFoundFromAnotherFolder) {
+  const std::string text =
+      "<robot name='r'><link name='a'><visual><geometry><mesh filename='../m/x.stl'/></geometry>"
+      "</visual><collision><geometry><mesh filename='../m/x.stl'/></geometry></collision></link>"
+      "</robot>";
+  const RobotModel robot = read_robot(SourceFile{"/robots/u/r.urdf", text});
+  const std::vector<LinkSpheres> spheres = {{"a", {{{1, 2, 3}, 0.25}}}};
+  EXPECT_NE(urdf_with_spheres(robot, spheres, "/out").find("filename='../robots/m/x.stl'"),
+            std::string::npos);
+  EXPECT_NE(urdf_with_spheres(robot, spheres, "/robots/u").find("filename='../m/x.stl'"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ist/asset.h>
+#include <ist/cover_spheres.h>
+#include <ist/query.h>
+
+namespace ist {
+
+/// The solids of a robot's links, to tell exactly whether two of them overlap.
+class LinkSolids {
+ public:
+  LinkSolids();
+  ~LinkSolids();
+
+  /// Adds a link: its closed mesh, if it has one, and spheres of its description. Returns why no
+  /// exact query can be asked of it; "" if one can.
+  std::string add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres);
+
+  /// By links in the order they were added: whether they share a volume above 0. True where a link
+  /// has no exact solid. Thread-safe.
+  bool overlap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const;
+
+ private:
+  struct Workspaces;
+  std::vector<std::unique_ptr<const Asset>> assets_;  ///< null: there is no exact solid
+  std::unique_ptr<Workspaces> workspaces_;
+};
+
+}  // namespace ist

@@ -1,0 +1,115 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <string>
+
+#include <ist/error.h>
+
+#include "robot/kinematics.h"
+#include "robot/robot_model.h"
+#include "support/temp_file.h"
+
+// Robots of MuJoCo.
+
+namespace ist::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+RobotModel mjcf(const std::string& inside) {
+  return read_robot(SourceFile{"m.xml", "<mujoco model='m'>" + inside + "</mujoco>"});
+}
+
+std::string mjcf_error(const std::string& inside) {
+  try {
+    mjcf(inside);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(Mjcf, BodiesJointsAndGeoms) {
+  const RobotModel robot = mjcf(R"(
+    <compiler meshdir='assets'/>
+    <default><geom contype='0' conaffinity='0'/>
+      <default class='solid'><geom contype='1' conaffinity='1' size='0.1'/>
+        <joint axis='0 1 0' range='-90 45'/></default></default>
+    <asset><mesh file='hand.stl' scale='2 2 2'/></asset>
+    <worldbody><geom type='plane' size='1 1 1'/>
+      <body name='a' pos='0 0 1' childclass='solid'>
+        <freejoint/>
+        <geom/><geom class='main' type='box' size='1 2 3'/>
+        <body name='b' pos='1 0 0' euler='0 0 90'>
+          <joint name='j' pos='0 0 0.5'/><joint name='s' type='slide' range='0 0.3'/>
+          <geom type='capsule' fromto='0 0 0 0 0 2'/>
+          <geom type='mesh' mesh='hand'/>
+          <geom type='ellipsoid' size='1 2 3'/>
+        </body>
+      </body>
+    </worldbody>
+    <contact><exclude body1='a' body2='b'/></contact>)");
+  ASSERT_EQ(robot.links.size(), 4u);  // world, a, and two for b
+  EXPECT_EQ(robot.links[0].name, "world");
+  EXPECT_TRUE(robot.links[0].collision.empty());
+  EXPECT_EQ(robot.links[1].collision.size(), 1u);
+  EXPECT_EQ(std::get<LinkBall>(robot.links[1].collision[0].shape).radius, 0.1);
+  // The class at the top is called main.
+  ASSERT_EQ(robot.links[1].visual.size(), 1u);
+  EXPECT_EQ(std::get<LinkBox>(robot.links[1].visual[0].shape).half_extents, Vector3d(1, 2, 3));
+  const RobotLink& b = robot.links.back();
+  EXPECT_EQ(b.name, "b");
+  ASSERT_EQ(b.collision.size(), 3u);
+  const auto& capsule = std::get<LinkCapsule>(b.collision[0].shape);
+  EXPECT_EQ(capsule.half_height, 1);
+  EXPECT_EQ(b.collision[0].translation, Vector3d(0, 0, 1));
+  EXPECT_EQ(std::get<LinkMesh>(b.collision[1].shape).file, "assets/hand.stl");
+  EXPECT_EQ(std::get<LinkMesh>(b.collision[1].shape).scale, Vector3d(2, 2, 2));
+  EXPECT_NE(std::get<LinkFault>(b.collision[2].shape).what.find("m.xml: line"), std::string::npos);
+  EXPECT_EQ(robot.excluded.size(), 1u);
+
+  // The hinge turns about y through (0, 0, 0.5) of b, whose frame is turned by 90 degrees.
+  ASSERT_EQ(robot.joints.size(), 3u);
+  EXPECT_NEAR(robot.joints[1].lower, -std::numbers::pi / 2, 1e-12);
+  Positions positions(3, 0.0);
+  EXPECT_TRUE(link_frames(robot, positions)[3].translation().isApprox(Vector3d(1, 0, 1)));
+  positions[1] = std::numbers::pi / 4;
+  const double s = 0.5 * std::sqrt(0.5);
+  // In b: (0, 0, 0.5) + R_y(45°) (0, 0, −0.5) = (−s, 0, 0.5 − s); b's x is the world's y.
+  EXPECT_TRUE(link_frames(robot, positions)[3].translation().isApprox(Vector3d(1, -s, 1.5 - s)));
+}
+
+TEST(Mjcf, IncludesAndEqualities) {
+  const TempFile inner("inner.xml",
+                       "<mujocoinclude><body name='f'><joint name='l' type='slide' axis='0 1 0' "
+                       "range='0 1'/><geom size='1'/></body></mujocoinclude>");
+  const RobotModel robot = read_robot(SourceFile{
+      std::filesystem::path(inner.path()).parent_path() / "m.xml",
+      "<mujoco><worldbody><body name='h'><include file='" +
+          std::filesystem::path(inner.path()).filename().string() +
+          "'/><body name='g'><joint name='r' type='slide' axis='0 1 0' range='0 1'/>"
+          "<geom size='1'/></body></body></worldbody><equality><joint joint1='r' joint2='l' "
+          "polycoef='0.5 -1 0 0 0'/></equality></mujoco>"});
+  ASSERT_EQ(robot.links.size(), 4u);
+  EXPECT_FALSE(robot.joints[2].is_free());
+  EXPECT_EQ(link_frames(robot, {0, 0.25, 0})[3].translation(), Vector3d(0, 0.25, 0));
+}
+
+TEST(Mjcf, SaysWhatIsWrongAndWhere) {
+  const auto expect = [](const std::string& inside, const std::string& message) {
+    EXPECT_NE(mjcf_error(inside).find(message), std::string::npos) << mjcf_error(inside);
+  };
+  expect("<worldbody>\n<body><joint type='screw'/></body></worldbody>",
+         "m.xml: line 2: <joint>: its type \"screw\" is unknown");
+  expect("<worldbody><body><joint range='2 1'/></body></worldbody>", "the smaller first");
+  expect("<worldbody><body name='a'/><body name='a'/></worldbody>", "duplicates the body");
+  expect("<worldbody><body quat='0 0 0 0'/></worldbody>", "not all 0");
+  expect("<worldbody><geom class='none'/></worldbody>", "its class \"none\" is not defined");
+  expect("<worldbody><frame/></worldbody>", "mj_saveLastXML");
+  expect("<contact><exclude body1='a' body2='b'/></contact>", "\"a\" is not a body");
+}
+
+}  // namespace
+}  // namespace ist::testing
