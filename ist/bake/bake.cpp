@@ -137,7 +137,7 @@ void describe_mass(const MeshMoments& moments, AssetHeader& header) {
   header.volume_error = moments.volume_error;
   for (int k = 0; k < 3; ++k) {
     header.centre_of_mass[k] = moments.centre[k];
-    header.inertia[k] = moments.inertia(k, k);
+    header.inertia[k] = std::max(0.0, moments.inertia(k, k));  // of a needle about its own axis
     header.inertia[3 + k] = k < 2 ? moments.inertia(0, 1 + k) : moments.inertia(1, 2);
   }
   header.centre_of_mass_error = moments.centre_error;

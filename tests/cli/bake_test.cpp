@@ -117,8 +117,8 @@ TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {
   EXPECT_LT(enough, 40'000);
   EXPECT_NE(ist({"info", "plate.ist"}).out.find("spheres are enough"), std::string::npos);
   // Thinner walls than any number of spheres fills are told of too.
-  const Outcome hopeless = ist({"bake", "plate.obj", "-o", "plate.ist", "--spheres", "200",
-                                "--scale", "1,1,0.001"});
+  const Outcome hopeless =
+      ist({"bake", "plate.obj", "-o", "plate.ist", "--spheres", "200", "--scale", "1,1,0.001"});
   EXPECT_NE(hopeless.err.find("too coarse for thin parts"), std::string::npos) << hopeless.err;
   EXPECT_NE(hopeless.err.find("no number of spheres is enough"), std::string::npos);
 }
