@@ -418,6 +418,18 @@ def thread():
 TRUTH = 34.7409603139359  # of nut and bolt at z = 8.5
 
 
+def test_exact_tells_what_touches(cube):
+    side = cube.bounds().upper[0] - cube.bounds().lower[0]
+    poses = np.tile([1.0, 0, 0, 0, 0, 0, 0], (5, 1))
+    poses[:, 4:] = side * np.array([[0.5, 0, 1], [1, 0, 1], [0, 0, 1 + 1e-9], [0, 0, 1 - 1e-9], [0, 0, 0]])
+    found = ist.penetration(cube, cube, poses, measure="exact")
+    assert found.touching.dtype == bool and found.touching.tolist() == [True, True, False, False, False]
+    assert (found.volume[:3] == 0).all() and (found.volume[3:] > 0).all()
+    assert found.contact_area == pytest.approx([0.5 * side**2, 0, 0, 0, 0])
+    assert found.contact_normal[0] == pytest.approx([0, 0, 1]) and not found.contact_normal[1:].any()
+    assert not ist.penetration(cube, cube, poses).touching.any()  # spheres cannot tell
+
+
 def test_exact_is_the_true_volume(thread):
     bolt, nut = thread
     found = ist.penetration(bolt, nut, [1, 0, 0, 0, 0, 0, 8.5], measure="exact")
