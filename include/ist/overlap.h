@@ -25,8 +25,8 @@ Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& works
 ///
 /// If both assets keep a mesh, `unknown` is left only where the distance is the margin to rounding
 /// and the meshes' errors. Otherwise inner spheres and their covers decide, as above. Takes about
-/// as long as overlap() unless the distance is near the margin. A margin that is negative, or NaN:
-/// unknown.
+/// as long as overlap(), or a few microseconds, unless the distance is near the margin. A margin
+/// that is negative, or NaN: unknown.
 Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
                     Workspace& workspace) noexcept;
 
