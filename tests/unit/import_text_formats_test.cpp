@@ -71,10 +71,10 @@ const std::string kOff =
 const std::string kPlyStart =
     "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
     "property float z\n";
-const std::string kPlyFaces = "element face 4\nproperty list uchar int vertex_indices\n";
+const std::string kSquareFaces = "element face 4\nproperty list uchar int vertex_indices\n";
 const std::string kPlyVertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 const std::string kPly =
-    kPlyStart + kPlyFaces + "end_header\n" + kPlyVertices + "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+    kPlyStart + kSquareFaces + "end_header\n" + kPlyVertices + "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
 
 TEST(ReadText, AnyLineEndsAndAByteOrderMark) {
   const std::pair<const char*, std::string> files[] = {
@@ -126,7 +126,7 @@ TEST(ReadText, WhatIsNotReadIsNamed) {
             std::string::npos);
   EXPECT_EQ(notes("a.ply", kPly), "");
   const std::string grid = "element range_grid 1\nproperty list uchar int vertex_indices\n";
-  EXPECT_NE(notes("a.ply", kPlyStart + kPlyFaces + grid + "end_header\n" + kPlyVertices +
+  EXPECT_NE(notes("a.ply", kPlyStart + kSquareFaces + grid + "end_header\n" + kPlyVertices +
                                "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n1 0\n")
                 .find("\"range_grid\""),
             std::string::npos);
@@ -140,7 +140,7 @@ TEST(ReadPly, StripsOfTriangles) {
       "a.ply", kPlyStart + strips + "end_header\n" + kPlyVertices + "9 0 2 1 3 -1 2 0 3 -1\n");
   EXPECT_EQ(parted.triangles.size(), 3u);
   const TriangleMesh whole =
-      load_text("a.ply", kPlyStart + kPlyFaces + strips + "end_header\n" + kPlyVertices +
+      load_text("a.ply", kPlyStart + kSquareFaces + strips + "end_header\n" + kPlyVertices +
                              "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n0\n");
   expect_tetrahedron(whole);
   EXPECT_ERROR("a.ply", kPlyStart + strips + "end_header\n" + kPlyVertices + "3 0 1 4\n",
