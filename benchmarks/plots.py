@@ -57,6 +57,27 @@ def small_large(report, path):
     save(figure, path)
 
 
+def mated(report, path):
+    """Time over the distance from the mate: a panel a mate, a curve a library. The first place of
+    the axis is the mate itself."""
+    rows = report["tables"]["Time over distance"]
+    mates = list(dict.fromkeys(row["mate"] for row in rows))
+    figure, axes = plt.subplots(1, len(mates), figsize=(4.5 * len(mates), 4), squeeze=False,
+                                sharey=True)
+    for axis, mate in zip(axes[0], mates):
+        mine = [row for row in rows if row["mate"] == mate]
+        at = range(len(mine))
+        axis.semilogy(at, [row["Manifold us"] for row in mine], "s--", color="tab:gray",
+                      label="Manifold's boolean")
+        axis.semilogy(at, [row["us"] for row in mine], "o-", color="tab:blue", label="ist, exact")
+        axis.set(title=mate, xlabel="distance from the mate", xticks=list(at)[::3],
+                 xticklabels=[f"{row['distance']:g}" for row in mine][::3])
+        axis.grid(True, which="major", alpha=0.3)
+    axes[0, 0].set_ylabel("µs")
+    axes[0, -1].legend(fontsize=8)
+    save(figure, path)
+
+
 def grids(report, path):
     """The paper's Figure 9: a column a mesh, a curve a grid; coverage above, spheres below."""
     rows = report["tables"]["Rounds"]

@@ -1,7 +1,7 @@
 // A million random and a hundred thousand degenerate poses of exact queries: signs that agree, a
 // surface that closes, bounds in order, A and B exchanged, nothing that is not a number; and a
-// million steps of random motions, with and without what is kept from step to step. `./dev soak
-// exact` runs it and writes its report.
+// million steps of random motions, with and without what is kept from step to step; and a million
+// random mates, whose volumes are known. `./dev soak exact` runs it and writes its report.
 
 #include <ist/query.h>
 
@@ -10,6 +10,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <string>
 #include <thread>
@@ -20,8 +22,10 @@
 #include "support/answer_bits.h"
 #include "support/exact_pair.h"
 #include "support/integer_meshes.h"
+#include "support/mate_checks.h"
 #include "support/test_meshes.h"
 #include "support/turns.h"
+#include "timing.h"
 
 namespace {
 
@@ -68,6 +72,46 @@ struct TestSolid {
   Asset asset;
   std::vector<Point> vertices;
 };
+
+/// Random mates, and the costliest query of each chunk.
+struct Mates {
+  testing::MateTally tally;
+  testing::MateWork work;
+};
+
+Mates ask_mates(std::size_t mates) {
+  // Thread time, the least of three.
+  const auto clocked = [](const std::function<Penetration()>& ask) {
+    double least = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 3; ++i) {
+      const double start = benchmark::thread_seconds();
+      ask();
+      least = std::min(least, benchmark::thread_seconds() - start);
+    }
+    return least;
+  };
+  constexpr std::size_t kMates = 1000;
+  std::atomic<std::size_t> next = 0;
+  std::vector<Mates> all(std::max(1u, std::thread::hardware_concurrency()));
+  std::vector<std::jthread> threads;
+  for (Mates& mine : all)
+    threads.emplace_back([&] {
+      for (std::size_t i = next++; i < mates / kMates; i = next++) {
+        testing::MateChecks checks(i + 1000, clocked);
+        for (std::size_t k = 0; k < kMates; ++k) checks.run(k % 8 == 0 ? 60 : 12);
+        mine.tally += checks.tally();
+        const testing::MateWork work = checks.work();
+        if (work.worst > mine.work.worst) mine.work = work;
+      }
+    });
+  threads.clear();
+  Mates sum;
+  for (const Mates& mine : all) {
+    sum.tally += mine.tally;
+    if (mine.work.worst > sum.work.worst) sum.work = mine.work;
+  }
+  return sum;
+}
 
 /// Small meshes of every kind: the fewer triangles the more of them cross at vertices and edges.
 std::vector<TestSolid> make_solids() {
@@ -368,6 +412,20 @@ int main(int argc, char** argv) {
   const double share = static_cast<double>(moved.kept) / static_cast<double>(moved.poses);
   report.target("motions: share that is answered by what is kept", share, 0.3);
   sound = sound && moved.unlike_kept == 0 && share > 0.3;
+  const Mates mated = ask_mates(report.quick() ? 1000 : 1'000'000);
+  report.row("Mates", {{"mates", mated.tally.mates},
+                       {"queries", mated.tally.queries},
+                       {"touching", mated.tally.touching},
+                       {"costliest query", mated.work.what}});
+  std::uint64_t wrong = 0;
+  for (const auto& [what, count] : mated.tally.wrong) {
+    report.target("mates: " + what, static_cast<double>(count), 0, true);
+    wrong += count;
+  }
+  report.target("mates: answers that are wrong in any way", static_cast<double>(wrong), 0, true);
+  report.target("mates: costliest query, in medians of like many triangles", mated.work.worst, 10,
+                true);
+  sound = sound && wrong == 0;
   report.remark(
       "25 small meshes: boxes, plates, needles, balls, a torus, a gear, and random ones of integer "
       "coordinates, some of several components and with cavities. Degenerate poses put corners on "
@@ -375,5 +433,11 @@ int main(int argc, char** argv) {
       "1e-16 to 1e-3, some turned as a whole. The gap of the overlap's surface is bounded by 2e-17 "
       "of the product of the solids' sizes for each crossing pair of triangles and a hundred "
       "more.");
+  report.remark(
+      "Mates: extruded profiles face on face, coaxial, in place, in channels, at the mate and 1e-9 "
+      "to "
+      "0.1 to both sides, as they lie or turned as a whole; volumes and areas of contact follow "
+      "from "
+      "plane geometry.");
   return report.write() != 0 || !sound ? 1 : 0;
 }
