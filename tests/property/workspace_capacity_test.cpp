@@ -132,7 +132,7 @@ TEST_F(WorkspaceCapacity, IsSmallForSmallTreesAndKnowsPosesNot) {
   // What the documentation of Workspace says of its bytes.
   for (const std::size_t capacity : {4096, 1 << 16, 1 << 20})
     EXPECT_NEAR(static_cast<double>(bytes_of(capacity)),
-                7.5e6 + 115 * static_cast<double>(capacity), 0.5e6);
+                8.5e6 + 173 * static_cast<double>(capacity), 0.5e6);
 }
 
 TEST_F(WorkspaceCapacity, RefusesWhatNoQueryTakes) {
