@@ -41,13 +41,18 @@ struct ExactInWorld {
   }
 };
 
-Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
+Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const PlacedTree& b,
+                         const RelativePose& pose) {
   const ExactInWorld sums(found.sums, found.origin, pose);
   Penetration answer;
   answer.volume = std::max(0.0, sums.volume);
   const double error = found.error * pose.unit3() + (answer.volume - sums.volume);
   answer.volume_min = std::max(0.0, answer.volume - error);
   answer.volume_max = answer.volume + error;
+  // No overlap is larger than the smaller solid.
+  const double most = std::min(volume_of(a), volume_of(b));
+  for (double* const volume : {&answer.volume, &answer.volume_min, &answer.volume_max})
+    *volume = std::min(*volume, most);
   if (answer.volume > 0) answer.centroid = sums.centroid;
   answer.translation_gradient = sums.force;
   answer.rotation_gradient = sums.torque;
@@ -162,15 +167,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (found.complete) {
-    Penetration answer = whole_answer(found, pose);
-    // What the interval allows for is no part of the smaller solid.
-    const double most = std::min(volume_of(a), volume_of(b));
-    answer.volume = std::min(answer.volume, most);
-    answer.volume_max = std::min(answer.volume_max, most);
-    answer.volume_min = std::min(answer.volume_min, most);
-    return answer;
-  }
+  if (found.complete) return whole_answer(found, a, b, pose);
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
@@ -205,7 +202,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
         [](ContactPatches& stopped) -> Penetration& { return stopped.penetration; });
     return answer;
   }
-  answer.contact.penetration = whole_answer(found, *pose);
+  answer.contact.penetration = whole_answer(found, a, b, *pose);
   answer.segments = found.crossings;
   if (!patches.empty()) {
     std::span<ExactPart> parts(scratch.parts.get(), query.divide());

@@ -177,7 +177,8 @@ class MeshGapSearch {
     if (!depth_first_) std::push_heap(waiting_, waiting_ + size_);
   }
 
-  void visit(const GapPair& pair) {
+  /// By value: what waits below it takes its place on the stack.
+  void visit(const GapPair pair) {
     if (pair.squared > squared_limit_) return;
     out_.stopped = budget_.grant(1) == 0;
     if (out_.stopped) return;
