@@ -121,8 +121,9 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     ASSERT_GE(
         ist_query(&c_a, &c_b, &c_settings, nullptr, &c_workspace_, &c_penetration, &c_separation),
         0);
-    expect_same(c_penetration, penetration(a, b, settings, workspace_));
-    expect_same(c_separation, separation(a, b, {}, workspace_));
+    const PenetrationAndSeparation asked = query(a, b, {settings, {}}, workspace_);
+    expect_same(c_penetration, asked.penetration);
+    expect_same(c_separation, asked.separation);
 
     // The surface in A's asset as a field.
     const PlacedField field{MeshField{a.tree}, a.pose, a.scale};

@@ -59,7 +59,8 @@ class ExactRational : public ::testing::Test {
   /// `b` as it lies before its pose.
   void compare(const TriangleMesh& a, const Asset& asset_a, const TriangleMesh& b,
                const Asset& asset_b, const Pose& pose, const std::string& what) {
-    ASSERT_EQ(asset_a.view().mesh_error() + asset_b.view().mesh_error(), 0) << what;
+    // Where faces of one mesh cross its points are rounded, no more.
+    ASSERT_LE(asset_a.view().mesh_error() + asset_b.view().mesh_error(), 1e-14) << what;
     const Rational truth = testing::rational_overlap(a, moved(b, pose));
     const PlacedTree placed_a{asset_a.view(), {}, 1}, placed_b{asset_b.view(), pose, 1};
     const Penetration found = testing::exactly(placed_a, placed_b, workspace_);

@@ -90,8 +90,8 @@ PackingSettings of_size(std::size_t spheres, unsigned threads) {
 Asset baked_beside(const ClosedMesh& mesh, const PackingSettings& settings, Seen& seen,
                    const ProgressCallback& progress = {}) {
   return thread_arena(settings.threads).execute([&] {
-    const MeshSolid solid(mesh);
     const Resolution as_it_is;
+    const MeshSolid solid(ResolvedMesh{mesh, as_it_is});
     SharedSurface surface(solid, as_it_is, settings.surface, settings.threads);
     TwoAtATime backend(solid, seen);
     return bake_solid(mesh, solid, surface, backend, settings, progress);

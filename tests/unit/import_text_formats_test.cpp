@@ -98,7 +98,7 @@ TEST(ReadText, AFileOfAnotherFormatIsNamedAsSuch) {
   EXPECT_ERROR("a.stl", kPly, "holds PLY");
   EXPECT_ERROR("a.stl", kObj + kObjFaces, "is text, and no STL");
   EXPECT_ERROR("a.stl", std::string("\xff\xfes\0o\0l\0i\0d\0", 12), "UTF-16");
-  EXPECT_ERROR("a.stl", std::string(100, '\1'), "or is no STL");
+  EXPECT_ERROR("a.stl", std::string(100, '\1') + '\0', "or is no STL");
   // A binary STL may say anything in its header.
   std::string binary = "glTF";
   binary.resize(80);
@@ -108,6 +108,7 @@ TEST(ReadText, AFileOfAnotherFormatIsNamedAsSuch) {
   binary.append(reinterpret_cast<const char*>(facet), 48).append(2, '\0');
   EXPECT_EQ(load_text("a.stl", binary).triangles.size(), 1u);
   EXPECT_TRUE(load_text("a.stl", binary).notes.empty());
+  binary.replace(0, 4, "free");
   const TriangleMesh more = load_text("a.stl", binary + std::string(100, '\1'));
   ASSERT_EQ(more.notes.size(), 1u);
   EXPECT_NE(more.notes[0].find("100 bytes behind the 1 triangle"), std::string::npos);

@@ -49,7 +49,7 @@ void ExactQuery::move_aside() noexcept {
   const bool first = std::abs(along) > 1e-9 ? along > 0
                                             : sides_[0].mesh.hash <= sides_[1].mesh.hash;
   const Point across = (first ? 1.0 : -1.0) * both + cross(kAcross, turned);
-  constexpr double kAside = 0x1p-46;  // of both sizes
+  constexpr double kAside = 0x1p-47;  // of both sizes
   const double far = kAside * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
   search_.aside = far * unit(centre + 0.4 * unit(across));
   search_.touch = sides_[0].moved + sides_[1].moved +
