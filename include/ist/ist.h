@@ -415,7 +415,7 @@ typedef struct ist_penetration_t {
   double contact_area;      /* [u²] IST_EXACT, touching: of the faces that lie on each other */
   double contact_normal[3]; /* unit, from A to B, world: their mean; zero if there is none */
   uint32_t node_visits, sphere_pairs; /* with IST_EXACT: crossing triangles */
-  uint32_t touching; /* IST_EXACT: 1 if they meet and the volume is 0; else 0 */
+  uint32_t touching;                  /* IST_EXACT: 1 if they meet and the volume is 0; else 0 */
 } ist_penetration_t;
 
 /* Separation: between the surfaces if both assets keep a mesh, else between the inner spheres. All

@@ -124,10 +124,10 @@ struct PlacedSolid {
 
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
 ///
-/// With Measure::exact the volume has a kink where faces are flush or copies lie in place. There the
-/// gradients are those towards one side, the same for (A, B) and (B, A): where B moves away from A
-/// along the line of the middles of their bounding boxes, and somewhat across. Of copies of one
-/// asset about one middle it is a side that is fixed in A's frame.
+/// With Measure::exact the volume has a kink where faces are flush or copies lie in place. There
+/// the gradients are those towards one side, the same for (A, B) and (B, A): where B moves away
+/// from A along the line of the middles of their bounding boxes, and somewhat across. Of copies of
+/// one asset about one middle it is a side that is fixed in A's frame.
 struct Penetration {
   double volume = 0;  ///< [u³] in the chosen measure
   /// [u³] With Measure::exact: bounds of the true volume. By spheres: the interval of the finished
@@ -219,9 +219,9 @@ class Workspace {
 /// and takes some 0.3 s for 16,000 spheres.
 ///
 /// It does not cover Measure::exact and time_of_impact(). A capacity c lets penetration() by the
-/// exact measure open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh that
-/// cross the other: copies in place need most. Patches and outlines hold all crossings at once,
-/// c / 16 + 128. The mesh must have no more than c blocks.
+/// exact measure open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh
+/// that cross the other: copies in place need most. Patches and outlines hold all crossings at
+/// once, c / 16 + 128. The mesh must have no more than c blocks.
 ///
 /// Throws Error for an empty asset, a scale out of range, or two fields.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);

@@ -289,7 +289,7 @@ std::string answers_csv(std::span<const Answer> answers) {
       fmt::format_to(std::back_inserter(out), ",{:.17g}", value);
     fmt::format_to(std::back_inserter(out), ",{},{},{},{:.17g},{}", name_of(answer.status()),
                    answer.node_visits(), answer.sphere_pairs(), answer.time_us,
-                   !answer.exact                         ? "nan"
+                   !answer.exact                        ? "nan"
                    : answer.result.penetration.touching ? "1"
                                                         : "0");
     for (const auto& [name, value] : contact_numbers(answer))

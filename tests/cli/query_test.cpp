@@ -145,8 +145,8 @@ TEST_F(QueryCommand, DistancesEndAtTheLargestThatMatters) {
   EXPECT_TRUE(std::isinf(farther[distance_max]));
   const std::vector<double> near = row("1,0,0,0,3,0,0", {"--max-distance", "2.5"});
   EXPECT_EQ(near[distance], row("1,0,0,0,3,0,0")[distance]);
-  const Outcome text = ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,3,0,0",
-                            "--max-distance", "0.25"});
+  const Outcome text =
+      ist({"query", "cube.ist", "cube.ist", "--pose", "1,0,0,0,3,0,0", "--max-distance", "0.25"});
   EXPECT_NE(text.out.find("> 0.25 u"), std::string::npos) << text.out;
   expect_exit(2, {"cube.ist", "cube.ist", "--pose", "1,0,0,0,3,0,0", "--max-distance", "-1"},
               "--max-distance");

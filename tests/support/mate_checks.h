@@ -146,7 +146,8 @@ class MateChecks {
     need(p.volume_min <= truth.volume + room && truth.volume - room <= p.volume_max,
          "intervals that miss the volume");
     need(std::abs(p.volume - q.volume) <= room, "volumes that change when A and B are exchanged");
-    // Where turns round the places of faces, a face along the side that is taken may lie either way.
+    // Where turns round the places of faces, a face along the side that is taken may lie either
+    // way.
     if (apart_everywhere(t) && turns_exactly())
       need((p.translation_gradient + q.translation_gradient).norm() <= 1e-11 * faces,
            "gradients that change when A and B are exchanged");

@@ -73,8 +73,8 @@ const std::string kPlyStart =
     "property float z\n";
 const std::string kSquareFaces = "element face 4\nproperty list uchar int vertex_indices\n";
 const std::string kPlyVertices = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
-const std::string kPly =
-    kPlyStart + kSquareFaces + "end_header\n" + kPlyVertices + "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
+const std::string kPly = kPlyStart + kSquareFaces + "end_header\n" + kPlyVertices +
+                         "3 0 2 1\n3 0 1 3\n3 1 2 3\n3 0 3 2\n";
 
 TEST(ReadText, AnyLineEndsAndAByteOrderMark) {
   const std::pair<const char*, std::string> files[] = {

@@ -43,10 +43,9 @@ IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bo
             .sign;
   if (sign[0] == sign[1]) return 0;
   for (int k = 0; k < 3; ++k)
-    way[k] =
-        (of_b ? way_round(t[k], t[(k + 1) % 3], p, q, aside)
-              : way_round(p, q, t[k], t[(k + 1) % 3], aside))
-            .sign;
+    way[k] = (of_b ? way_round(t[k], t[(k + 1) % 3], p, q, aside)
+                   : way_round(p, q, t[k], t[(k + 1) % 3], aside))
+                 .sign;
   return way[0] == way[1] && way[1] == way[2] ? direction(sign[0]) : 0;
 }
 

@@ -78,28 +78,32 @@ class TriangleSearch {
       }
       pairs.count = 0;
     };
-    visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
-                                std::uint32_t lanes) {
-      Meeting now(*this, number_a, number_b);
-      for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
-        const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
-        if (dot(now.normal(false, i), now.normal(true, j)) >= 0) continue;
-        put_pair(kWidth * number_a + i, *now.vertices[0], kWidth * number_b + j, *now.vertices[1]);
-        if (pairs.count == 8) add_areas();
-      }
-      return false;
-    });
+    visit_near(
+        count, kept,
+        [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b, std::uint32_t lanes) {
+          Meeting now(*this, number_a, number_b);
+          for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
+            const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
+            if (dot(now.normal(false, i), now.normal(true, j)) >= 0) continue;
+            put_pair(kWidth * number_a + i, *now.vertices[0], kWidth * number_b + j,
+                     *now.vertices[1]);
+            if (pairs.count == 8) add_areas();
+          }
+          return false;
+        });
     add_areas();
     out.touching = out.area > 0;
     if (!out.touching)  // in a point or an edge, if at all
-      visit_near(count, kept, [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
-                                  std::uint32_t lanes) {
-        for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
-          out.touching = exact::come_within(
-              search_.touch, corners(false, number_a, i).of,
-              corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
-        return out.touching;
-      });
+      visit_near(
+          count, kept,
+          [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
+              std::uint32_t lanes) {
+            for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
+              out.touching = exact::come_within(
+                  search_.touch, corners(false, number_a, i).of,
+                  corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
+            return out.touching;
+          });
     return out;
   }
 
@@ -303,7 +307,7 @@ class TriangleSearch {
     std::uint32_t number_[2];
     Margin margin_;
     double by_;
-    float apart_ = 0;               ///< no coordinates of both blocks differ by more
+    float apart_ = 0;                ///< no coordinates of both blocks differ by more
     std::uint32_t columns_[kWidth];  ///< A's triangles that B's plane keeps apart, a bit each
     std::uint32_t known_ = 0;
   };
@@ -352,10 +356,10 @@ class TriangleSearch {
   /// Heights of eight pairs, and what their signs say: a bit each.
   struct alignas(64) Heights {
     double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-    double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
-    std::uint32_t positive[2][3] = {};      ///< with B moved aside
-    std::uint32_t certain[2][3] = {};       ///< in double
-    std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
+    double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
+    std::uint32_t positive[2][3] = {};  ///< with B moved aside
+    std::uint32_t certain[2][3] = {};   ///< in double
+    std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
 
     /// Pairs that a plane keeps apart.
     std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
@@ -375,9 +379,8 @@ class TriangleSearch {
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
       HWY_UNROLL(2)
-      for (int s = 0; s < 2; ++s)
-        HWY_UNROLL(3)
-        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      for (int s = 0; s < 2; ++s) HWY_UNROLL(3)
+      for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       HWY_UNROLL(2)
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
@@ -478,8 +481,8 @@ class TriangleSearch {
     if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
   }
 
-  /// Pairs that are further apart than `reach` along the plane of one of them, as those in one plane
-  /// may be.
+  /// Pairs that are further apart than `reach` along the plane of one of them, as those in one
+  /// plane may be.
   HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
     const D d;
@@ -544,9 +547,8 @@ class TriangleSearch {
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3], edge_b[3];
       HWY_UNROLL(2)
-      for (int s = 0; s < 2; ++s)
-        HWY_UNROLL(3)
-        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      for (int s = 0; s < 2; ++s) HWY_UNROLL(3)
+      for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       V size_b[3];
       HWY_UNROLL(3)
       for (int j = 0; j < 3; ++j) {
@@ -586,8 +588,8 @@ class TriangleSearch {
         parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
     std::uint32_t settled = 0;
     if constexpr (kAsks) {
-      settled = each(heights.settled[0]) & each(heights.settled[1]) &
-                round.decided(parts, round.settled);
+      settled =
+          each(heights.settled[0]) & each(heights.settled[1]) & round.decided(parts, round.settled);
       for (std::uint32_t left = asks & all & ~settled; left != 0; left &= left - 1)
         note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
     }
@@ -781,8 +783,8 @@ HWY_EXPORT(search_kept);
 HWY_EXPORT(search_contact);
 HWY_EXPORT(place_one);
 
-CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
-                              std::uint32_t next, std::uint32_t count, KeptPairs* keep,
+CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first, std::uint32_t next,
+                              std::uint32_t count, KeptPairs* keep,
                               ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_triangles)(search, first, next, count, keep, scratch);
 }

@@ -32,10 +32,10 @@ double ExactQuery::nearness() const noexcept {
 
 /// Signs are those of B moved by far more than what rounds the meshes' places, and by far less than
 /// what the interval allows for anyway: then faces that are flush, and copies in place, have clear
-/// signs. It goes away from A's middle, since flush parts separate so, and somewhat across, since no
-/// direction of a part is like it. What A and B see of each other is opposite if they change places:
-/// the first and the last term are, and the sign of the other is by the middles, or where these do
-/// not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
+/// signs. It goes away from A's middle, since flush parts separate so, and somewhat across, since
+/// no direction of a part is like it. What A and B see of each other is opposite if they change
+/// places: the first and the last term are, and the sign of the other is by the middles, or where
+/// these do not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
 void ExactQuery::move_aside() noexcept {
   const auto unit = [](const Point& x) {
     const double length = std::sqrt(dot(x, x));
@@ -46,15 +46,16 @@ void ExactQuery::move_aside() noexcept {
   const Point turned = 1 / a_from_b_.scale * map_vector(a_from_b_, kAcross);
   const Point both = kAcross + turned;
   const double along = dot(centre, both);
-  const bool first = std::abs(along) > 1e-9 ? along > 0
-                                            : sides_[0].mesh.hash <= sides_[1].mesh.hash;
+  const bool first =
+      std::abs(along) > 1e-9 ? along > 0 : sides_[0].mesh.hash <= sides_[1].mesh.hash;
   const Point across = (first ? 1.0 : -1.0) * both + cross(kAcross, turned);
   constexpr double kAside = 0x1p-47;  // of both sizes
   const double far = kAside * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
   search_.aside = far * unit(centre + 0.4 * unit(across));
   search_.touch = sides_[0].moved + sides_[1].moved +
-                  4 * kHalfUnit * (sides_[0].mesh.extent() +
-                                   a_from_b_.scale * sides_[1].mesh.extent() + length_bound(middle));
+                  4 * kHalfUnit *
+                      (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent() +
+                       length_bound(middle));
   sides_[1].moved += far;
 }
 

@@ -31,8 +31,8 @@ struct MeshOfPair {
 };
 
 /// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
-/// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one way
-/// or the other.
+/// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one
+/// way or the other.
 bool is_inside(const MeshOfPair& solid, const exact::Point& p,
                const exact::Point& aside = {0, 0, 0}) noexcept;
 

@@ -112,7 +112,8 @@ inline bool come_within(double distance, const Point (&a)[3], const Point (&b)[3
   return best.squared < distance * distance;
 }
 
-/// What two triangles that lie in one plane have in common. `normal`: of A's, as FlatTriangle has it.
+/// What two triangles that lie in one plane have in common. `normal`: of A's, as FlatTriangle has
+/// it.
 inline double common_area(const Point (&a)[3], const Point& normal, const Point (&b)[3]) noexcept {
   const double n[3] = {std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)};
   const std::size_t main = n[0] > n[1] ? (n[0] > n[2] ? 0 : 2) : n[1] > n[2] ? 1 : 2;

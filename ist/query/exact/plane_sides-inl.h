@@ -75,12 +75,12 @@ struct PlaneSides {
   std::uint32_t above = 0, below = 0;
 };
 
-/// Of vertices of the other solid, seen from the plane of triangle t of a block; above and below what
-/// lies between `low` and `high`. `aside`: what they move by. `apart`: no coordinates of both blocks
-/// differ by more.
+/// Of vertices of the other solid, seen from the plane of triangle t of a block; above and below
+/// what lies between `low` and `high`. `aside`: what they move by. `apart`: no coordinates of both
+/// blocks differ by more.
 HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlanes& planes,
-                               std::uint32_t t, double low, double high,
-                               const exact::Point& aside, double apart, Margin margin, double by) {
+                               std::uint32_t t, double low, double high, const exact::Point& aside,
+                               double apart, Margin margin, double by) {
   const D d;
   const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
   const double shift = dot(aside, n), longest = planes.longest[t] + by;
@@ -126,7 +126,7 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                        hn::Abs(az) + hn::Abs(bz)};
     hn::Store((size.x + size.y) + size.z, d, out.size + l);
-    const auto store = [&](const Vec3& x, double (&to)[3][kWidth]) {
+    const auto store = [&](const Vec3& x, double(&to)[3][kWidth]) {
       hn::Store(x.x, d, to[0] + l);
       hn::Store(x.y, d, to[1] + l);
       hn::Store(x.z, d, to[2] + l);
