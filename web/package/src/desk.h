@@ -39,7 +39,7 @@ extern desk_t desk;
 
 _Static_assert(kMostPatches == 32, "patches");
 _Static_assert(sizeof(ist_contact_patch_t) == 160, "patch");
-_Static_assert(sizeof(ist_penetration_t) == 112, "penetration");
+_Static_assert(sizeof(ist_penetration_t) == 152, "penetration");
 _Static_assert(sizeof(ist_ball_t) == 32, "ball");
 _Static_assert(sizeof(ist_lens_t) == 72, "lens");
 _Static_assert(sizeof(ist_outline_segment_t) == 56, "segment");
