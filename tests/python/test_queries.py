@@ -23,7 +23,7 @@ def test_boxes_overlap_by_their_volume(cube):
 
 
 def test_distances_up_to_a_limit(gear, knot, random_poses):
-    poses = random_poses(64, 3)
+    poses = random_poses(64, 9)
     gaps = ist.separation(gear, knot, poses)
     limit = float(np.median(gaps.distance[gaps.distance > 0]))
     found = ist.separation(gear, knot, poses, max_distance=limit, pair_id=3)
