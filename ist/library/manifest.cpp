@@ -109,10 +109,12 @@ class Reader {
             fmt::format("not valid TOML: {}. See https://toml.io", error.description()));
       return finish();
     }
+    bool all_known = true;
     for (const auto& [key, value] : root) {
       static const std::vector<std::string> kTables = {"defaults", "asset", "robot"};
       const std::string name(key.str());
       if (std::count(kTables.begin(), kTables.end(), name) != 0) continue;
+      all_known = false;
       const std::string nearest = nearest_word(name, kTables);
       fault(key.source().begin.line,
             nearest.empty()
@@ -122,7 +124,8 @@ class Reader {
                 : fmt::format("unknown '{}': did you mean '{}'?", name, nearest));
     }
     read_defaults(root);
-    if (!root.contains("asset") && !root.contains("robot"))
+    // Where a table's name is unknown, that is the one mistake.
+    if (all_known && !root.contains("asset") && !root.contains("robot"))
       fault(1, "no [[asset]]: add at least one");
     read_entries(root, "asset", &Reader::read_asset);
     read_entries(root, "robot", &Reader::read_robot_entry);

@@ -142,7 +142,7 @@ TEST_F(Mistakes, InNamesAndExclusions) {
   expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nexclude = 3\n",
                 {"3: exclude: 3 is not a quoted string"});
   expect_faults("[[assets]]\nmesh = \"meshes/*.obj\"\n",
-                {"unknown 'assets': did you mean 'asset'?"});
+                {"1: unknown 'assets': did you mean 'asset'?"});
 }
 
 TEST_F(Mistakes, AnExclusionOfNothingIsAWarning) {
