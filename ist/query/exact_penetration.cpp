@@ -41,13 +41,15 @@ struct ExactInWorld {
   }
 };
 
-Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose) {
+Penetration whole_answer(const ExactOverlap& found, const RelativePose& pose, const PlacedTree& a,
+                         const PlacedTree& b) {
   const ExactInWorld sums(found.sums, found.origin, pose);
   Penetration answer;
   answer.volume = std::max(0.0, sums.volume);
   const double error = found.error * pose.unit3() + (answer.volume - sums.volume);
   answer.volume_min = std::max(0.0, answer.volume - error);
-  answer.volume_max = answer.volume + error;
+  answer.volume_max =
+      std::max(answer.volume, std::min(answer.volume + error, smaller_volume(a, b) * (1 + 1e-12)));
   if (answer.volume > 0) answer.centroid = sums.centroid;
   answer.translation_gradient = sums.force;
   answer.rotation_gradient = sums.torque;
@@ -162,7 +164,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
-  if (found.complete) return whole_answer(found, pose);
+  if (found.complete) return whole_answer(found, pose, a, b);
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
@@ -197,7 +199,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
         [](ContactPatches& stopped) -> Penetration& { return stopped.penetration; });
     return answer;
   }
-  answer.contact.penetration = whole_answer(found, *pose);
+  answer.contact.penetration = whole_answer(found, *pose, a, b);
   answer.segments = found.crossings;
   if (!patches.empty()) {
     std::span<ExactPart> parts(scratch.parts.get(), query.divide());

@@ -43,6 +43,7 @@ inline std::vector<std::map<std::string, std::string>> read_csv(const std::strin
     std::vector<std::string> out;
     std::istringstream stream(text);
     for (std::string field; std::getline(stream, field, ',');) out.push_back(field);
+    if (!out.empty() && out.back().ends_with('\r')) out.back().pop_back();
     return out;
   };
   if (!std::getline(file, line)) throw std::runtime_error("cannot read " + path);
