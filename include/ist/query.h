@@ -47,7 +47,8 @@ struct PenetrationSettings {
 
   /// Accepted relative error of the volume, such as 0.005 for 0.5 %; two trees in the matched
   /// measure only. Over random poses the median error is less than a third of this, and about 19 of
-  /// 20 errors are below this. Flat faces that rest on each other have larger errors by spheres.
+  /// 20 errors are below this. Where faces are flush or copies coincide, spheres that a coarser
+  /// level does not confirm give way to Measure::exact. volume_max is at most the smaller solid's.
   ///
   /// The query uses the cheapest measure whose predicted error is smaller: the coarsest level of
   /// detail that is accurate enough at this overlap, or Measure::exact where no level is, or where
@@ -56,8 +57,9 @@ struct PenetrationSettings {
   /// (TreeView::predicted_errors), or else from a fit.
   ///
   /// Needs the mesh in both assets (TreeView::has_mesh), and no pair budget. Otherwise the finest
-  /// level, or the finest within the budget, answers; if its predicted error is larger than this,
-  /// the status is error_exceeded. Assets without spheres are answered by Measure::exact.
+  /// level, or the finest within the budget, answers; if its predicted error is larger than this, or
+  /// a coarser level does not confirm it, the status is error_exceeded. Assets without spheres are
+  /// answered by Measure::exact.
   double relative_error = 0;
 
   /// The caller's id of this pair of solids; 0: none. Calls with the same id and workspace are
