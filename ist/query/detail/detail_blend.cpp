@@ -317,6 +317,7 @@ class BlendSum {
     add(weight * trusted, part, sum_);
     largest_volume_ = std::max(largest_volume_, part.volume);
     exact_weight_.volume += weight * (1 - trusted);
+    by_levels_ |= weight * trusted > 0;
     if (i == shares_.largest) largest_ = weight * trusted;
     // At extreme sizes unit3 is 0 or the volume infinite: then a slope of 0 would give NaN.
     if (of_rest.slope != 0) {
@@ -353,6 +354,10 @@ class BlendSum {
     if (exact_slope_ != 0) slope_ += exact_slope_ * part.volume;
     doubt_ += weight_doubt_ * std::max(largest_volume_, part.volume);
     missed_ |= with_error_status(part, settings_).status == QueryStatus::error_exceeded;
+    if (by_levels_) return;
+    sum_.touching = part.touching;
+    sum_.contact_area = part.contact_area;
+    sum_.contact_normal = part.contact_normal;
   }
 
   DetailQueries& queries_;
@@ -367,6 +372,7 @@ class BlendSum {
   const bool keep_rounding_;
   bool missed_;
   Penetration sum_;
+  bool by_levels_ = false;    ///< some of the sum is
   double largest_ = 0;        ///< weight of the largest level
   Penetration exact_weight_;  ///< as if it were a volume, with its gradients but those by …
   double exact_slope_ = 0;    ///< … the coarse estimate
