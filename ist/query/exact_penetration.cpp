@@ -50,7 +50,7 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const P
   answer.volume_min = std::max(0.0, answer.volume - error);
   answer.volume_max = answer.volume + error;
   // No overlap is larger than the smaller solid.
-  const double most = std::min(volume_of(a), volume_of(b));
+  const double most = smaller_volume(a, b);
   for (double* const volume : {&answer.volume, &answer.volume_min, &answer.volume_max})
     *volume = std::min(*volume, most);
   if (answer.volume > 0) answer.centroid = sums.centroid;

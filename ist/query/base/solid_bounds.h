@@ -16,11 +16,15 @@ inline double volume_of(const PlacedTree& placed) noexcept {
          (placed.scale * placed.scale * placed.scale);
 }
 
+inline double smaller_volume(const PlacedTree& a, const PlacedTree& b) noexcept {
+  return std::min(volume_of(a), volume_of(b));
+}
+
 /// The true volume lies between nothing and the smaller solid's; what spheres say may be more.
 inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
                             Penetration& answer) noexcept {
   answer.volume_min = 0;
-  answer.volume_max = std::min(volume_of(a), volume_of(b)) * (1 + 1e-12);
+  answer.volume_max = smaller_volume(a, b) * (1 + 1e-12);
   if (!std::isnan(answer.volume)) answer.volume_max = std::max(answer.volume_max, answer.volume);
 }
 

@@ -47,10 +47,10 @@ class DetailQueries {
   }
 
   /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
-  /// levels instead. `most`: its weight is the largest.
+  /// levels instead, unless the exact measure answers there. `most`: its weight is the largest.
   Penetration ask(const DetailPair& pair, bool most, bool keep_rounding = false) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
-    if (coincidence.weight == 0) return descend(pair, most, keep_rounding);
+    if (coincidence.weight == 0 || has_exact_) return descend(pair, most, keep_rounding);
     DetailPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
     const bool mostly_unlike = coincidence.weight >= 0.5;
@@ -65,7 +65,7 @@ class DetailQueries {
 
   /// Whether asking a pair of levels is no more than its coarse estimate.
   bool is_estimate(const DetailPair& pair, bool most) const noexcept {
-    return !(most && sorts()) && coincidence_weight_of(pair).weight == 0 &&
+    return !(most && sorts()) && (has_exact_ || coincidence_weight_of(pair).weight == 0) &&
            (by_error(settings_) || !method_of(pair).surface);
   }
 
@@ -156,6 +156,11 @@ class DetailQueries {
 // A coarse estimate whose bounds are further apart than this part of it is too rough for an answer.
 constexpr double kRough = 5e-4;
 
+void add_gradients(double factor, const Penetration& part, Penetration& sum) {
+  sum.translation_gradient += factor * part.translation_gradient;
+  sum.rotation_gradient += factor * part.rotation_gradient;
+}
+
 /// Adds a part of a blend.
 void add(double weight, const Penetration& part, Penetration& sum) {
   sum.volume += weight * part.volume;
@@ -163,14 +168,34 @@ void add(double weight, const Penetration& part, Penetration& sum) {
   sum.volume_max += weight * part.volume_max;
   if (sum.volume > 0)
     sum.centroid += (weight * part.volume / sum.volume) * (part.centroid - sum.centroid);
-  sum.translation_gradient += weight * part.translation_gradient;
-  sum.rotation_gradient += weight * part.rotation_gradient;
+  add_gradients(weight, part, sum);
   sum.status = std::max(sum.status, part.status);
+}
+
+// The part of the accepted error by which volumes about the smaller solid's are kept within it.
+constexpr double kCapWidth = 0.1;
+
+/// What a level says, no more than `most`, the smaller solid's volume: smooth, with its slope.
+Penetration kept_within_solid(Penetration part, double most, double error) {
+  const double width = kCapWidth * std::min(error, 1.0) * most;
+  if (!(width > 0) || !std::isfinite(most) || !(part.volume_max > most - width)) return part;
+  const auto left = [&](double x) { return std::max(0.0, most + width - x); };
+  const auto kept = [&](double x) {
+    return x > most - width ? most - left(x) * left(x) / (4 * width) : x;
+  };
+  const double slope = std::min(left(part.volume) / (2 * width), 1.0);
+  part.volume = kept(part.volume);
+  part.volume_min = kept(part.volume_min);
+  part.volume_max = kept(part.volume_max);
+  part.translation_gradient *= slope;
+  part.rotation_gradient *= slope;
+  return part;
 }
 
 /// What is known where a limit stopped the coarse estimate: any level might have been meant.
 Penetration stopped_blend(DetailQueries& queries, const PlacedTree& a, const PlacedTree& b,
-                          const DetailChain& chain, const Penetration& coarse) {
+                          const PenetrationSettings& settings, const DetailChain& chain,
+                          const Penetration& coarse) {
   Penetration result = coarse;
   if (queries.sorts()) queries.ask(chain.coarsest(), true);
   for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
@@ -178,11 +203,9 @@ Penetration stopped_blend(DetailQueries& queries, const PlacedTree& a, const Pla
     result.volume_min = std::min(result.volume_min, bounds.volume_min);
     result.volume_max = std::max(result.volume_max, bounds.volume_max);
   }
-  if (queries.has_exact()) {
-    const double by_spheres = result.volume_max;
-    bound_by_solids(a, b, result);
-    result.volume_max = std::max(result.volume_max, by_spheres);
-  }
+  if (by_error(settings))
+    result = kept_within_solid(result, smaller_volume(a, b), settings.relative_error);
+  if (queries.has_exact()) bound_by_solids(a, b, result);
   return result;
 }
 
@@ -218,54 +241,147 @@ BlendShares share_blend(const DetailChain& chain, const WantedError* wanted, boo
 }
 
 /// The sum of all parts, with the slopes of their weights.
-Penetration mix_blend(DetailQueries& queries, const DetailChain& chain, const BlendShares& shares,
-                      const Penetration& coarse, const RelativePose& pose,
-                      const PenetrationSettings& settings) {
-  const double unit3 = pose.unit3();
-  const DetailWeight &sure = shares.sure, &rest = shares.wanted.rest;
-  const bool rough = coarse.volume_max - coarse.volume_min > kRough * coarse.volume;
-  // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
-  const bool keep_rounding = shares.weights[0].weight < 1;
-  bool missed = shares.missed;
-  double slope = 0;       // of the blend by the coarse estimate
-  double sure_slope = 0;  // and by the quick look
-  Penetration result;
-  for (std::size_t i = chain.size(); i-- > 0;) {  // the coarse ones first: they are sure to end
-    const DetailWeight& of_rest = shares.weights[i];
-    const double weight = shares.weight(i);
-    if (weight == 0 && of_rest.slope == 0) continue;
-    const bool most = i == shares.largest && !shares.mostly_exact;
-    const bool is_coarse = i + 1 == chain.size() && !rough && queries.is_estimate(chain[i], most);
-    const Penetration part = is_coarse ? coarse : queries.ask(chain[i], most, keep_rounding);
-    add(weight, part, result);
+class BlendSum {
+ public:
+  /// `wanted`: null without a wanted error. `most` [u³]: the smaller solid's volume.
+  BlendSum(DetailQueries& queries, const DetailChain& chain, const WantedError* wanted,
+           const BlendShares& shares, const Penetration& coarse,
+           const PenetrationSettings& settings, double most, const RelativePose& pose) noexcept
+      : queries_(queries),
+        chain_(chain),
+        wanted_(wanted),
+        shares_(shares),
+        coarse_(coarse),
+        settings_(settings),
+        most_(most),
+        pose_(pose),
+        rough_(width(coarse) > kRough * coarse.volume),
+        // Where lenses graze, to sum them again in double takes longer than a coarser level saves.
+        keep_rounding_(shares.weights[0].weight < 1),
+        missed_(shares.missed) {}
+
+  Penetration sum() noexcept {
+    for (std::size_t i = chain_.size(); i-- > 0;)  // the coarse ones first: they are sure to end
+      if (shares_.weight(i) > 0 || shares_.weights[i].slope != 0) add_level(i);
+    const DetailWeight& rest = shares_.wanted.rest;
+    exact_weight_.volume += rest.weight;
+    if (rest.slope != 0) exact_slope_ += rest.slope / pose_.unit3();
+    if (exact_weight_.volume > 0 || exact_slope_ != 0) add_exact();
+    // The coarse estimate is rounded too, and with it the weights.
+    if (slope_ != 0) {
+      doubt_ += std::abs(slope_) * width(coarse_);
+      add_gradients(slope_, coarse_, sum_);
+    }
+    if (sure_slope_ != 0)
+      add_slope(queries_.look(chain_.coarsest(), true).slope, sure_slope_, pose_, sum_);
+    sum_.volume_min = std::max(0.0, sum_.volume_min - doubt_);
+    sum_.volume_max += doubt_;
+    if (wanted_ != nullptr)
+      sum_.volume_max = std::max(sum_.volume, std::min(sum_.volume_max, most_ * (1 + 1e-12)));
+    if (missed_ && sum_.volume > 0 && sum_.status == QueryStatus::ok)
+      sum_.status = QueryStatus::error_exceeded;
+    return sum_;
+  }
+
+ private:
+  static double width(const Penetration& part) { return part.volume_max - part.volume_min; }
+
+  Penetration ask(const DetailPair& pair, bool most) {
+    if (pair.a == chain_.coarsest().a && pair.b == chain_.coarsest().b && !rough_ &&
+        queries_.is_estimate(pair, most))
+      return coarse_;
+    return queries_.ask(pair, most, keep_rounding_);
+  }
+
+  void add_level(std::size_t i) {
+    const DetailWeight &of_rest = shares_.weights[i], &sure = shares_.sure;
+    const double weight = shares_.weight(i);
+    const Penetration raw = ask(chain_[i], i == shares_.largest && !shares_.mostly_exact);
+    const Penetration part =
+        wanted_ != nullptr ? kept_within_solid(raw, most_, settings_.relative_error) : raw;
+    const CoincidenceWeight same = queries_.coincidence_weight_of(chain_[i]);
+    double trusted = 1;
+    // Predictions are of levels within the budget.
+    missed_ |= wanted_ != nullptr && !queries_.has_exact() &&
+               (weight < shares_.wanted.levels[i].weight || same.weight > 0);
+    if (wanted_ != nullptr && !missed_) {
+      const Penetration other = ask(wanted_->coarser(i), false);
+      const LevelTrust trust = wanted_->trust(i, raw.volume, other.volume, most_);
+      sum_.status = std::max(sum_.status, other.status);
+      trusted = trust.weight * (1 - same.weight);
+      if (queries_.has_exact())
+        hand_over(weight, trust, same, part.volume, raw, other);
+      else
+        missed_ |= std::exchange(trusted, 1) < 1;
+    }
+    add(weight * trusted, part, sum_);
+    largest_volume_ = std::max(largest_volume_, part.volume);
+    exact_weight_.volume += weight * (1 - trusted);
+    by_levels_ |= weight * trusted > 0;
+    if (i == shares_.largest) largest_ = weight * trusted;
     // At extreme sizes unit3 is 0 or the volume infinite: then a slope of 0 would give NaN.
-    if (of_rest.slope != 0) slope += (1 - sure.weight) * of_rest.slope / unit3 * part.volume;
+    if (of_rest.slope != 0) {
+      const double slope = (1 - sure.weight) * of_rest.slope / pose_.unit3();
+      slope_ += slope * trusted * part.volume;
+      exact_slope_ += slope * (1 - trusted);
+    }
     if (sure.slope != 0)
-      sure_slope += sure.slope * ((i == 0 ? 1 : 0) - of_rest.weight) * part.volume;
-    // Predictions are of solids that are not in one place, and of levels within the budget.
-    missed |= by_error(settings) && (weight < shares.wanted.levels[i].weight ||
-                                     queries.coincidence_weight_of(chain[i]).weight > 0);
+      sure_slope_ += sure.slope * ((i == 0 ? 1 : 0) - of_rest.weight) * part.volume;
   }
-  if (rest.weight > 0 || rest.slope != 0) {
-    const Penetration part = queries.exact(shares.mostly_exact);
-    add(rest.weight, part, result);
-    if (rest.slope != 0) slope += rest.slope / unit3 * part.volume;
-    missed |= with_error_status(part, settings).status == QueryStatus::error_exceeded;
+
+  /// The slopes of what a level that says `volume` leaves to the exact measure.
+  void hand_over(double weight, const LevelTrust& trust, const CoincidenceWeight& same,
+                 double volume, const Penetration& own, const Penetration& other) {
+    const auto change = [&](double by, const Penetration& of) {
+      if (by == 0) return;
+      const double slope = weight * (1 - same.weight) * by;
+      add_gradients(slope * volume, of, sum_);
+      add_gradients(-slope, of, exact_weight_);
+      weight_doubt_ += std::abs(slope) * width(of);
+    };
+    change(trust.by_own, own);
+    change(trust.by_other, other);
+    if (!(same.weight > 0)) return;
+    add_slope(same.slope, -weight * trust.weight * volume, pose_, sum_);
+    add_slope(same.slope, weight * trust.weight, pose_, exact_weight_);
   }
-  // The coarse estimate is rounded too, and with it the weights.
-  if (slope != 0) {
-    const double doubt = std::abs(slope) * (coarse.volume_max - coarse.volume_min);
-    result.volume_min = std::max(0.0, result.volume_min - doubt);
-    result.volume_max += doubt;
-    result.translation_gradient += slope * coarse.translation_gradient;
-    result.rotation_gradient += slope * coarse.rotation_gradient;
+
+  void add_exact() {
+    const Penetration part =
+        queries_.exact(shares_.mostly_exact || exact_weight_.volume > largest_);
+    add_gradients(part.volume, exact_weight_, sum_);
+    add(exact_weight_.volume, part, sum_);
+    if (exact_slope_ != 0) slope_ += exact_slope_ * part.volume;
+    doubt_ += weight_doubt_ * std::max(largest_volume_, part.volume);
+    missed_ |= with_error_status(part, settings_).status == QueryStatus::error_exceeded;
+    if (by_levels_) return;
+    sum_.touching = part.touching;
+    sum_.contact_area = part.contact_area;
+    sum_.contact_normal = part.contact_normal;
   }
-  if (sure_slope != 0)
-    add_slope(queries.look(chain.coarsest(), true).slope, sure_slope, pose, result);
-  if (missed && result.volume > 0 && result.status == QueryStatus::ok)
-    result.status = QueryStatus::error_exceeded;
-  return result;
-}
+
+  DetailQueries& queries_;
+  const DetailChain& chain_;
+  const WantedError* const wanted_;
+  const BlendShares& shares_;
+  const Penetration& coarse_;
+  const PenetrationSettings& settings_;
+  const double most_;
+  const RelativePose& pose_;
+  const bool rough_;
+  const bool keep_rounding_;
+  bool missed_;
+  Penetration sum_;
+  bool by_levels_ = false;    ///< some of the sum is
+  double largest_ = 0;        ///< weight of the largest level
+  Penetration exact_weight_;  ///< as if it were a volume, with its gradients but those by …
+  double exact_slope_ = 0;    ///< … the coarse estimate
+  double slope_ = 0;          ///< of the sum by the coarse estimate
+  double sure_slope_ = 0;     ///< and by the quick look
+  // Of the sum and of the exact measure's weight, as volumes that decide weights are rounded:
+  double doubt_ = 0, weight_doubt_ = 0;
+  double largest_volume_ = 0;  ///< of levels
+};
 
 }  // namespace
 
@@ -290,10 +406,14 @@ Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const Relati
   // Whatever else is asked, the coarse estimate is the whole sum: only that is smooth.
   const Penetration coarse = queries.coarse_estimate(chain.coarsest());
   if (coarse.status != QueryStatus::ok)
-    return queries.with_counts(stopped_blend(queries, a, b, chain, coarse));
+    return queries.with_counts(stopped_blend(queries, a, b, settings, chain, coarse));
   const BlendShares shares = share_blend(chain, wanted ? &*wanted : nullptr, has_exact, sure,
                                          settings.pair_budget, coarse.volume / pose.unit3());
-  return queries.with_counts(mix_blend(queries, chain, shares, coarse, pose, settings));
+  Penetration answer = BlendSum(queries, chain, wanted ? &*wanted : nullptr, shares, coarse,
+                                settings, smaller_volume(a, b), pose)
+                           .sum();
+  if (has_exact && answer.status == QueryStatus::budget_exhausted) bound_by_solids(a, b, answer);
+  return queries.with_counts(answer);
 }
 
 }  // namespace ist

@@ -29,6 +29,12 @@ constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 250;
 // one takes over at four.
 constexpr double kCompared = 2;
 
+// A level is compared with another whose spheres are by at least this part larger …
+constexpr double kLeastWider = 0.3;
+// … and trusted up to this square of the error that follows over the accepted one; from the other
+// on not at all. In between a blend with the truth errs by no more than accepted.
+constexpr double kTrusted2 = 0.75, kDistrusted2 = 3;
+
 double eighth_root(double x) { return std::sqrt(std::sqrt(std::sqrt(x))); }
 
 /// (kErrorOfOne / error)^(9/8), of an error where there is one sphere.
@@ -79,13 +85,12 @@ double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
 WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
                          const PenetrationSettings& settings, const DetailChain& chain,
                          bool exact) noexcept
-    : size_(chain.size()) {
+    : error_(std::min(settings.relative_error, 1.0)), size_(chain.size()) {
   const AssetHeader& asset_a = a.tree.header();
   const AssetHeader& asset_b = b.tree.header();
   const double scale3 = pose.a_from_b.scale * pose.a_from_b.scale * pose.a_from_b.scale;
-  const double error = std::min(settings.relative_error, 1.0);
-  const double needed_a = spheres_needed(asset_a, error);
-  const double needed_b = spheres_needed(asset_b, error);
+  const double needed_a = spheres_needed(asset_a, error_);
+  const double needed_b = spheres_needed(asset_b, error_);
   for (std::size_t i = 0; i < size_; ++i) {
     const TreeHeader& tree_a = matched_tree(asset_a, chain[i].a);
     const TreeHeader& tree_b = matched_tree(asset_b, chain[i].b);
@@ -97,11 +102,26 @@ WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const Relativ
            : method.b_probes ? from_b
                              : from_a;
     if (i > 0) from *= 1 + kDeep * from / std::min(asset_a.volume, asset_b.volume * scale3);
+    const std::uint32_t coarser_a = std::min(chain[i].a + 1, asset_a.detail_count);
+    const std::uint32_t coarser_b = std::min(chain[i].b + 1, asset_b.detail_count);
+    const TreeHeader& wide_a = matched_tree(asset_a, coarser_a);
+    const TreeHeader& wide_b = matched_tree(asset_b, coarser_b);
+    coarser_[i] = detail_pair(coarser_a, LevelCost::of(wide_a), coarser_b, LevelCost::of(wide_b),
+                              pose.a_from_b.scale);
+    const auto blur = [&](const TreeHeader& of_a, const TreeHeader& of_b) {
+      const double blur_a = of_a.mean_radius, blur_b = of_b.mean_radius * pose.a_from_b.scale;
+      return method.lenses     ? std::sqrt(blur_a * blur_a + blur_b * blur_b)
+             : method.b_probes ? blur_b
+                               : blur_a;
+    };
+    wider_[i] = blur(wide_a, wide_b) / blur(tree_a, tree_b) - 1;
+    if (!(wider_[i] >= kLeastWider)) from = std::numeric_limits<double>::infinity();
     if (!exact) continue;
     const double compared = kCompared * from;
     const double crossing = crossings(asset_a, std::min(1.0, compared / asset_a.volume)) +
                             crossings(asset_b, std::min(1.0, compared / (asset_b.volume * scale3)));
-    if (!(expected_pairs(chain[i], compared) + kPairsSaved < kPairsOfCrossing * crossing))
+    const double pairs = expected_pairs(chain[i], compared) + expected_pairs(coarser_[i], compared);
+    if (!(pairs + kPairsSaved < kPairsOfCrossing * crossing))
       from = std::numeric_limits<double>::infinity();
   }
 }
@@ -125,6 +145,21 @@ WantedError::Shares WantedError::shares(double coarse) const noexcept {
     rest = rest * complement(part);
   }
   return shares;
+}
+
+LevelTrust WantedError::trust(std::size_t i, double own, double other, double most) const noexcept {
+  const double accepted = error_ * wider_[i] * own;
+  const double difference = other - own, excess = own - most;
+  // (also where nothing is known: volumes of 0 or infinity)
+  if (!(std::abs(difference) < 2 * accepted) || !(excess < 2 * error_ * most)) return {};
+  const double x = difference / accepted, y = excess > 0 ? excess / (error_ * most) : 0;
+  const double t = (x * x + y * y - kTrusted2) / (kDistrusted2 - kTrusted2);
+  LevelTrust trust{1 - smooth_step(t)};
+  if (!(t > 0 && t < 1)) return trust;
+  const double slope = -2 * smooth_slope(t) / (kDistrusted2 - kTrusted2);
+  trust.by_own = slope * (y / (error_ * most) - x * (other / own) / accepted);
+  trust.by_other = slope * x / accepted;
+  return trust;
 }
 
 }  // namespace ist
