@@ -9,6 +9,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/exact/flat_areas-inl.h"
 #include "query/exact/nearest_points.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/plane_sides-inl.h"
@@ -66,15 +67,13 @@ class TriangleSearch {
     SurfaceContact out;
     TrianglePairs& pairs = *scratch_.pairs;
     const auto add_areas = [&] {
+      alignas(64) double area[8], along[3][8];
       const std::uint32_t far = far_in_planes(pairs, pairs.count, 0);
+      find_areas(pairs, area, along);
       for (std::uint32_t left = ((1u << pairs.count) - 1) & ~far; left != 0; left &= left - 1) {
-        const ExactCorners corners(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
-        const exact::Point(&a)[3] = corners.of[0];
-        const exact::Point normal = cross(a[1] - a[0], a[2] - a[0]);
-        const double area = exact::common_area(a, normal, corners.of[1]);
-        if (!(area > 0)) continue;
-        out.area += area;
-        out.normal = out.normal + (area / std::sqrt(dot(normal, normal))) * normal;
+        const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
+        out.area += area[n];
+        out.normal = out.normal + exact::Point{along[0][n], along[1][n], along[2][n]};
       }
       pairs.count = 0;
     };
@@ -187,6 +186,51 @@ class TriangleSearch {
     return bits;
   }
 
+  /// Triangles of B that reach through the plane of one of A's, which reaches through theirs.
+  struct Straddling {
+    std::uint32_t clear = 0, doubtful = 0;
+  };
+
+  /// In float.
+  HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
+                                   const PlacedTriangles& b, std::uint32_t lanes) const {
+    const F d;
+    // Coordinates are floats, and points of both blocks that matter are no further apart than this.
+    const float blur = 1e-6f * (a.reach + b.reach) + reach_, size = a.size + b.size;
+    const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
+    Straddling out;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
+      const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
+                          hn::Load(d, b.slack + l) * hn::Set(d, size);
+      hn::Vec<F> of_b[3], of_a[3];
+      for (int c = 0; c < 3; ++c) {
+        of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
+                    hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
+                   hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
+                  hn::Set(d, a.offset[i]);
+        of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
+                    hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
+                   hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
+                  hn::Load(d, b.offset + l);
+      }
+      // How far the heights reach to the nearer side of a plane.
+      const auto through = [](const hn::Vec<F>(&height)[3]) {
+        return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
+                       hn::Max(height[0], hn::Max(height[1], height[2])));
+      };
+      const auto a_by = through(of_b), b_by = through(of_a);
+      const std::uint32_t may =
+          mask_bits(d, hn::And(a_by >= hn::Neg(over_a), b_by >= hn::Neg(over_b)));
+      const std::uint32_t clear = mask_bits(d, hn::And(a_by > over_a, b_by > over_b));
+      out.clear |= clear << l;
+      out.doubtful |= (may & ~clear) << l;
+    }
+    out.clear &= lanes;
+    out.doubtful &= lanes;
+    return out;
+  }
+
   /// Tests the triangles of two blocks by boxes and planes.
   void meet(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedTriangles& a = placed_.triangles(false, number_a);
@@ -215,11 +259,18 @@ class TriangleSearch {
     if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now.beside(false)) ||
         (thin(box_b.slab_low, box_b.slab_high, lane_b) && now.beside(true)))
       return;
+    bool flush = false;
     for (; rows != 0; rows &= rows - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
       const OneBox box(a.low, a.high, i, reach_);
       std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
-      if (lanes != 0) lanes = now.straddling(i, lanes);
+      if (lanes != 0) {
+        // Where floats tell nothing, they are not asked again.
+        const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes);
+        flush |= found.clear == 0 && found.doubtful != 0;
+        lanes = found.clear;
+        if (found.doubtful != 0) lanes |= now.straddling(i, found.doubtful);
+      }
       for (; lanes != 0; lanes &= lanes - 1)
         add_pair(kWidth * number_a + i, *now.vertices[0],
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
@@ -503,6 +554,24 @@ class TriangleSearch {
       }
     }
     return out;
+  }
+
+  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal.
+  static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
+                                      double (&along)[3][8]) {
+    const D d;
+    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3];
+      for (int s = 0; s < 2; ++s)
+        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
+      const Vec3 normal = cross(corner[0][1] - corner[0][0], corner[0][2] - corner[0][0]);
+      const V length = hn::Sqrt(dot(normal, normal));
+      const V factor = common_area(corner[0], corner[1], normal);
+      hn::Store(factor * length, d, area + l);
+      hn::Store(factor * normal.x, d, along[0] + l);
+      hn::Store(factor * normal.y, d, along[1] + l);
+      hn::Store(factor * normal.z, d, along[2] + l);
+    }
   }
 
   /// Which way round A's edges go about B's: a bit a pair.

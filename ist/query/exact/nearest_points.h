@@ -112,46 +112,4 @@ inline bool come_within(double distance, const Point (&a)[3], const Point (&b)[3
   return best.squared < distance * distance;
 }
 
-/// What two triangles that lie in one plane have in common. `normal`: of A's, as FlatTriangle has
-/// it.
-inline double common_area(const Point (&a)[3], const Point& normal, const Point (&b)[3]) noexcept {
-  const double n[3] = {std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)};
-  const std::size_t main = n[0] > n[1] ? (n[0] > n[2] ? 0 : 2) : n[1] > n[2] ? 1 : 2;
-  const std::size_t i = (main + 1) % 3, j = (main + 2) % 3;
-  struct Flat {
-    double x, y;
-  };
-  const auto flat = [&](const Point& p) {
-    const Point r = p - a[0];
-    return Flat{r[static_cast<int>(i)], r[static_cast<int>(j)]};
-  };
-  Flat polygon[8], cut[8];
-  std::size_t count = 3;
-  for (std::size_t k = 0; k < 3; ++k) polygon[k] = flat(b[k]);
-  const double turn = normal[static_cast<int>(main)] > 0 ? 1 : -1;
-  for (std::size_t k = 0; k < 3 && count > 0; ++k) {
-    const Flat p = flat(a[k]), q = flat(a[(k + 1) % 3]);
-    const auto side = [&](const Flat& x) {
-      return turn * ((q.x - p.x) * (x.y - p.y) - (q.y - p.y) * (x.x - p.x));
-    };
-    std::size_t kept = 0;
-    for (std::size_t v = 0; v < count; ++v) {
-      const Flat &from = polygon[v], &to = polygon[(v + 1) % count];
-      const double s = side(from), t = side(to);
-      if (s >= 0) cut[kept++] = from;
-      if ((s > 0 && t < 0) || (s < 0 && t > 0)) {
-        const double share = s / (s - t);
-        cut[kept++] = {from.x + share * (to.x - from.x), from.y + share * (to.y - from.y)};
-      }
-    }
-    count = kept;
-    std::copy_n(cut, count, polygon);
-  }
-  double twice = 0;
-  for (std::size_t v = 1; v + 1 < count; ++v)
-    twice += (polygon[v].x - polygon[0].x) * (polygon[v + 1].y - polygon[0].y) -
-             (polygon[v].y - polygon[0].y) * (polygon[v + 1].x - polygon[0].x);
-  return 0.5 * std::abs(twice) * (std::sqrt(dot(normal, normal)) / n[main]);
-}
-
 }  // namespace ist::exact

@@ -1,0 +1,87 @@
+// What triangles in one plane have in common: included once a target.
+
+#if defined(IST_QUERY_FLAT_AREAS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_QUERY_FLAT_AREAS_INL_H_
+#undef IST_QUERY_FLAT_AREAS_INL_H_
+#else
+#define IST_QUERY_FLAT_AREAS_INL_H_
+#endif
+
+#include "query/exact/points-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Points in the plane of two coordinates, and an edge between two of them.
+struct FlatPoint {
+  V x, y;
+};
+struct FlatEdge {
+  V low, high;  ///< of x
+  V x, y, slope;
+  V turn;  ///< 1 where it goes up in x, -1 where down, 0 where neither
+
+  FlatEdge(const FlatPoint& p, const FlatPoint& q) : x(p.x), y(p.y) {
+    const D d;
+    const V dx = q.x - p.x;
+    low = hn::Min(p.x, q.x);
+    high = hn::Max(p.x, q.x);
+    const V one = hn::Set(d, 1.0);
+    const auto upright = hn::Abs(dx) <= hn::Set(d, 1e-200);
+    slope = (q.y - p.y) / hn::IfThenElse(upright, one, dx);
+    turn = hn::IfThenZeroElse(upright, hn::CopySign(one, dx));
+  }
+  V at(V where) const { return y + (where - x) * slope; }
+};
+
+/// The area that triangles in one plane have in common, over the length of `normal`, A's.
+///
+/// A triangle is the sum of what lies below its edges, signed by the way they go. What two such
+/// areas have in common is the integral of the lower edge, whose parts that do not depend on both
+/// edges add up to 0: ∫ min(e − f, 0) over the x of both is left. No side of a point is asked, so
+/// edges and corners that coincide are nothing special.
+HWY_INLINE V common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& normal) {
+  const D d;
+  const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
+  const V nx = hn::Abs(normal.x), ny = hn::Abs(normal.y), nz = hn::Abs(normal.z);
+  const auto by_x = hn::And(nx > ny, nx > nz), by_y = ny > nz;
+  const auto one_of = [&](V if_x, V if_y, V if_z) {
+    return hn::IfThenElse(by_x, if_x, hn::IfThenElse(by_y, if_y, if_z));
+  };
+  FlatPoint at[2][3];
+  V low = zero, high = zero, left = zero, right = zero;
+  for (int s = 0; s < 2; ++s)
+    for (int c = 0; c < 3; ++c) {
+      const Vec3 r = (s == 0 ? a[c] : b[c]) - a[0];
+      at[s][c] = {one_of(r.y, r.z, r.x), one_of(r.z, r.x, r.y)};
+      left = hn::Min(left, at[s][c].x);
+      right = hn::Max(right, at[s][c].x);
+      low = hn::Min(low, at[s][c].y);
+      high = hn::Max(high, at[s][c].y);
+    }
+  V twice = zero;
+  for (int i = 0; i < 3; ++i) {
+    const FlatEdge e(at[0][i], at[0][(i + 1) % 3]);
+    for (int j = 0; j < 3; ++j) {
+      const FlatEdge f(at[1][j], at[1][(j + 1) % 3]);
+      const V from = hn::Max(e.low, f.low), to = hn::Min(e.high, f.high);
+      const V first = e.at(from) - f.at(from), last = e.at(to) - f.at(to);
+      const V below = hn::Max(hn::Neg(first), zero) + hn::Max(hn::Neg(last), zero);
+      const V whole = hn::Abs(first) + hn::Abs(last);
+      const auto counts = hn::And(to > from, whole > zero);
+      const V part = (to - from) * (below * below) / hn::IfThenElse(counts, whole, one);
+      twice = twice + hn::IfThenElseZero(counts, e.turn * f.turn * part);
+    }
+  }
+  // What roundings leave of nothing is nothing.
+  const V found = hn::Abs(twice), least = hn::Set(d, 1e-14) * ((right - left) * (high - low));
+  const V size = one_of(nx, ny, nz);
+  const auto counts = hn::And(found > least, size > zero);
+  return hn::IfThenElseZero(counts,
+                            hn::Set(d, 0.5) * found / hn::IfThenElse(counts, size, one));
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
