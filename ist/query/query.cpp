@@ -122,6 +122,7 @@ Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
   const Separation gap = tree_a != nullptr && tree_b != nullptr
                              ? find_separation(*tree_a, *tree_b, settings, workspace, margin)
                              : separation(a, b, settings, workspace);
+  if (std::isnan(gap.distance_max)) return Overlapping::unknown;
   if (gap.distance_max <= margin) return Overlapping::yes;
   return gap.distance_min > margin || std::isinf(gap.distance_max) ? Overlapping::no
                                                                    : Overlapping::unknown;

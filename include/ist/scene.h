@@ -1,0 +1,149 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <ist/api.h>
+#include <ist/overlap.h>
+#include <ist/query.h>
+#include <ist/surface.h>
+
+namespace IST_API ist {
+
+/// What a scene answers of two bodies.
+enum class SceneAnswer : std::uint32_t {
+  nothing = 0,      ///< they do not meet
+  overlap = 1,      ///< overlap(), within the margin: yes, no or unknown
+  penetration = 2,  ///< penetration(), and separation() where a margin is set
+  patches = 3,      ///< contact_patches(), likewise
+};
+
+/// How bodies of two groups are asked.
+struct SceneRule {
+  SceneAnswer answer = SceneAnswer::penetration;
+  /// Measure and limits. The scene sets no pair_id.
+  PenetrationSettings penetration;
+  /// [u] ≥ 0: bodies that come as near are told too, with their separation.
+  double margin = 0;
+};
+
+/// A solid in a scene.
+struct SceneBody {
+  /// The caller's number, unique in its scene: bodies are named by it, and pairs are in its order.
+  std::uint32_t number = 0;
+  PlacedSolid solid;
+  bool moves = true;          ///< two bodies that do not move are not asked
+  std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
+  std::uint32_t layers = 1;   ///< bits
+  std::uint32_t meets = ~0u;  ///< bits: layers of bodies that it meets; both must agree
+};
+inline constexpr std::uint32_t kSceneGroups = 8;
+
+/// Whether two bodies met in the step before.
+enum class SceneEvent : std::uint32_t { begins = 0, stays = 1 };
+
+/// Two bodies that meet: their volume is positive, or they touch, or they come within the margin,
+/// or it is unknown. The status of an answer that failed is here too, with NaN.
+struct ScenePair {
+  std::uint32_t a = 0, b = 0;  ///< numbers, a < b; A of the query is `a`
+  SceneEvent event = SceneEvent::begins;
+  Overlapping overlapping = Overlapping::unknown;  ///< SceneAnswer::overlap alone
+  Penetration penetration;
+  Separation separation;          ///< with a margin: all zero of bodies that overlap
+  std::uint32_t first_patch = 0;  ///< in Scene::patches()
+  std::uint32_t patch_count = 0;
+};
+
+struct ScenePairName {
+  std::uint32_t a = 0, b = 0;
+};
+
+struct SceneSettings {
+  std::size_t max_bodies = 1024;              ///< memory for as many is taken at once
+  std::size_t max_pairs = 8192;               ///< pairs of bodies whose boxes meet, in one step
+  std::uint32_t patches_per_pair = 8;         ///< at most, for SceneAnswer::patches
+  std::size_t workers = 1;                    ///< workspaces: as many threads may work at a step
+  std::size_t workspace_capacity = 1u << 20;  ///< as Workspace has it
+};
+
+/// What a step found. The spans stay until the next call of a function that is not const.
+struct SceneStep {
+  std::span<const ScenePair> pairs;      ///< that meet, by (a, b)
+  std::span<const ScenePairName> ended;  ///< met in the step before, by (a, b)
+  std::span<const std::uint32_t>
+      refused;                ///< left out: pose or scale not usable, or beyond 1e37 [u]
+  std::size_t boxes_met = 0;  ///< pairs of bodies whose boxes meet
+  /// Not all pairs had room (SceneSettings::max_pairs): nothing was asked, `pairs` is empty, and no
+  /// pair ended.
+  bool pairs_exceeded = false;
+};
+
+struct SceneHit {
+  std::uint32_t number = 0;  ///< of the body, if `hit` is one
+  RayHit hit;
+};
+
+/// Many solids, and which of them meet: a broad phase over the queries of pairs, and no more.
+/// Bodies, islands, sleeping and solving stay with the host.
+///
+/// Boxes of bodies stand in two hierarchies, of those that move and those that do not. A step asks
+/// the pairs whose boxes meet and of which a body was added or moved; of the others the answers are
+/// those of the step before. Poses and rules alone decide the answers: they have the same bits and
+/// order for any number of workers and any order of insertion.
+///
+/// A step allocates nothing, locks nothing but what the pool does, and throws nothing. A scene is
+/// one thread's at a time; const functions may run on several. Assets must outlive their bodies.
+class Scene {
+ public:
+  /// Throws std::bad_alloc, and Error for numbers of 0 or too large.
+  explicit Scene(const SceneSettings& settings = {});
+  ~Scene();
+  Scene(Scene&&) noexcept;
+  Scene& operator=(Scene&&) noexcept;
+
+  /// Throws Error for a number that is taken, a group that is too large or a full scene; a pose
+  /// that is not usable is refused in the step.
+  void add(const SceneBody& body);
+  /// False: there is none. Its pairs end in the next step.
+  bool remove(std::uint32_t number) noexcept;
+  /// False: there is none.
+  bool set_pose(std::uint32_t number, const Pose& pose) noexcept;
+  /// Returns how many there are.
+  std::size_t set_poses(std::span<const std::uint32_t> numbers,
+                        std::span<const Pose> poses) noexcept;
+  std::size_t size() const noexcept;
+  std::optional<SceneBody> body(std::uint32_t number) const;
+
+  /// The rule for bodies of two groups, whichever is which. Asks all pairs again. Throws Error for
+  /// groups that are too large, or a margin that is negative or NaN.
+  void set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule);
+  /// Bodies that are joined: as long as both are there they do not meet. Throws std::bad_alloc.
+  void exclude(std::uint32_t a, std::uint32_t b);
+  void include(std::uint32_t a, std::uint32_t b) noexcept;
+  /// Pairs for which it returns false do not meet. It must not change from call to call while
+  /// neither body moves. Null: all meet.
+  void set_filter(bool (*filter)(const void* context, std::uint32_t a, std::uint32_t b) noexcept,
+                  const void* context) noexcept;
+
+  /// Asks all pairs that may have changed.
+  SceneStep step(const ParallelFor& parallel = {}) noexcept;
+  /// Of the last step.
+  std::span<const ContactPatch> patches(const ScenePair& pair) const noexcept;
+
+  /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.
+  /// Bodies that rays do not support (<ist/surface.h>) and those that are refused are passed.
+  SceneHit raycast(const Ray& ray) const noexcept;
+  /// Bodies whose boxes meet a box [u], in no order: how many there are; as many as fit are
+  /// written.
+  std::size_t in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
+                     std::span<std::uint32_t> numbers) const noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace ist

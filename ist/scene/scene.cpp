@@ -1,0 +1,601 @@
+#include <ist/scene.h>
+
+#include <ist/error.h>
+#include <ist/mass_properties.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "query/base/batch.h"
+#include "query/base/relative_pose.h"
+#include "scene/box_tree.h"
+
+namespace ist {
+namespace {
+
+constexpr std::uint32_t kNone = BoxTree::kNone;
+constexpr float kEndless = std::numeric_limits<float>::infinity();
+
+std::uint64_t key_of(std::uint32_t a, std::uint32_t b) noexcept {
+  return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
+}
+ScenePairName name_of(std::uint64_t key) noexcept {
+  return {static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
+}
+
+/// The box around a box that is turned; empty where it has no end.
+struct TurnedBox {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero();
+};
+std::optional<TurnedBox> own_box(const Field& field) noexcept {
+  const auto around = [](double x, double y, double z) {
+    return TurnedBox{Eigen::Vector3d::Zero(), {x, y, z}};
+  };
+  if (const auto* box = std::get_if<BoxField>(&field))
+    return TurnedBox{{0, 0, 0}, box->half_extents};
+  if (const auto* ball = std::get_if<BallField>(&field))
+    return around(ball->radius, ball->radius, ball->radius);
+  if (const auto* capsule = std::get_if<CapsuleField>(&field))
+    return around(capsule->radius, capsule->radius, capsule->radius + capsule->half_height);
+  if (const auto* cylinder = std::get_if<CylinderField>(&field))
+    return around(cylinder->radius, cylinder->radius, cylinder->half_height);
+  if (const auto* grid = std::get_if<DistanceGridField>(&field)) {
+    const Eigen::Vector3d half =
+        grid->spacing / 2 *
+        Eigen::Vector3d(grid->size[0] - 1.0, grid->size[1] - 1.0, grid->size[2] - 1.0);
+    return TurnedBox{grid->origin + half, half};
+  }
+  if (const auto* mesh = std::get_if<MeshField>(&field)) {
+    const Bounds own = bounds(mesh->tree);
+    return TurnedBox{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+struct Scene::Impl {
+  /// Where a body stands among the others.
+  enum class Place : std::uint8_t {
+    free,     ///< it is none
+    tree,     ///< its box is in a hierarchy
+    endless,  ///< it has no box
+    refused,  ///< its pose or scale is not usable
+  };
+  struct Placement {
+    Place place = Place::refused;
+    SceneBox box = {};
+  };
+
+  /// In the world, `margin` wider.
+  static Placement place_of(const PlacedSolid& solid, bool by_spheres, double margin) noexcept {
+    std::optional<TurnedBox> own;
+    double scale = 1, wider = margin;
+    const Pose* pose = nullptr;
+    if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
+      if (tree->tree.empty()) return {};
+      const Bounds b = bounds(tree->tree);
+      own = TurnedBox{(b.lower + b.upper) / 2, (b.upper - b.lower) / 2};
+      scale = tree->scale;
+      pose = &tree->pose;
+      if (by_spheres) wider += scale * tree->tree.protrusion();
+    } else {
+      const auto& field = std::get<PlacedField>(solid.placed);
+      own = own_box(field.field);
+      scale = field.scale;
+      pose = &field.pose;
+    }
+    const auto rotation = usable_rotation(*pose, scale);
+    if (!rotation) return {};
+    if (!own) return {Place::endless};
+    const Eigen::Matrix3d turn = rotation->toRotationMatrix();
+    const Eigen::Vector3d middle = turn * (scale * own->middle) + vector(pose->t);
+    const Eigen::Vector3d half =
+        turn.cwiseAbs() * (scale * own->half) + Eigen::Vector3d::Constant(wider);
+    const double farthest = (middle.cwiseAbs() + half).maxCoeff();
+    constexpr double kMost = 1e37;  // boxes are of floats
+    if (!std::isfinite(farthest) || farthest > kMost) return {};
+    Placement out{Place::tree};
+    for (int k = 0; k < 3; ++k) {
+      // Doubles round by far less than the next float lies aside.
+      const auto i = static_cast<std::size_t>(k);
+      out.box.low[i] = std::nextafter(static_cast<float>(middle[k] - half[k]), -kEndless);
+      out.box.high[i] = std::nextafter(static_cast<float>(middle[k] + half[k]), kEndless);
+    }
+    return out;
+  }
+
+  struct Body {
+    SceneBody given;
+    SceneBox box;
+    std::uint32_t leaf = kNone;
+    Place place = Place::free;
+    bool moved = false;  ///< or added, since the last step
+  };
+
+  /// Two bodies whose boxes meet.
+  struct Candidate {
+    std::uint64_t key;      ///< numbers, the lower one first
+    std::uint32_t body[2];  ///< indices, of the lower number first
+    std::uint32_t answer;   ///< in `answers`, in the order of candidates; kNone: they do not meet
+  };
+
+  static bool by_key(const Candidate& x, const Candidate& y) noexcept { return x.key < y.key; }
+
+  explicit Impl(const SceneSettings& given)
+      : settings(given), still(given.max_bodies), moving(given.max_bodies) {
+    bodies.reserve(given.max_bodies);
+    free_bodies.reserve(given.max_bodies);
+    moved.reserve(given.max_bodies);
+    endless.reserve(given.max_bodies);
+    refused.reserve(given.max_bodies);
+    refused_bodies.reserve(given.max_bodies);
+    index_of.reserve(given.max_bodies);
+    for (auto* const list : {&now, &before}) list->reserve(given.max_pairs);
+    for (auto* const list : {&answers, &old_answers}) list->reserve(given.max_pairs);
+    ended.reserve(given.max_pairs);
+    workspaces.reserve(given.workers);
+    for (std::size_t i = 0; i < given.workers; ++i)
+      workspaces.emplace_back(given.workspace_capacity);
+  }
+
+  SceneRule& rule_of(const Body& a, const Body& b) noexcept {
+    return rules[a.given.group * kSceneGroups + b.given.group];
+  }
+  Body* find(std::uint32_t number) noexcept {
+    const auto found = index_of.find(number);
+    return found == index_of.end() ? nullptr : &bodies[found->second];
+  }
+  std::uint32_t index(const Body& body) const noexcept {
+    return static_cast<std::uint32_t>(&body - bodies.data());
+  }
+  BoxTree& tree_of(const Body& body) noexcept { return body.given.moves ? moving : still; }
+
+  void note_moved(Body& body) noexcept {
+    if (std::exchange(body.moved, true)) return;
+    moved.push_back(index(body));
+  }
+
+  std::vector<std::uint32_t>* list_of(Place place) noexcept {
+    return place == Place::endless ? &endless : place == Place::refused ? &refused_bodies : nullptr;
+  }
+
+  void take_out(Body& body) noexcept {
+    if (body.place == Place::tree) tree_of(body).remove(body.leaf);
+    if (auto* const list = list_of(body.place))
+      list->erase(std::find(list->begin(), list->end(), index(body)));
+    body.place = Place::free;
+  }
+
+  /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
+  void place(Body& body, bool at_once) noexcept {
+    note_moved(body);
+    const auto [place, box] = place_of(body.given.solid, by_spheres, margin);
+    body.box = box;
+    if (place == Place::tree && body.place == Place::tree) {
+      if (at_once)
+        tree_of(body).put(body.leaf, box);
+      else
+        tree_of(body).move(body.leaf, box);
+      return;
+    }
+    take_out(body);
+    body.place = place;
+    if (place == Place::tree)
+      body.leaf = tree_of(body).add(index(body), box);
+    else
+      list_of(place)->push_back(index(body));
+  }
+  void place_all() noexcept {
+    for (const auto& [number, at] : index_of) place(bodies[at], true);
+    still.refit();
+    moving.refit();
+  }
+
+  bool may_meet(const Body& a, const Body& b) noexcept {
+    if (!a.given.moves && !b.given.moves) return false;
+    if ((a.given.layers & b.given.meets) == 0 || (b.given.layers & a.given.meets) == 0)
+      return false;
+    if (rule_of(a, b).answer == SceneAnswer::nothing) return false;
+    if (std::holds_alternative<PlacedField>(a.given.solid.placed) &&
+        std::holds_alternative<PlacedField>(b.given.solid.placed))
+      return false;
+    const std::uint32_t numbers[2] = {a.given.number, b.given.number};
+    if (!excluded.empty() &&
+        std::binary_search(excluded.begin(), excluded.end(), key_of(numbers[0], numbers[1])))
+      return false;
+    return filter == nullptr ||
+           filter(context, std::min(numbers[0], numbers[1]), std::max(numbers[0], numbers[1]));
+  }
+
+  void note(std::uint32_t i, std::uint32_t j) noexcept {
+    const Body &a = bodies[i], &b = bodies[j];
+    if ((!a.moved && !b.moved) || !may_meet(a, b)) return;
+    if (now.size() == settings.max_pairs) {
+      exceeded = true;
+      return;
+    }
+    const bool in_order = a.given.number < b.given.number;
+    now.push_back(
+        {key_of(a.given.number, b.given.number), {in_order ? i : j, in_order ? j : i}, kNone});
+  }
+
+  /// Pairs of which a body moved whose boxes meet.
+  void find_candidates() noexcept {
+    const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
+    if (8 * moved.size() > still.size() + moving.size()) {
+      moving.pairs_within(both);
+      moving.pairs_with(still, both);
+    } else {
+      for (const std::uint32_t i : moved) {
+        const Body& body = bodies[i];
+        if (body.place != Place::tree) continue;
+        const auto enter = [&](const SceneBox& box) { return box.meets(body.box); };
+        const auto visit = [&](std::uint32_t j) {
+          // Two that moved find each other.
+          if (j != i && (!bodies[j].moved || i < j)) note(i, j);
+        };
+        moving.each(enter, visit);
+        if (body.given.moves) still.each(enter, visit);
+      }
+    }
+    for (const std::uint32_t i : endless) {
+      if (bodies[i].moved) {
+        for (std::uint32_t j = 0; j < bodies.size(); ++j) {
+          const Body& other = bodies[j];
+          // Two that moved find each other.
+          if (other.place == Place::tree ||
+              (other.place == Place::endless && j != i && (!other.moved || i < j)))
+            note(i, j);
+        }
+        continue;
+      }
+      for (const std::uint32_t j : moved)
+        if (bodies[j].place == Place::tree) note(i, j);
+    }
+  }
+
+  /// Answers a candidate. Returns whether the bodies meet.
+  bool answer(const Candidate& two, ScenePair& out, ContactPatch* patches_of,
+              Workspace& workspace) noexcept {
+    const Body &a = bodies[two.body[0]], &b = bodies[two.body[1]];
+    const PlacedSolid &solid_a = a.given.solid, &solid_b = b.given.solid;
+    const SceneRule& rule = rule_of(a, b);
+    out = {};
+    out.a = a.given.number;
+    out.b = b.given.number;
+    if (rule.answer == SceneAnswer::overlap) {
+      out.overlapping = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
+                                        : overlap(solid_a, solid_b, workspace);
+      return out.overlapping != Overlapping::no;
+    }
+    if (rule.answer == SceneAnswer::patches) {
+      const ContactPatches found = contact_patches(solid_a, solid_b, rule.penetration, workspace,
+                                                   {patches_of, settings.patches_per_pair});
+      out.penetration = found.penetration;
+      out.patch_count = static_cast<std::uint32_t>(found.count);
+    } else {
+      out.penetration = penetration(solid_a, solid_b, rule.penetration, workspace);
+    }
+    const Penetration& p = out.penetration;
+    bool meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
+    if (rule.margin > 0 && (std::isnan(p.volume) || p.volume == 0)) {
+      SeparationSettings limits;
+      limits.max_distance = rule.margin;
+      out.separation = separation(solid_a, solid_b, limits, workspace);
+      meet = meet || out.separation.status != QueryStatus::ok ||
+             out.separation.distance_min < rule.margin;
+    }
+    return meet;
+  }
+
+  void remember_unmoved() noexcept {
+    // Of bodies that stand still the answers stay.
+    for (const Candidate& old : before) {
+      const Body &a = bodies[old.body[0]], &b = bodies[old.body[1]];
+      if (a.moved || b.moved || a.place == Place::free || b.place == Place::free) continue;
+      if (now.size() == settings.max_pairs) {
+        exceeded = true;
+        return;
+      }
+      now.push_back(old);
+    }
+  }
+
+  SceneStep step(const ParallelFor& parallel) noexcept {
+    still.settle();
+    moving.settle();
+    std::swap(now, before);
+    std::swap(answers, old_answers);
+    std::swap(patches, old_patches);
+    now.clear();
+    exceeded = false;
+    find_candidates();
+    remember_unmoved();
+    ended.clear();
+    refused.clear();
+    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
+    std::sort(refused.begin(), refused.end());
+    SceneStep out;
+    out.refused = refused;
+    out.boxes_met = now.size();
+    if (exceeded) {
+      // As if it had not been: what moved is asked in the next step.
+      std::swap(now, before);
+      std::swap(answers, old_answers);
+      std::swap(patches, old_patches);
+      out.pairs_exceeded = true;
+      return out;
+    }
+    std::sort(now.begin(), now.end(), by_key);
+    answers.resize(now.size());
+    const auto is_kept = [&](const Candidate& two) {
+      return !bodies[two.body[0]].moved && !bodies[two.body[1]].moved;
+    };
+    const auto ask = [&](std::size_t i, std::size_t worker) {
+      Candidate& two = now[i];
+      const std::size_t at = i * settings.patches_per_pair;
+      ContactPatch* const room = patches.empty() ? nullptr : patches.data() + at;
+      if (is_kept(two)) {
+        if (two.answer == kNone) return;
+        answers[i] = old_answers[two.answer];
+        std::copy_n(old_patches.begin() + answers[i].first_patch, answers[i].patch_count, room);
+      } else if (!answer(two, answers[i], room, workspaces[worker])) {
+        return;
+      }
+      answers[i].first_patch = static_cast<std::uint32_t>(at);
+      two.answer = 0;
+    };
+    answer_all(now.size(), workspaces.size(), parallel, ask);
+    std::uint32_t count = 0;
+    auto old = before.begin();
+    const auto end_before = [&](std::uint64_t key) {
+      for (; old != before.end() && old->key < key; ++old)
+        if (old->answer != kNone) ended.push_back(name_of(old->key));
+    };
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      end_before(now[i].key);
+      const bool met = old != before.end() && old->key == now[i].key && old->answer != kNone;
+      if (old != before.end() && old->key == now[i].key) {
+        if (met && now[i].answer == kNone) ended.push_back(name_of(old->key));
+        ++old;
+      }
+      if (now[i].answer == kNone) continue;
+      answers[i].event = met ? SceneEvent::stays : SceneEvent::begins;
+      now[i].answer = count;
+      answers[count++] = answers[i];
+    }
+    end_before(~std::uint64_t{0});
+    answers.resize(count);
+    for (const std::uint32_t i : moved) {
+      bodies[i].moved = false;
+      if (bodies[i].place == Place::free) free_bodies.push_back(i);
+    }
+    moved.clear();
+    out.pairs = answers;
+    out.ended = ended;
+    return out;
+  }
+
+  SceneSettings settings;
+  std::array<SceneRule, kSceneGroups * kSceneGroups> rules;
+  double margin = 0;       ///< half the largest of the rules': each body has one
+  bool by_spheres = true;  ///< a rule asks a measure of spheres, which stick out
+  BoxTree still, moving;
+  std::vector<Body> bodies;
+  std::unordered_map<std::uint32_t, std::uint32_t> index_of;
+  std::vector<std::uint32_t> free_bodies, moved, endless, refused_bodies, refused;
+  std::vector<std::uint64_t> excluded;
+  bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept = nullptr;
+  const void* context = nullptr;
+  std::vector<Candidate> now, before;
+  std::vector<ScenePair> answers, old_answers;
+  std::vector<ContactPatch> patches, old_patches;
+  std::vector<ScenePairName> ended;
+  bool exceeded = false;
+  std::vector<Workspace> workspaces;
+};
+
+Scene::Scene(const SceneSettings& settings) {
+  const auto in_range = [](std::size_t value, std::size_t most, const char* name) {
+    if (value < 1 || value > most)
+      throw Error("a scene's " + std::string(name) + " is " + std::to_string(value) +
+                  ": give 1 to " + std::to_string(most));
+  };
+  in_range(settings.max_bodies, 1u << 30, "max_bodies");
+  in_range(settings.max_pairs, 1u << 30, "max_pairs");
+  in_range(settings.patches_per_pair, 1024, "patches_per_pair");
+  in_range(settings.workers, 4096, "workers");
+  impl_ = std::make_unique<Impl>(settings);
+}
+Scene::~Scene() = default;
+Scene::Scene(Scene&&) noexcept = default;
+Scene& Scene::operator=(Scene&&) noexcept = default;
+
+void Scene::add(const SceneBody& body) {
+  Impl& all = *impl_;
+  const std::string name = "body " + std::to_string(body.number);
+  if (all.find(body.number) != nullptr) throw Error(name + " is in the scene already");
+  if (body.group >= kSceneGroups)
+    throw Error(name + ": group " + std::to_string(body.group) + " is not below " +
+                std::to_string(kSceneGroups));
+  if (all.index_of.size() == all.settings.max_bodies)
+    throw Error(name + ": the scene is full; give a larger SceneSettings::max_bodies (" +
+                std::to_string(all.settings.max_bodies) + ")");
+  std::uint32_t at = 0;
+  if (!all.free_bodies.empty()) {
+    at = all.free_bodies.back();
+    all.free_bodies.pop_back();
+  } else {
+    // Those of bodies that were removed since the last step are not free yet.
+    at = static_cast<std::uint32_t>(all.bodies.size());
+    all.bodies.emplace_back();
+    for (auto* const list :
+         {&all.moved, &all.endless, &all.refused, &all.refused_bodies, &all.free_bodies})
+      list->reserve(all.bodies.size());
+  }
+  all.index_of.emplace(body.number, at);
+  all.bodies[at] = {};
+  all.bodies[at].given = body;
+  all.place(all.bodies[at], false);
+}
+
+bool Scene::remove(std::uint32_t number) noexcept {
+  auto* const body = impl_->find(number);
+  if (body == nullptr) return false;
+  impl_->index_of.erase(number);
+  impl_->take_out(*body);
+  impl_->note_moved(*body);
+  return true;
+}
+
+bool Scene::set_pose(std::uint32_t number, const Pose& pose) noexcept {
+  return set_poses({&number, 1}, {&pose, 1}) == 1;
+}
+
+std::size_t Scene::set_poses(std::span<const std::uint32_t> numbers,
+                             std::span<const Pose> poses) noexcept {
+  Impl& all = *impl_;
+  const std::size_t count = std::min(numbers.size(), poses.size());
+  const bool at_once = 8 * count > all.index_of.size();
+  std::size_t set = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto* const body = all.find(numbers[i]);
+    if (body == nullptr) continue;
+    std::visit([&](auto& placed) { placed.pose = poses[i]; }, body->given.solid.placed);
+    all.place(*body, at_once);
+    ++set;
+  }
+  if (at_once) {
+    all.still.refit();
+    all.moving.refit();
+  }
+  return set;
+}
+
+std::size_t Scene::size() const noexcept { return impl_->index_of.size(); }
+
+std::optional<SceneBody> Scene::body(std::uint32_t number) const {
+  auto* const body = impl_->find(number);
+  return body == nullptr ? std::nullopt : std::optional(body->given);
+}
+
+void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule) {
+  if (group_a >= kSceneGroups || group_b >= kSceneGroups)
+    throw Error("a rule's groups are " + std::to_string(group_a) + " and " +
+                std::to_string(group_b) + ": give numbers below " + std::to_string(kSceneGroups));
+  if (!(rule.margin >= 0 && std::isfinite(rule.margin)))
+    throw Error("a rule's margin is " + std::to_string(rule.margin) + ": give 0 or more");
+  Impl& all = *impl_;
+  SceneRule plain = rule;
+  plain.penetration.pair_id = 0;
+  if (rule.answer == SceneAnswer::patches && all.patches.empty())
+    for (auto* const list : {&all.patches, &all.old_patches})
+      list->resize(all.settings.max_pairs * all.settings.patches_per_pair);
+  all.rules[group_a * kSceneGroups + group_b] = all.rules[group_b * kSceneGroups + group_a] = plain;
+  all.margin = 0;
+  all.by_spheres = false;
+  for (const SceneRule& one : all.rules) {
+    all.margin = std::max(all.margin, one.margin / 2);
+    all.by_spheres |=
+        one.answer > SceneAnswer::overlap && one.penetration.measure == Measure::matched;
+  }
+  all.place_all();
+}
+
+void Scene::exclude(std::uint32_t a, std::uint32_t b) {
+  auto& list = impl_->excluded;
+  const auto at = std::lower_bound(list.begin(), list.end(), key_of(a, b));
+  if (at != list.end() && *at == key_of(a, b)) return;
+  list.insert(at, key_of(a, b));
+  for (const std::uint32_t number : {a, b})
+    if (auto* const body = impl_->find(number)) impl_->note_moved(*body);
+}
+
+void Scene::include(std::uint32_t a, std::uint32_t b) noexcept {
+  auto& list = impl_->excluded;
+  const auto at = std::lower_bound(list.begin(), list.end(), key_of(a, b));
+  if (at == list.end() || *at != key_of(a, b)) return;
+  list.erase(at);
+  for (const std::uint32_t number : {a, b})
+    if (auto* const body = impl_->find(number)) impl_->note_moved(*body);
+}
+
+void Scene::set_filter(bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept,
+                       const void* context) noexcept {
+  impl_->filter = filter;
+  impl_->context = context;
+  impl_->place_all();
+}
+
+SceneStep Scene::step(const ParallelFor& parallel) noexcept { return impl_->step(parallel); }
+
+std::span<const ContactPatch> Scene::patches(const ScenePair& pair) const noexcept {
+  if (pair.patch_count == 0) return {};
+  return {impl_->patches.data() + pair.first_patch, pair.patch_count};
+}
+
+SceneHit Scene::raycast(const Ray& ray) const noexcept {
+  SceneHit best;
+  // (also for a ray that is not usable)
+  if (!ray.origin.allFinite() || !ray.direction.allFinite() || ray.direction.isZero(0)) return best;
+  const Eigen::Vector3d unit = ray.direction.stableNormalized();
+  double longest = ray.longest;
+  const auto enter = [&](const SceneBox& box) {
+    double from = 0, to = longest;
+    for (int k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double low = box.low[i] - ray.origin[k], high = box.high[i] - ray.origin[k];
+      if (unit[k] == 0) {
+        if (low > 0 || high < 0) return false;
+        continue;
+      }
+      const double x = low / unit[k], y = high / unit[k];
+      from = std::max(from, std::min(x, y));
+      to = std::min(to, std::max(x, y));
+    }
+    // Rounding must not pass a flat box.
+    return from <= to * (1 + 1e-12) + 1e-300;
+  };
+  const auto visit = [&](std::uint32_t i) {
+    const auto& body = impl_->bodies[i];
+    const RayHit hit = ist::raycast(body.given.solid, ray);
+    if (hit.status != QueryStatus::ok || !hit.hit() || !(hit.distance <= longest)) return;
+    if (best.hit.hit() && hit.distance == best.hit.distance && body.given.number > best.number)
+      return;
+    best = {body.given.number, hit};
+    longest = hit.distance;
+  };
+  for (const std::uint32_t i : impl_->endless) visit(i);
+  impl_->still.each(enter, visit);
+  impl_->moving.each(enter, visit);
+  return best;
+}
+
+std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
+                          std::span<std::uint32_t> numbers) const noexcept {
+  SceneBox box;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    box.low[i] = std::nextafter(static_cast<float>(lower[k]), -kEndless);
+    box.high[i] = std::nextafter(static_cast<float>(upper[k]), kEndless);
+  }
+  std::size_t count = 0;
+  const auto visit = [&](std::uint32_t i) {
+    if (count < numbers.size()) numbers[count] = impl_->bodies[i].given.number;
+    ++count;
+  };
+  const auto enter = [&](const SceneBox& node) { return node.meets(box); };
+  for (const std::uint32_t i : impl_->endless) visit(i);
+  impl_->still.each(enter, visit);
+  impl_->moving.each(enter, visit);
+  return count;
+}
+
+}  // namespace ist
