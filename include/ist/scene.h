@@ -16,9 +16,10 @@ namespace IST_API ist {
 /// What a scene answers of two bodies.
 enum class SceneAnswer : std::uint32_t {
   nothing = 0,      ///< they do not meet
-  overlap = 1,      ///< overlap(), within the margin: yes, no or unknown
-  penetration = 2,  ///< penetration(), and separation() where a margin is set
-  patches = 3,      ///< contact_patches(), likewise
+  boxes = 1,        ///< they meet where their boxes do, each half the margin wider
+  overlap = 2,      ///< overlap(), within the margin: yes, no or unknown
+  penetration = 3,  ///< penetration(), and separation() where a margin is set
+  patches = 4,      ///< contact_patches(), likewise
 };
 
 /// How bodies of two groups are asked.
@@ -46,14 +47,12 @@ inline constexpr std::uint32_t kSceneGroups = 8;
 enum class SceneEvent : std::uint32_t { begins = 0, stays = 1 };
 
 /// Two bodies that meet: their volume is positive, or they touch, or they come within the margin,
-/// or it is unknown. The status of an answer that failed is here too, with NaN.
+/// or it is unknown. Answers that failed are here too: their status says why.
 struct ScenePair {
   std::uint32_t a = 0, b = 0;  ///< numbers, a < b; A of the query is `a`
   SceneEvent event = SceneEvent::begins;
   Overlapping overlapping = Overlapping::unknown;  ///< SceneAnswer::overlap alone
-  Penetration penetration;
-  Separation separation;          ///< with a margin: all zero of bodies that overlap
-  std::uint32_t first_patch = 0;  ///< in Scene::patches()
+  std::uint32_t slot = ~0u;                        ///< where its answers are
   std::uint32_t patch_count = 0;
 };
 
@@ -130,7 +129,10 @@ class Scene {
 
   /// Asks all pairs that may have changed.
   SceneStep step(const ParallelFor& parallel = {}) noexcept;
-  /// Of the last step.
+  /// Answers to a pair of the last step: all zero where its rule asks no such thing. Of bodies that
+  /// overlap the separation is zero.
+  Penetration penetration(const ScenePair& pair) const noexcept;
+  Separation separation(const ScenePair& pair) const noexcept;
   std::span<const ContactPatch> patches(const ScenePair& pair) const noexcept;
 
   /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.

@@ -1,6 +1,6 @@
 #include "scene/box_tree.h"
 
-#include <cmath>
+#include <utility>
 
 namespace ist {
 namespace {
@@ -11,15 +11,16 @@ constexpr double kWorn = 1.5;
 }  // namespace
 
 BoxTree::BoxTree(std::size_t most) {
-  nodes_.reserve(2 * most);
+  for (auto* const list : {&nodes_, &other_nodes_}) list->reserve(2 * most);
+  node_of_.reserve(most);
   free_.reserve(2 * most);
-  order_.reserve(2 * most);
-  // Two nodes of depth d leave no more than 3 d waiting; hierarchies are built anew before they are
-  // deep, but in the worst case they are a chain.
+  order_.reserve(most);
+  // Two nodes leave at most three of a level waiting; in the worst case the hierarchy is a chain.
   stack_.reserve(6 * most + 64);
 }
 
 std::uint32_t BoxTree::take_node() noexcept {
+  in_order_ = false;
   if (free_.empty()) {
     nodes_.emplace_back();
     return static_cast<std::uint32_t>(nodes_.size() - 1);
@@ -32,19 +33,24 @@ std::uint32_t BoxTree::take_node() noexcept {
 
 void BoxTree::fit_above(std::uint32_t node) noexcept {
   for (std::uint32_t at = nodes_[node].parent; at != kNone; at = nodes_[at].parent) {
-    const SceneBox box = nodes_[nodes_[at].child[0]].box.united(nodes_[nodes_[at].child[1]].box);
-    if (box == nodes_[at].box) return;
-    nodes_[at].box = box;
+    const SceneBox before = nodes_[at].box;
+    fit(nodes_[at]);
+    if (nodes_[at].box == before) return;
   }
 }
 
-std::uint32_t BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
+void BoxTree::add(std::uint32_t body, const SceneBox& box) {
+  if (node_of_.size() <= body) node_of_.resize(body + 1, kNone);
   const std::uint32_t leaf = take_node();
+  node_of_[body] = leaf;
   nodes_[leaf].box = box;
   nodes_[leaf].body = body;
   ++leaves_;
   ++added_;
-  if (root_ == kNone) return root_ = leaf;
+  if (root_ == kNone) {
+    root_ = leaf;
+    return;
+  }
   // Down to where the least area is added.
   std::uint32_t at = root_;
   while (!nodes_[at].is_leaf()) {
@@ -68,11 +74,12 @@ std::uint32_t BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
   else
     nodes_[parent].child[nodes_[parent].child[0] == at ? 0 : 1] = above;
   fit_above(above);
-  return leaf;
 }
 
-void BoxTree::remove(std::uint32_t leaf) noexcept {
+void BoxTree::remove(std::uint32_t body) noexcept {
+  const std::uint32_t leaf = std::exchange(node_of_[body], kNone);
   --leaves_;
+  in_order_ = false;
   free_.push_back(leaf);
   const std::uint32_t above = nodes_[leaf].parent;
   if (above == kNone) {
@@ -91,90 +98,72 @@ void BoxTree::remove(std::uint32_t leaf) noexcept {
   fit_above(other);
 }
 
-void BoxTree::move(std::uint32_t leaf, const SceneBox& box) noexcept {
-  nodes_[leaf].box = box;
-  fit_above(leaf);
+void BoxTree::move(std::uint32_t body, const SceneBox& box) noexcept {
+  nodes_[node_of_[body]].box = box;
+  fit_above(node_of_[body]);
 }
 
 void BoxTree::refit() noexcept {
-  if (root_ == kNone || nodes_[root_].is_leaf()) return;
+  // As dear as to build it: an order that is broken.
+  if (!in_order_) return build();
   double area = 0;
-  // Children before their parents, by the parents' links.
-  std::uint32_t at = root_;
-  while (!nodes_[at].is_leaf()) at = nodes_[at].child[0];
-  while (nodes_[at].parent != kNone) {
-    const std::uint32_t up = nodes_[at].parent;
-    if (nodes_[up].child[0] == at) {
-      at = nodes_[up].child[1];
-      while (!nodes_[at].is_leaf()) at = nodes_[at].child[0];
-      continue;
-    }
-    Node& node = nodes_[up];
-    node.box = nodes_[node.child[0]].box.united(nodes_[node.child[1]].box);
-    area += node.box.area();
-    at = up;
+  for (std::size_t i = nodes_.size(); i-- > 0;) {
+    if (nodes_[i].is_leaf()) continue;
+    fit(nodes_[i]);
+    area += nodes_[i].box.area();
   }
-  // (also where it is NaN, of boxes without an end)
   if (area > kWorn * built_area_) build();
 }
 
 void BoxTree::build() noexcept {
   added_ = 0;
   built_area_ = 0;
-  if (root_ == kNone || nodes_[root_].is_leaf()) return;
+  in_order_ = true;
+  if (root_ == kNone) return;
   order_.clear();
-  for (std::uint32_t at = root_; at != kNone;) {
-    while (!nodes_[at].is_leaf()) at = nodes_[at].child[0];
-    for (;;) {
-      const std::uint32_t up = nodes_[at].parent;
-      if (nodes_[at].is_leaf()) order_.push_back(at);
-      if (up == kNone) {
-        at = kNone;
-        break;
-      }
-      if (nodes_[up].child[0] == at) {
-        at = nodes_[up].child[1];
-        break;
-      }
-      free_.push_back(up);
-      at = up;
-    }
-  }
+  for (const std::uint32_t leaf : node_of_)
+    if (leaf != kNone) order_.push_back(leaf);
+  free_.clear();
+  other_nodes_.clear();
   root_ = build(order_.data(), order_.data() + order_.size());
-  nodes_[root_].parent = kNone;
+  other_nodes_[root_].parent = kNone;
+  std::swap(nodes_, other_nodes_);
 }
 
+/// In `other_nodes_`, of leaves of `nodes_`.
 std::uint32_t BoxTree::build(std::uint32_t* first, std::uint32_t* last) noexcept {
-  if (last - first == 1) return *first;
+  const auto node = static_cast<std::uint32_t>(other_nodes_.size());
+  if (last - first == 1) {
+    other_nodes_.push_back(nodes_[*first]);
+    node_of_[nodes_[*first].body] = node;
+    return node;
+  }
+  other_nodes_.emplace_back();
   const auto middle_of = [&](std::uint32_t leaf, std::size_t k) {
-    // Boxes without an end have none.
-    const double m = double{nodes_[leaf].box.low[k]} + nodes_[leaf].box.high[k];
-    return std::isfinite(m) ? m : 0.0;
+    return nodes_[leaf].box.low[k] + nodes_[leaf].box.high[k];
   };
-  double low[3], high[3];
-  for (std::size_t k = 0; k < 3; ++k) {
-    low[k] = high[k] = middle_of(*first, k);
-    for (const std::uint32_t* leaf = first; leaf != last; ++leaf) {
+  float low[3], high[3];
+  for (std::size_t k = 0; k < 3; ++k) low[k] = high[k] = middle_of(*first, k);
+  for (const std::uint32_t* leaf = first; leaf != last; ++leaf)
+    for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], middle_of(*leaf, k));
       high[k] = std::max(high[k], middle_of(*leaf, k));
     }
-  }
   std::size_t axis = 0;
   for (std::size_t k = 1; k < 3; ++k)
     if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
   std::uint32_t* const half = first + (last - first) / 2;
   std::nth_element(first, half, last, [&](std::uint32_t x, std::uint32_t y) {
-    const double mx = middle_of(x, axis), my = middle_of(y, axis);
+    const float mx = middle_of(x, axis), my = middle_of(y, axis);
     return mx != my ? mx < my : x < y;
   });
-  const std::uint32_t node = take_node();
   const std::uint32_t children[2] = {build(first, half), build(half, last)};
-  Node& made = nodes_[node];
+  Node& made = other_nodes_[node];
   for (int k = 0; k < 2; ++k) {
     made.child[k] = children[k];
-    nodes_[children[k]].parent = node;
+    other_nodes_[children[k]].parent = node;
   }
-  made.box = nodes_[children[0]].box.united(nodes_[children[1]].box);
+  made.box = other_nodes_[children[0]].box.united(other_nodes_[children[1]].box);
   built_area_ += made.box.area();
   return node;
 }

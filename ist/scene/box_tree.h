@@ -43,16 +43,16 @@ class BoxTree {
   explicit BoxTree(std::size_t most);
 
   std::uint32_t size() const noexcept { return leaves_; }
-  /// Returns the leaf. Many that are added in a row are cheaper to build() at once.
-  std::uint32_t add(std::uint32_t body, const SceneBox& box) noexcept;
-  void remove(std::uint32_t leaf) noexcept;
-  /// Sets the box of a leaf and those above it.
-  void move(std::uint32_t leaf, const SceneBox& box) noexcept;
-  /// Sets the box of a leaf alone: until refit() or build() nothing may be asked.
-  void put(std::uint32_t leaf, const SceneBox& box) noexcept { nodes_[leaf].box = box; }
-  /// Sets all boxes above leaves, and builds anew where they have grown too much.
+  /// Many that are added in a row are cheaper to settle() at once. `body`: any number; memory is
+  /// taken for all up to it.
+  void add(std::uint32_t body, const SceneBox& box);
+  void remove(std::uint32_t body) noexcept;
+  /// Sets the box of a body and those above it.
+  void move(std::uint32_t body, const SceneBox& box) noexcept;
+  /// Sets the box of a body alone: until refit() nothing may be asked.
+  void put(std::uint32_t body, const SceneBox& box) noexcept { nodes_[node_of_[body]].box = box; }
+  /// Sets all boxes above those of bodies, and builds anew where they have grown too much.
   void refit() noexcept;
-  void build() noexcept;
   /// Builds anew where many were added.
   void settle() noexcept {
     if (2 * added_ > leaves_) build();
@@ -98,7 +98,8 @@ class BoxTree {
   void pairs_with(const BoxTree& other, const Visit& visit) noexcept {
     if (root_ == kNone || other.root_ == kNone) return;
     stack_.clear();
-    stack_.push_back({root_, other.root_});
+    if (nodes_[root_].box.meets(other.nodes_[other.root_].box))
+      stack_.push_back({root_, other.root_});
     go_on(other, visit);
   }
 
@@ -121,35 +122,42 @@ class BoxTree {
       const Two two = stack_.back();
       stack_.pop_back();
       const Node &a = nodes_[two.a], &b = other.nodes_[two.b];
+      const auto wait = [&](std::uint32_t x, std::uint32_t y) {
+        if (nodes_[x].box.meets(other.nodes_[y].box)) stack_.push_back({x, y});
+      };
       if (this == &other && two.a == two.b) {
         if (a.is_leaf()) continue;
-        stack_.push_back({a.child[0], a.child[1]});
+        wait(a.child[0], a.child[1]);
         stack_.push_back({a.child[1], a.child[1]});
         stack_.push_back({a.child[0], a.child[0]});
-        continue;
-      }
-      if (!a.box.meets(b.box)) continue;
-      if (a.is_leaf() && b.is_leaf()) {
+      } else if (a.is_leaf() && b.is_leaf()) {
         visit(a.body, b.body);
-      } else if (b.is_leaf() || (!a.is_leaf() && a.box.area() >= b.box.area())) {
-        stack_.push_back({a.child[1], two.b});
-        stack_.push_back({a.child[0], two.b});
+      } else if (b.is_leaf()) {
+        for (const std::uint32_t x : a.child) wait(x, two.b);
+      } else if (a.is_leaf()) {
+        for (const std::uint32_t y : b.child) wait(two.a, y);
       } else {
-        stack_.push_back({two.a, b.child[1]});
-        stack_.push_back({two.a, b.child[0]});
+        for (const std::uint32_t x : a.child)
+          for (const std::uint32_t y : b.child) wait(x, y);
       }
     }
   }
   std::uint32_t take_node() noexcept;
   void fit_above(std::uint32_t node) noexcept;
+  void build() noexcept;
   std::uint32_t build(std::uint32_t* first, std::uint32_t* last) noexcept;
+  void fit(Node& node) noexcept {
+    node.box = nodes_[node.child[0]].box.united(nodes_[node.child[1]].box);
+  }
 
-  std::vector<Node> nodes_;
+  std::vector<Node> nodes_, other_nodes_;
+  std::vector<std::uint32_t> node_of_;  ///< of a body
   std::vector<std::uint32_t> free_, order_;
   std::vector<Two> stack_;
   std::uint32_t root_ = kNone, leaves_ = 0;
   double built_area_ = 0;  ///< of all nodes above leaves, when they were built
   std::size_t added_ = 0;  ///< since
+  bool in_order_ = true;   ///< no node is taken out, and each stands before those below it
 };
 
 }  // namespace ist

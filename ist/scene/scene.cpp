@@ -17,10 +17,21 @@
 #include "scene/box_tree.h"
 
 namespace ist {
+
+/// A box in a body's own frame.
+struct TurnedBox {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero();
+};
+
 namespace {
 
 constexpr std::uint32_t kNone = BoxTree::kNone;
-constexpr float kEndless = std::numeric_limits<float>::infinity();
+
+/// A float that is lower, by more than what doubles round.
+float float_below(double x) noexcept {
+  const auto nearest = static_cast<float>(x);
+  return nearest - std::abs(nearest) * 1.2e-7f - 1e-37f;
+}
 
 std::uint64_t key_of(std::uint32_t a, std::uint32_t b) noexcept {
   return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
@@ -29,10 +40,7 @@ ScenePairName name_of(std::uint64_t key) noexcept {
   return {static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
 }
 
-/// The box around a box that is turned; empty where it has no end.
-struct TurnedBox {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero();
-};
+/// Empty where it has no end.
 std::optional<TurnedBox> own_box(const Field& field) noexcept {
   const auto around = [](double x, double y, double z) {
     return TurnedBox{Eigen::Vector3d::Zero(), {x, y, z}};
@@ -73,60 +81,68 @@ struct Scene::Impl {
     SceneBox box = {};
   };
 
-  /// In the world, `margin` wider.
-  static Placement place_of(const PlacedSolid& solid, bool by_spheres, double margin) noexcept {
-    std::optional<TurnedBox> own;
-    double scale = 1, wider = margin;
-    const Pose* pose = nullptr;
+  /// What of a solid does not change with its pose.
+  struct Kept {
+    std::optional<TurnedBox> box;  ///< in its own frame, scaled
+    double scale = 1;
+    double sticks_out = 0;  ///< [u] matched spheres
+    bool empty = false;
+  };
+  static Kept kept_of(const PlacedSolid& solid) noexcept {
+    Kept out;
     if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
-      if (tree->tree.empty()) return {};
       const Bounds b = bounds(tree->tree);
-      own = TurnedBox{(b.lower + b.upper) / 2, (b.upper - b.lower) / 2};
-      scale = tree->scale;
-      pose = &tree->pose;
-      if (by_spheres) wider += scale * tree->tree.protrusion();
+      out = {TurnedBox{(b.lower + b.upper) / 2, (b.upper - b.lower) / 2}, tree->scale,
+             tree->scale * tree->tree.protrusion(), tree->tree.empty()};
     } else {
       const auto& field = std::get<PlacedField>(solid.placed);
-      own = own_box(field.field);
-      scale = field.scale;
-      pose = &field.pose;
+      out = {own_box(field.field), field.scale};
     }
-    const auto rotation = usable_rotation(*pose, scale);
-    if (!rotation) return {};
-    if (!own) return {Place::endless};
+    if (out.box) {
+      out.box->middle *= out.scale;
+      out.box->half *= out.scale;
+    }
+    return out;
+  }
+
+  /// In the world, `wider`.
+  static Placement place_of(const Kept& kept, const Pose& pose, double wider) noexcept {
+    const auto rotation = usable_rotation(pose, kept.scale);
+    if (!rotation || kept.empty) return {};
+    if (!kept.box) return {Place::endless};
     const Eigen::Matrix3d turn = rotation->toRotationMatrix();
-    const Eigen::Vector3d middle = turn * (scale * own->middle) + vector(pose->t);
+    const Eigen::Vector3d middle = turn * kept.box->middle + vector(pose.t);
     const Eigen::Vector3d half =
-        turn.cwiseAbs() * (scale * own->half) + Eigen::Vector3d::Constant(wider);
+        turn.cwiseAbs() * kept.box->half + Eigen::Vector3d::Constant(wider);
     const double farthest = (middle.cwiseAbs() + half).maxCoeff();
     constexpr double kMost = 1e37;  // boxes are of floats
     if (!std::isfinite(farthest) || farthest > kMost) return {};
     Placement out{Place::tree};
     for (int k = 0; k < 3; ++k) {
-      // Doubles round by far less than the next float lies aside.
       const auto i = static_cast<std::size_t>(k);
-      out.box.low[i] = std::nextafter(static_cast<float>(middle[k] - half[k]), -kEndless);
-      out.box.high[i] = std::nextafter(static_cast<float>(middle[k] + half[k]), kEndless);
+      out.box.low[i] = float_below(middle[k] - half[k]);
+      out.box.high[i] = -float_below(-(middle[k] + half[k]));
     }
     return out;
   }
 
   struct Body {
     SceneBody given;
+    Kept kept;
     SceneBox box;
-    std::uint32_t leaf = kNone;
     Place place = Place::free;
     bool moved = false;  ///< or added, since the last step
   };
 
   /// Two bodies whose boxes meet.
   struct Candidate {
-    std::uint64_t key;      ///< numbers, the lower one first
-    std::uint32_t body[2];  ///< indices, of the lower number first
-    std::uint32_t answer;   ///< in `answers`, in the order of candidates; kNone: they do not meet
+    std::uint64_t key;           ///< numbers, the lower one first
+    std::uint32_t body[2];       ///< indices, of the lower number first
+    std::uint32_t slot = kNone;  ///< of its answer; kNone: there is none
+    std::uint32_t patches = 0;
+    Overlapping overlapping = Overlapping::unknown;
+    bool meet = false;
   };
-
-  static bool by_key(const Candidate& x, const Candidate& y) noexcept { return x.key < y.key; }
 
   explicit Impl(const SceneSettings& given)
       : settings(given), still(given.max_bodies), moving(given.max_bodies) {
@@ -137,8 +153,11 @@ struct Scene::Impl {
     refused.reserve(given.max_bodies);
     refused_bodies.reserve(given.max_bodies);
     index_of.reserve(given.max_bodies);
-    for (auto* const list : {&now, &before}) list->reserve(given.max_pairs);
-    for (auto* const list : {&answers, &old_answers}) list->reserve(given.max_pairs);
+    for (auto* const list : {&now, &before, &fresh}) list->reserve(given.max_pairs);
+    pairs.reserve(given.max_pairs);
+    penetrations.reserve(given.max_pairs);
+    separations.reserve(given.max_pairs);
+    free_slots.reserve(given.max_pairs);
     ended.reserve(given.max_pairs);
     workspaces.reserve(given.workers);
     for (std::size_t i = 0; i < given.workers; ++i)
@@ -167,7 +186,7 @@ struct Scene::Impl {
   }
 
   void take_out(Body& body) noexcept {
-    if (body.place == Place::tree) tree_of(body).remove(body.leaf);
+    if (body.place == Place::tree) tree_of(body).remove(index(body));
     if (auto* const list = list_of(body.place))
       list->erase(std::find(list->begin(), list->end(), index(body)));
     body.place = Place::free;
@@ -176,19 +195,22 @@ struct Scene::Impl {
   /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
   void place(Body& body, bool at_once) noexcept {
     note_moved(body);
-    const auto [place, box] = place_of(body.given.solid, by_spheres, margin);
+    const Pose& pose = std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
+                                  body.given.solid.placed);
+    const auto [place, box] =
+        place_of(body.kept, pose, margin + (by_spheres ? body.kept.sticks_out : 0));
     body.box = box;
     if (place == Place::tree && body.place == Place::tree) {
       if (at_once)
-        tree_of(body).put(body.leaf, box);
+        tree_of(body).put(index(body), box);
       else
-        tree_of(body).move(body.leaf, box);
+        tree_of(body).move(index(body), box);
       return;
     }
     take_out(body);
     body.place = place;
     if (place == Place::tree)
-      body.leaf = tree_of(body).add(index(body), box);
+      tree_of(body).add(index(body), box);
     else
       list_of(place)->push_back(index(body));
   }
@@ -217,13 +239,12 @@ struct Scene::Impl {
   void note(std::uint32_t i, std::uint32_t j) noexcept {
     const Body &a = bodies[i], &b = bodies[j];
     if ((!a.moved && !b.moved) || !may_meet(a, b)) return;
-    if (now.size() == settings.max_pairs) {
+    if (fresh.size() + kept == settings.max_pairs) {
       exceeded = true;
       return;
     }
     const bool in_order = a.given.number < b.given.number;
-    now.push_back(
-        {key_of(a.given.number, b.given.number), {in_order ? i : j, in_order ? j : i}, kNone});
+    fresh.push_back({key_of(a.given.number, b.given.number), {in_order ? i : j, in_order ? j : i}});
   }
 
   /// Pairs of which a body moved whose boxes meet.
@@ -261,126 +282,132 @@ struct Scene::Impl {
     }
   }
 
-  /// Answers a candidate. Returns whether the bodies meet.
-  bool answer(const Candidate& two, ScenePair& out, ContactPatch* patches_of,
-              Workspace& workspace) noexcept {
+  bool is_kept(const Candidate& two) const noexcept {
+    return !bodies[two.body[0]].moved && !bodies[two.body[1]].moved;
+  }
+
+  /// A place for an answer; those of before are used again.
+  std::uint32_t take_slot() noexcept {
+    if (free_slots.empty()) {
+      penetrations.emplace_back();
+      separations.emplace_back();
+      return static_cast<std::uint32_t>(penetrations.size() - 1);
+    }
+    const std::uint32_t slot = free_slots.back();
+    free_slots.pop_back();
+    return slot;
+  }
+  void give_back(Candidate& two) noexcept {
+    if (two.slot != kNone) free_slots.push_back(std::exchange(two.slot, kNone));
+  }
+
+  void answer(Candidate& two, Workspace& workspace) noexcept {
     const Body &a = bodies[two.body[0]], &b = bodies[two.body[1]];
     const PlacedSolid &solid_a = a.given.solid, &solid_b = b.given.solid;
     const SceneRule& rule = rule_of(a, b);
-    out = {};
-    out.a = a.given.number;
-    out.b = b.given.number;
     if (rule.answer == SceneAnswer::overlap) {
-      out.overlapping = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
+      two.overlapping = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
                                         : overlap(solid_a, solid_b, workspace);
-      return out.overlapping != Overlapping::no;
+      two.meet = two.overlapping != Overlapping::no;
     }
+    if (two.slot == kNone) return;
+    Penetration& p = penetrations[two.slot];
+    Separation& s = separations[two.slot];
     if (rule.answer == SceneAnswer::patches) {
-      const ContactPatches found = contact_patches(solid_a, solid_b, rule.penetration, workspace,
-                                                   {patches_of, settings.patches_per_pair});
-      out.penetration = found.penetration;
-      out.patch_count = static_cast<std::uint32_t>(found.count);
+      const ContactPatches found =
+          contact_patches(solid_a, solid_b, rule.penetration, workspace,
+                          {patches.data() + std::size_t{two.slot} * settings.patches_per_pair,
+                           settings.patches_per_pair});
+      p = found.penetration;
+      two.patches = static_cast<std::uint32_t>(found.count);
     } else {
-      out.penetration = penetration(solid_a, solid_b, rule.penetration, workspace);
+      p = ist::penetration(solid_a, solid_b, rule.penetration, workspace);
     }
-    const Penetration& p = out.penetration;
-    bool meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
+    s = {};
+    two.meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
     if (rule.margin > 0 && (std::isnan(p.volume) || p.volume == 0)) {
       SeparationSettings limits;
       limits.max_distance = rule.margin;
-      out.separation = separation(solid_a, solid_b, limits, workspace);
-      meet = meet || out.separation.status != QueryStatus::ok ||
-             out.separation.distance_min < rule.margin;
-    }
-    return meet;
-  }
-
-  void remember_unmoved() noexcept {
-    // Of bodies that stand still the answers stay.
-    for (const Candidate& old : before) {
-      const Body &a = bodies[old.body[0]], &b = bodies[old.body[1]];
-      if (a.moved || b.moved || a.place == Place::free || b.place == Place::free) continue;
-      if (now.size() == settings.max_pairs) {
-        exceeded = true;
-        return;
-      }
-      now.push_back(old);
+      s = ist::separation(solid_a, solid_b, limits, workspace);
+      two.meet = two.meet || s.status != QueryStatus::ok || s.distance_min < rule.margin;
     }
   }
 
   SceneStep step(const ParallelFor& parallel) noexcept {
     still.settle();
     moving.settle();
-    std::swap(now, before);
-    std::swap(answers, old_answers);
-    std::swap(patches, old_patches);
-    now.clear();
-    exceeded = false;
-    find_candidates();
-    remember_unmoved();
-    ended.clear();
+    SceneStep out;
     refused.clear();
     for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
     std::sort(refused.begin(), refused.end());
-    SceneStep out;
     out.refused = refused;
-    out.boxes_met = now.size();
+    // Of bodies that stand still the answers stay.
+    kept = static_cast<std::size_t>(
+        std::count_if(now.begin(), now.end(), [&](const Candidate& two) { return is_kept(two); }));
+    fresh.clear();
+    exceeded = false;
+    find_candidates();
+    out.boxes_met = kept + fresh.size();
     if (exceeded) {
-      // As if it had not been: what moved is asked in the next step.
-      std::swap(now, before);
-      std::swap(answers, old_answers);
-      std::swap(patches, old_patches);
+      // What moved is asked in the next step.
       out.pairs_exceeded = true;
       return out;
     }
-    std::sort(now.begin(), now.end(), by_key);
-    answers.resize(now.size());
-    const auto is_kept = [&](const Candidate& two) {
-      return !bodies[two.body[0]].moved && !bodies[two.body[1]].moved;
-    };
-    const auto ask = [&](std::size_t i, std::size_t worker) {
-      Candidate& two = now[i];
-      const std::size_t at = i * settings.patches_per_pair;
-      ContactPatch* const room = patches.empty() ? nullptr : patches.data() + at;
-      if (is_kept(two)) {
-        if (two.answer == kNone) return;
-        answers[i] = old_answers[two.answer];
-        std::copy_n(old_patches.begin() + answers[i].first_patch, answers[i].patch_count, room);
-      } else if (!answer(two, answers[i], room, workspaces[worker])) {
-        return;
-      }
-      answers[i].first_patch = static_cast<std::uint32_t>(at);
-      two.answer = 0;
-    };
-    answer_all(now.size(), workspaces.size(), parallel, ask);
-    std::uint32_t count = 0;
-    auto old = before.begin();
-    const auto end_before = [&](std::uint64_t key) {
-      for (; old != before.end() && old->key < key; ++old)
-        if (old->answer != kNone) ended.push_back(name_of(old->key));
-    };
-    for (std::size_t i = 0; i < now.size(); ++i) {
-      end_before(now[i].key);
-      const bool met = old != before.end() && old->key == now[i].key && old->answer != kNone;
-      if (old != before.end() && old->key == now[i].key) {
-        if (met && now[i].answer == kNone) ended.push_back(name_of(old->key));
-        ++old;
-      }
-      if (now[i].answer == kNone) continue;
-      answers[i].event = met ? SceneEvent::stays : SceneEvent::begins;
-      now[i].answer = count;
-      answers[count++] = answers[i];
+    std::swap(now, before);
+    now.clear();
+    for (Candidate& two : before)
+      if (!is_kept(two)) give_back(two);
+    std::sort(fresh.begin(), fresh.end(),
+              [](const Candidate& x, const Candidate& y) { return x.key < y.key; });
+    for (Candidate& two : fresh) {
+      const SceneAnswer asked = rule_of(bodies[two.body[0]], bodies[two.body[1]]).answer;
+      two.meet = asked == SceneAnswer::boxes;
+      if (asked > SceneAnswer::overlap) two.slot = take_slot();
     }
-    end_before(~std::uint64_t{0});
-    answers.resize(count);
+    answer_all(fresh.size(), workspaces.size(), parallel,
+               [&](std::size_t i, std::size_t worker) { answer(fresh[i], workspaces[worker]); });
+    merge();
     for (const std::uint32_t i : moved) {
       bodies[i].moved = false;
       if (bodies[i].place == Place::free) free_bodies.push_back(i);
     }
     moved.clear();
-    out.pairs = answers;
+    out.pairs = pairs;
     out.ended = ended;
     return out;
+  }
+
+  /// Of those of before that stay and those that were asked: all, the pairs that meet, and those
+  /// that no longer do.
+  void merge() noexcept {
+    pairs.clear();
+    ended.clear();
+    const auto go_on = [&](const Candidate& two, bool met) {
+      now.push_back(two);
+      if (two.meet)
+        pairs.push_back({name_of(two.key).a, name_of(two.key).b,
+                         met ? SceneEvent::stays : SceneEvent::begins, two.overlapping, two.slot,
+                         two.patches});
+      else if (met)
+        ended.push_back(name_of(two.key));
+    };
+    auto old = before.begin();
+    const auto pass = [&](std::uint64_t key) {
+      for (; old != before.end() && old->key < key; ++old) {
+        if (is_kept(*old))
+          go_on(*old, old->meet);
+        else if (old->meet)
+          ended.push_back(name_of(old->key));
+      }
+    };
+    for (Candidate& two : fresh) {
+      pass(two.key);
+      const bool both = old != before.end() && old->key == two.key;
+      if (!two.meet) give_back(two);
+      go_on(two, both && old->meet);
+      if (both) ++old;
+    }
+    pass(~std::uint64_t{0});
   }
 
   SceneSettings settings;
@@ -394,9 +421,13 @@ struct Scene::Impl {
   std::vector<std::uint64_t> excluded;
   bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept = nullptr;
   const void* context = nullptr;
-  std::vector<Candidate> now, before;
-  std::vector<ScenePair> answers, old_answers;
-  std::vector<ContactPatch> patches, old_patches;
+  std::vector<Candidate> now, before, fresh;
+  std::size_t kept = 0;
+  std::vector<ScenePair> pairs;
+  std::vector<Penetration> penetrations;  ///< by slot, as `separations` and `patches`
+  std::vector<Separation> separations;
+  std::vector<ContactPatch> patches;
+  std::vector<std::uint32_t> free_slots;
   std::vector<ScenePairName> ended;
   bool exceeded = false;
   std::vector<Workspace> workspaces;
@@ -443,6 +474,7 @@ void Scene::add(const SceneBody& body) {
   all.index_of.emplace(body.number, at);
   all.bodies[at] = {};
   all.bodies[at].given = body;
+  all.bodies[at].kept = Impl::kept_of(body.solid);
   all.place(all.bodies[at], false);
 }
 
@@ -496,8 +528,7 @@ void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRu
   SceneRule plain = rule;
   plain.penetration.pair_id = 0;
   if (rule.answer == SceneAnswer::patches && all.patches.empty())
-    for (auto* const list : {&all.patches, &all.old_patches})
-      list->resize(all.settings.max_pairs * all.settings.patches_per_pair);
+    all.patches.resize(all.settings.max_pairs * all.settings.patches_per_pair);
   all.rules[group_a * kSceneGroups + group_b] = all.rules[group_b * kSceneGroups + group_a] = plain;
   all.margin = 0;
   all.by_spheres = false;
@@ -536,9 +567,16 @@ void Scene::set_filter(bool (*filter)(const void*, std::uint32_t, std::uint32_t)
 
 SceneStep Scene::step(const ParallelFor& parallel) noexcept { return impl_->step(parallel); }
 
+Penetration Scene::penetration(const ScenePair& pair) const noexcept {
+  return pair.slot < impl_->penetrations.size() ? impl_->penetrations[pair.slot] : Penetration{};
+}
+Separation Scene::separation(const ScenePair& pair) const noexcept {
+  return pair.slot < impl_->separations.size() ? impl_->separations[pair.slot] : Separation{};
+}
 std::span<const ContactPatch> Scene::patches(const ScenePair& pair) const noexcept {
-  if (pair.patch_count == 0) return {};
-  return {impl_->patches.data() + pair.first_patch, pair.patch_count};
+  const std::size_t first = std::size_t{pair.slot} * impl_->settings.patches_per_pair;
+  if (pair.patch_count == 0 || first + pair.patch_count > impl_->patches.size()) return {};
+  return {impl_->patches.data() + first, pair.patch_count};
 }
 
 SceneHit Scene::raycast(const Ray& ray) const noexcept {
@@ -583,8 +621,8 @@ std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& u
   SceneBox box;
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);
-    box.low[i] = std::nextafter(static_cast<float>(lower[k]), -kEndless);
-    box.high[i] = std::nextafter(static_cast<float>(upper[k]), kEndless);
+    box.low[i] = float_below(lower[k]);
+    box.high[i] = -float_below(-upper[k]);
   }
   std::size_t count = 0;
   const auto visit = [&](std::uint32_t i) {

@@ -275,6 +275,41 @@ class Penetration:
     sphere_pairs: Final[_Count]  # (n,)
 
 @final
+class SceneStep:
+    def __len__(self) -> int: ...  # pairs
+    pairs: Final[NDArray[np.uint32]]  # (n, 2) numbers of the bodies that meet
+    begins: Final[NDArray[np.bool_]]  # (n,) they did not meet in the step before
+    overlapping: Final[NDArray[np.uint32]]  # (n,) Overlapping, where the rule is 'overlap'
+    penetration: Final[Penetration]  # n rows
+    separation: Final[Separation]  # n rows
+    ended: Final[NDArray[np.uint32]]  # (m, 2)
+    refused: Final[NDArray[np.uint32]]  # (k,)
+
+class Scene:
+    def __init__(
+        self, *, max_bodies: int = 1024, max_pairs: int = 8192, threads: int = 0,
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def add(
+        self, solid: Asset | Field, pose: ArrayLike | None = None, *, scale: float = 1.0,
+        number: int | None = None, moves: bool = True, group: int = 0, layers: int = 1,
+        meets: int = 0xFFFFFFFF,
+    ) -> int: ...
+    def remove(self, number: int) -> None: ...
+    def set_rule(
+        self, group_a: int = 0, group_b: int = 0, *,
+        answer: Literal["nothing", "boxes", "overlap", "penetration"] = "penetration",
+        measure: Literal["matched", "inner", "exact"] = "matched",
+        surface: Literal["automatic", "never", "always"] = "automatic", margin: float = 0.0,
+        pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0,
+    ) -> None: ...
+    def exclude(self, a: int, b: int) -> None: ...
+    def include(self, a: int, b: int) -> None: ...
+    def step(
+        self, poses: ArrayLike | None = None, *, numbers: ArrayLike | None = None,
+    ) -> SceneStep: ...
+
+@final
 class Lenses:
     centre: Final[NDArray[np.float64]]  # (n, 3) [u] world
     axis: Final[NDArray[np.float64]]  # (n, 3) unit, from A's sphere to B's

@@ -77,6 +77,7 @@ NB_MODULE(_core, module) {
   python::add_penetration(module);
   python::add_pictures(module);
   python::add_separation(module);
+  python::add_scenes(module);
   python::add_surfaces(module);
   python::add_time_of_impact(module);
   python::add_gpu(module);

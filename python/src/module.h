@@ -16,6 +16,7 @@ void add_gpu_penetration(py::module_& module);
 void add_gpu_separation(py::module_& module);
 void add_pictures(py::module_& module);
 void add_penetration(py::module_& module);
+void add_scenes(py::module_& module);
 void add_separation(py::module_& module);
 void add_surfaces(py::module_& module);
 void add_time_of_impact(py::module_& module);

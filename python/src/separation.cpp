@@ -13,13 +13,6 @@
 namespace ist::python {
 namespace {
 
-struct Separations {
-  Shape rows;
-  Column<double> distance{rows}, distance_min{rows}, distance_max{rows};
-  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
-  Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
-};
-
 /// Patches of a batch on a device, and whether it was well asked.
 struct GpuPatches : GpuContactPatches {
   QueryStatus* status = nullptr;

@@ -42,38 +42,49 @@ void run_threads(void*, std::size_t workers, void (*work)(void*, std::size_t), v
   for (std::thread& one : threads) one.join();
 }
 
-std::uint64_t bits_of(const ScenePair& pair, std::span<const ContactPatch> patches) {
+struct Answer {
+  ScenePair pair;
+  Penetration penetration;
+  Separation separation;
+};
+Answer answer_of(const Scene& scene, const ScenePair& pair) {
+  return {pair, scene.penetration(pair), scene.separation(pair)};
+}
+
+std::uint64_t bits_of(const Answer& answer, std::span<const ContactPatch> patches) {
+  const ScenePair& pair = answer.pair;
   AnswerBits bits;
   bits.add(std::uint64_t{pair.a} << 32 | pair.b);
   bits.add(std::uint64_t{static_cast<std::uint32_t>(pair.event)} << 32 |
            static_cast<std::uint32_t>(pair.overlapping));
-  bits.add(pair.penetration);
-  bits.add(pair.separation);
+  bits.add(answer.penetration);
+  bits.add(answer.separation);
   for (const ContactPatch& patch : patches) bits.add(patch);
   return bits.value();
 }
 /// Of two bodies that have no answer a scene tells where their boxes meet, and else nothing.
-bool is_answered(const ScenePair& pair) {
-  return pair.overlapping == Overlapping::yes ||
-         (pair.overlapping == Overlapping::unknown && pair.penetration.status == QueryStatus::ok &&
-          pair.separation.status == QueryStatus::ok &&
+bool is_answered(const Answer& pair) {
+  return pair.pair.overlapping == Overlapping::yes ||
+         (pair.pair.overlapping == Overlapping::unknown &&
+          pair.penetration.status == QueryStatus::ok && pair.separation.status == QueryStatus::ok &&
           (pair.penetration.touching || pair.penetration.volume > 0 ||
            pair.separation.distance > 0));
 }
 std::vector<std::uint64_t> answered(const Scene& scene, const SceneStep& step) {
   std::vector<std::uint64_t> out;
-  for (ScenePair pair : step.pairs) {
-    if (!is_answered(pair)) continue;
-    const auto patches = scene.patches(pair);
-    pair.event = SceneEvent::begins;
-    out.push_back(bits_of(pair, patches));
+  for (const ScenePair& pair : step.pairs) {
+    Answer answer = answer_of(scene, pair);
+    if (!is_answered(answer)) continue;
+    answer.pair.event = SceneEvent::begins;
+    out.push_back(bits_of(answer, scene.patches(pair)));
   }
   for (const std::uint32_t number : step.refused) out.push_back(number);
   return out;
 }
 std::vector<std::uint64_t> bits_of(const Scene& scene, const SceneStep& step) {
   std::vector<std::uint64_t> out;
-  for (const ScenePair& pair : step.pairs) out.push_back(bits_of(pair, scene.patches(pair)));
+  for (const ScenePair& pair : step.pairs)
+    out.push_back(bits_of(answer_of(scene, pair), scene.patches(pair)));
   for (const ScenePairName& pair : step.ended) out.push_back(std::uint64_t{pair.a} << 32 | pair.b);
   for (const std::uint32_t number : step.refused) out.push_back(number);
   return out;
@@ -159,11 +170,11 @@ class AllPairs {
     for (auto a = bodies.begin(); a != bodies.end(); ++a)
       for (auto b = std::next(a); b != bodies.end(); ++b) {
         if (!asks(a->second, b->second)) continue;
-        ScenePair pair;
+        Answer pair;
         if (!answer(a->second, b->second, pair)) continue;
         if (!is_answered(pair)) continue;
         ++met_;
-        out.push_back(bits_of(pair, {patches_.data(), pair.patch_count}));
+        out.push_back(bits_of(pair, {patches_.data(), pair.pair.patch_count}));
       }
     for (const std::uint32_t number : refused) out.push_back(number);
     return out;
@@ -189,19 +200,19 @@ class AllPairs {
            !is_refused(a.solid) && !is_refused(b.solid) &&
            rule_of(a.group, b.group).answer != SceneAnswer::nothing;
   }
-  bool answer(const SceneBody& a, const SceneBody& b, ScenePair& out) {
+  bool answer(const SceneBody& a, const SceneBody& b, Answer& out) {
     const SceneRule rule = rule_of(a.group, b.group);
-    out.a = a.number;
-    out.b = b.number;
+    out.pair.a = a.number;
+    out.pair.b = b.number;
     if (rule.answer == SceneAnswer::overlap) {
-      out.overlapping = overlap(a.solid, b.solid, rule.margin, workspace_);
-      return out.overlapping != Overlapping::no;
+      out.pair.overlapping = overlap(a.solid, b.solid, rule.margin, workspace_);
+      return out.pair.overlapping != Overlapping::no;
     }
     if (rule.answer == SceneAnswer::patches) {
       const ContactPatches found =
           contact_patches(a.solid, b.solid, rule.penetration, workspace_, patches_);
       out.penetration = found.penetration;
-      out.patch_count = static_cast<std::uint32_t>(found.count);
+      out.pair.patch_count = static_cast<std::uint32_t>(found.count);
     } else {
       out.penetration = penetration(a.solid, b.solid, rule.penetration, workspace_);
     }
@@ -314,10 +325,10 @@ TEST(Scene, TouchingBlocksMeetAndApartOnesComeWithinTheMargin) {
   scene.add(block_at(5, 4.25));
   const SceneStep step = scene.step();
   ASSERT_EQ(step.pairs.size(), 2u);
-  EXPECT_TRUE(step.pairs[0].penetration.touching);
-  EXPECT_NEAR(step.pairs[0].penetration.contact_area, 4, 1e-12);
+  EXPECT_TRUE(scene.penetration(step.pairs[0]).touching);
+  EXPECT_NEAR(scene.penetration(step.pairs[0]).contact_area, 4, 1e-12);
   EXPECT_EQ(step.pairs[1].a, 2u);
-  EXPECT_NEAR(step.pairs[1].separation.distance, 0.25, 1e-12);
+  EXPECT_NEAR(scene.separation(step.pairs[1]).distance, 0.25, 1e-12);
   EXPECT_EQ(step.pairs[1].event, SceneEvent::begins);
   EXPECT_EQ(scene.step().pairs[1].event, SceneEvent::stays);
   scene.set_pose(5, {{1, 0, 0, 0}, {9, 0, 0}});

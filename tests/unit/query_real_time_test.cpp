@@ -6,6 +6,7 @@
 #include <ist/ist.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/scene.h>
 #include <ist/surface.h>
 #include <ist/time_of_impact.h>
 
@@ -57,6 +58,11 @@ class RealTime : public ::testing::Test {
     contact_patches(field, b, settings, workspaces_[0], patches_);
     const PlacedPair field_pairs[] = {{field, b}, {a, field}};
     penetration_batch(field_pairs, settings, workspaces_, answers_);
+    // Many bodies, some of which move; what a step finds depends on `settings` by its measure.
+    for (std::uint32_t k = 0; k < kBodies; k += 1 + static_cast<std::uint32_t>(i) % 7)
+      scene_.set_pose(k, poses_b_[(i + static_cast<int>(k)) % kPoses]);
+    volume_[i] += static_cast<double>(scene_.step().pairs.size());
+    scene_.raycast(Ray{{0, 0, 0}, {1, 2, 3}});
     const Motions motions{{{0.1, 0.2, 0}, {1, 0, 2}, {}}, {{-1, 0, 1}, {0, 1, 0}, {0.1, 0, 0}}};
     ImpactSettings until;
     until.max_visits = settings.max_visits != 0 ? settings.max_visits : 3000;
@@ -120,7 +126,27 @@ class RealTime : public ::testing::Test {
   double volume_[kPoses] = {};
   Pose poses_a_[kPoses], poses_b_[kPoses];
 
+  static constexpr std::uint32_t kBodies = 20;
+  Scene scene_{{.max_bodies = kBodies, .max_pairs = 400}};
+
   RealTime() {
+    SceneRule rule;
+    rule.margin = 0.1;
+    scene_.set_rule(0, 1, rule);
+    rule.answer = SceneAnswer::patches;
+    scene_.set_rule(0, 0, rule);
+    rule.penetration.measure = Measure::exact;
+    scene_.set_rule(1, 1, rule);
+    for (std::uint32_t k = 0; k < kBodies; ++k) {
+      SceneBody body;
+      body.number = k;
+      body.group = k % 2;
+      const Field floor = HalfSpaceField{{0, 0, 1}, -0.5};
+      body.solid = k == 0       ? PlacedSolid(floor, Pose{})
+                   : k % 4 == 1 ? PlacedSolid(ball_.view(), Pose{})
+                                : PlacedSolid(k % 4 == 3 ? box_.view() : a_.view(), Pose{});
+      scene_.add(body);
+    }
     ist_workspace_make(0, nullptr, &c_workspace_);
     ist_tree_view(a_.bytes().data(), a_.bytes().size(), &c_tree_a_);
     ist_tree_view(b_.bytes().data(), b_.bytes().size(), &c_tree_b_);

@@ -1,0 +1,244 @@
+#include <ist/error.h>
+#include <ist/query_tbb.h>
+#include <ist/scene.h>
+
+#include <map>
+#include <memory>
+#include <thread>
+
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/unique_ptr.h>
+
+#include "penetration.h"
+#include "separation.h"
+
+namespace ist::python {
+namespace {
+
+constexpr std::pair<const char*, SceneAnswer> kAnswers[] = {
+    {"nothing", SceneAnswer::nothing},
+    {"boxes", SceneAnswer::boxes},
+    {"overlap", SceneAnswer::overlap},
+    {"penetration", SceneAnswer::penetration}};
+
+struct PyScene {
+  explicit PyScene(const SceneSettings& settings)
+      : scene(settings), max_pairs(settings.max_pairs) {}
+
+  Scene scene;
+  std::size_t max_pairs;
+  std::uint32_t next = 0;
+  std::map<std::uint32_t, py::object> owners;
+};
+
+/// One step's pairs as columns.
+struct SceneAnswers {
+  Shape rows;
+  Column<std::uint32_t, 2> pairs{rows}, ended{};
+  Column<bool> begins{rows};
+  Column<std::uint32_t> overlapping{rows}, refused{};
+  std::shared_ptr<Penetrations> penetration{};
+  std::shared_ptr<Separations> separation{};
+};
+
+Pose pose_at(const double* row) {
+  Pose pose;
+  std::copy_n(row, 4, pose.q);
+  std::copy_n(row + 4, 3, pose.t);
+  return pose;
+}
+
+void set_poses(PyScene& self, const py::object& poses, const py::object& numbers) {
+  const Doubles rows = take_poses(poses, "poses", "(n, 7) or (n, 4, 4)");
+  const std::size_t count = rows.size() / 7;
+  std::vector<Pose> to(count);
+  for (std::size_t i = 0; i < count; ++i) to[i] = pose_at(rows.data() + 7 * i);
+  std::vector<std::uint32_t> of;
+  if (numbers.is_none()) {
+    for (const auto& [number, owner] : self.owners)
+      if (self.scene.body(number)->moves) of.push_back(number);
+    if (of.size() != count)
+      throw value_error("poses: " + std::to_string(count) + " rows; wanted " +
+                        std::to_string(of.size()) +
+                        ", one for each body that moves, by number, or give numbers=");
+  } else {
+    const Integers given = take_integers(numbers, "numbers", "(n,)");
+    if (given.size() != count)
+      throw value_error("numbers: " + std::to_string(given.size()) + " for " +
+                        std::to_string(count) + " poses");
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::int64_t number = given.data()[i];
+      if (number < 0 || self.owners.count(static_cast<std::uint32_t>(number)) == 0)
+        throw value_error("numbers: there is no body " + std::to_string(number));
+      of.push_back(static_cast<std::uint32_t>(number));
+    }
+  }
+  self.scene.set_poses(of, to);
+}
+
+std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
+                                   const py::object& numbers) {
+  if (!poses.is_none())
+    set_poses(self, poses, numbers);
+  else if (!numbers.is_none())
+    throw value_error("numbers: without poses");
+  SceneStep found;
+  {
+    const py::gil_scoped_release free;
+    found = self.scene.step(tbb_parallel_for());
+  }
+  if (found.pairs_exceeded)
+    throw Error("more than " + std::to_string(self.max_pairs) +
+                " pairs of bodies have boxes that meet: make the Scene with a larger max_pairs");
+  auto out = std::make_shared<SceneAnswers>(SceneAnswers{{found.pairs.size()}});
+  out->penetration = std::make_shared<Penetrations>(Penetrations{out->rows});
+  out->separation = std::make_shared<Separations>(Separations{out->rows});
+  for (std::size_t i = 0; i < found.pairs.size(); ++i) {
+    const ScenePair& pair = found.pairs[i];
+    out->pairs.row(i)[0] = pair.a;
+    out->pairs.row(i)[1] = pair.b;
+    out->begins.write(i, pair.event == SceneEvent::begins);
+    out->overlapping.write(i, pair.overlapping);
+    Row row;
+    const auto pose_of = [&](std::uint32_t number) {
+      const SceneBody body = *self.scene.body(number);
+      return std::visit([](const auto& placed) { return placed.pose; }, body.solid.placed);
+    };
+    row.a.pose = pose_of(pair.a);
+    row.b.pose = pose_of(pair.b);
+    out->penetration->write(i, row, self.scene.penetration(pair));
+    write_row(*out->separation, i, self.scene.separation(pair));
+  }
+  out->ended = Column<std::uint32_t, 2>({found.ended.size()});
+  for (std::size_t i = 0; i < found.ended.size(); ++i) {
+    out->ended.row(i)[0] = found.ended[i].a;
+    out->ended.row(i)[1] = found.ended[i].b;
+  }
+  out->refused = Column<std::uint32_t>({found.refused.size()});
+  for (std::size_t i = 0; i < found.refused.size(); ++i) out->refused.write(i, found.refused[i]);
+  return out;
+}
+
+std::uint32_t add(PyScene& self, const py::object& solid, const py::object& pose, double scale,
+                  const py::object& number, bool moves, std::uint32_t group, std::uint32_t layers,
+                  std::uint32_t meets) {
+  SceneBody body;
+  body.number = self.next;
+  if (!number.is_none() && !py::try_cast(number, body.number))
+    throw value_error("number: " + text_of(number) + "; wanted a whole number from 0 to 2³² − 1");
+  const Pose at = take_pose(pose, scale);
+  body.solid = std::visit([&](const auto& what) { return PlacedSolid(what, at, scale); },
+                          solid_of(solid, "solid"));
+  body.moves = moves;
+  body.group = group;
+  body.layers = layers;
+  body.meets = meets;
+  self.scene.add(body);
+  self.owners[body.number] = solid;
+  self.next = self.owners.rbegin()->first + 1;
+  return body.number;
+}
+
+constexpr const char* kSceneDoc =
+    R"(Many solids, and which of them meet: ist.Scene in <ist/scene.h>.
+
+Bodies have numbers. A step asks the pairs whose boxes meet and of which a body was added or moved; of
+the others the answers are those of the step before. Poses and rules alone decide the answers and their
+order.
+
+max_bodies, max_pairs: memory for as many is taken at once. threads: that work at a step; 0: all
+cores.)";
+
+constexpr const char* kStepDoc = R"(Asks all pairs that may have changed.
+
+poses: (n, 7) or (n, 4, 4), of the bodies `numbers` (n,), or of all bodies that move, in the order of
+    their numbers; None: nothing moved.
+
+Returns a SceneStep. Raises ist.Error where more than max_pairs boxes meet.)";
+
+}  // namespace
+
+void add_scenes(py::module_& module) {
+  py::class_<SceneAnswers> type(module, "SceneStep", "What a step of a Scene found.");
+  add_column(type, "pairs", &SceneAnswers::pairs,
+             "(n, 2) uint32: numbers of the bodies that meet, the lower one first, in order.");
+  add_column(type, "begins", &SceneAnswers::begins,
+             "(n,) bool: they did not meet in the step before.");
+  add_column(type, "overlapping", &SceneAnswers::overlapping,
+             "(n,) uint32, an Overlapping, of pairs whose rule is 'overlap'.");
+  add_inner(type, "penetration", &SceneAnswers::penetration,
+            "Penetration of n rows; zero where the rule asks none.");
+  add_inner(type, "separation", &SceneAnswers::separation,
+            "Separation of n rows; zero where bodies overlap, or the rule has no margin.");
+  add_column(type, "ended", &SceneAnswers::ended,
+             "(m, 2) uint32: pairs that met in the step before.");
+  add_column(type, "refused", &SceneAnswers::refused,
+             "(k,) uint32: bodies that are left out, whose pose is not usable.");
+  type.def("__len__", [](const SceneAnswers& self) { return self.rows[0]; });
+
+  py::class_<PyScene>(module, "Scene", kSceneDoc)
+      .def(py::new_([](std::size_t max_bodies, std::size_t max_pairs, unsigned threads) {
+             SceneSettings settings;
+             settings.max_bodies = max_bodies;
+             settings.max_pairs = max_pairs;
+             settings.patches_per_pair = 1;
+             const unsigned workers = take_threads(threads);
+             settings.workers =
+                 workers != 0 ? workers : std::max(1u, std::thread::hardware_concurrency());
+             return std::make_unique<PyScene>(settings);
+           }),
+           py::kw_only(), py::arg("max_bodies") = 1024, py::arg("max_pairs") = 8192,
+           py::arg("threads") = 0)
+      .def("__len__", [](const PyScene& self) { return self.scene.size(); })
+      .def("__repr__",
+           [](const PyScene& self) {
+             return "<ist.Scene of " + std::to_string(self.scene.size()) + " bodies>";
+           })
+      .def("add", add, py::arg("solid"), py::arg("pose") = py::none(), py::kw_only(),
+           py::arg("scale") = 1.0, py::arg("number") = py::none(), py::arg("moves") = true,
+           py::arg("group") = 0, py::arg("layers") = 1, py::arg("meets") = ~0u,
+           "Adds an Asset or a Field at a pose; None: at the origin. Returns its number: `number`, "
+           "or the first that is above all others. Two bodies that do not move are not asked. "
+           "group: selects the rule of a pair. layers, meets: bits; each of a pair must be on a "
+           "layer that the other meets.")
+      .def(
+          "remove",
+          [](PyScene& self, std::uint32_t number) {
+            if (!self.scene.remove(number))
+              throw value_error("number: there is no body " + std::to_string(number));
+            self.owners.erase(number);
+          },
+          py::arg("number"), "Takes a body out; its pairs end in the next step.")
+      .def(
+          "set_rule",
+          [](PyScene& self, std::uint32_t group_a, std::uint32_t group_b, const std::string& answer,
+             const std::string& measure, const std::string& surface, double margin,
+             std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error) {
+            SceneRule rule;
+            rule.answer = named(answer, "answer", kAnswers);
+            rule.margin = take_limit(margin, "margin");
+            rule.penetration =
+                contact_settings(measure, surface, pair_budget, max_visits, relative_error, 0);
+            self.scene.set_rule(group_a, group_b, rule);
+          },
+          py::arg("group_a") = 0, py::arg("group_b") = 0, py::kw_only(),
+          py::arg("answer") = "penetration", py::arg("measure") = "matched",
+          py::arg("surface") = "automatic", py::arg("margin") = 0.0, py::arg("pair_budget") = 0,
+          py::arg("max_visits") = 0, py::arg("relative_error") = 0.0,
+          "How bodies of two groups are asked: 'penetration' (as ist.penetration has it), "
+          "'overlap' "
+          "(yes or no), 'boxes' (whether their boxes meet) or 'nothing'. margin: [u] bodies that "
+          "come as near are told too, with their separation.")
+      .def(
+          "exclude",
+          [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.exclude(a, b); },
+          py::arg("a"), py::arg("b"), "Bodies that are joined do not meet.")
+      .def(
+          "include",
+          [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.include(a, b); },
+          py::arg("a"), py::arg("b"), "Takes exclude() back.")
+      .def("step", step, py::arg("poses") = py::none(), py::kw_only(),
+           py::arg("numbers") = py::none(), kStepDoc);
+}
+
+}  // namespace ist::python
