@@ -299,8 +299,8 @@ class Scene:
     def set_rule(
         self, group_a: int = 0, group_b: int = 0, *,
         answer: Literal["nothing", "boxes", "overlap", "penetration"] = "penetration",
-        measure: Literal["matched", "inner", "exact"] = "matched",
-        surface: Literal["automatic", "never", "always"] = "automatic", margin: float = 0.0,
+        measure: _Measure = "matched",
+        surface: _SurfaceUse = "automatic", margin: float = 0.0,
         pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0,
     ) -> None: ...
     def exclude(self, a: int, b: int) -> None: ...

@@ -36,6 +36,15 @@ def test_the_first_lines_of_the_guide():
     exec(lines_of("docs/python.md"), {})
 
 
+def test_many_bodies_of_the_guide():
+    names = {}
+    exec(lines_of("docs/python.md"), names)
+    text = (ROOT / "docs/python.md").read_text()
+    exec(next(block for block in re.findall(r"```python\n(.*?)```", text, re.S) if "ist.Scene()" in block),
+         names)
+    assert len(names["scene"]) == 4 and len(names["step"].ended) + len(names["step"]) > 0
+
+
 def test_the_tour():
     assert "it lands at 0.7" in run("tour.py")
 

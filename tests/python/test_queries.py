@@ -639,3 +639,61 @@ def test_constructors_name_the_argument():
                  lambda: ist.HeightField([[1.0]]), lambda: ist.HeightField([[1, float("nan")]] * 2)):
         with pytest.raises(ValueError):
             make()
+
+
+def test_a_scene_asks_what_pairs_are_asked(gear, knot):
+    rng = np.random.default_rng(5)
+    side = 3 * (gear.bounds().upper - gear.bounds().lower).max()
+    poses = np.hstack([rng.normal(size=(12, 4)), rng.uniform(0, side, (12, 3))])
+    poses[3] = poses[2]  # copies in place
+    solids = [gear if i % 2 == 0 else knot for i in range(12)]
+    scene = ist.Scene(max_bodies=20, threads=2)
+    scene.set_rule(measure="exact", margin=0.1 * side)
+    for solid, pose in zip(solids, poses):
+        scene.add(solid, pose)
+    floor = scene.add(ist.HalfSpaceField(offset=-side), number=40, moves=False, layers=2, meets=0)
+    assert floor == 40 and len(scene) == 13
+    step = scene.step()
+    assert len(step) > 3 and step.begins.all() and step.refused.size == 0
+    told = {tuple(pair) for pair in step.pairs}
+    for i in range(12):
+        for j in range(i + 1, 12):
+            alone = ist.penetration(solids[i], solids[j], poses[j], poses_a=poses[i], measure="exact")
+            gap = ist.separation(solids[i], solids[j], poses[j], poses_a=poses[i], max_distance=0.1 * side)
+            meet = alone.volume > 0 or alone.touching or gap.distance_min < 0.1 * side
+            assert ((i, j) in told) == meet
+            if meet:
+                row = step.pairs.tolist().index([i, j])
+                assert step.penetration.volume[row] == alone.volume
+                assert np.array_equal(step.penetration.torque[row], alone.torque)
+                if alone.volume == 0:
+                    assert step.separation.distance[row] == gap.distance
+    poses[:, 4] += 10 * side * np.arange(12)
+    with pytest.raises(ValueError, match="poses: 11 rows; wanted 12"):
+        scene.step(poses[:11])
+    apart = scene.step(poses)
+    assert len(apart) == 0 and {tuple(pair) for pair in apart.ended} == told
+    poses[0] = np.nan
+    assert list(scene.step(poses[:1], numbers=[0]).refused) == [0]
+    scene.remove(0)
+    assert scene.step().refused.size == 0 and len(scene) == 12
+
+
+def test_mistakes_of_scenes_are_told(gear):
+    scene = ist.Scene(max_bodies=4, max_pairs=1)
+    scene.set_rule(answer="boxes")
+    for _ in range(3):
+        scene.add(gear, IDENTITY)
+    with pytest.raises(ist.Error, match="make the Scene with a larger max_pairs"):
+        scene.step()
+    for call, words in ((lambda: scene.remove(9), "there is no body 9"),
+                        (lambda: scene.step([IDENTITY], numbers=[9]), "there is no body 9"),
+                        (lambda: scene.step(numbers=[1]), "without poses"),
+                        (lambda: scene.set_rule(answer="all"), "one of 'nothing', 'boxes'"),
+                        (lambda: scene.set_rule(margin=-1), "margin")):
+        with pytest.raises(ValueError, match=words):
+            call()
+    with pytest.raises(ist.Error, match="body 1 is in the scene already"):
+        scene.add(gear, IDENTITY, number=1)
+    with pytest.raises(ist.Error, match="group 8 is not below 8"):
+        scene.add(gear, IDENTITY, group=8)
