@@ -1,0 +1,377 @@
+"""trimesh's CollisionManager by exact overlaps and distances: `from ist.trimesh import CollisionManager`.
+
+Methods, arguments and what they return are those of trimesh.collision.CollisionManager (trimesh 5.2),
+which asks FCL. What differs: a mesh is a solid here, convex or not, so that one within another
+collides; a mesh that is not closed raises ist.OpenMeshError unless `repair`; the depth of a contact
+is its volume over its area (at most the volume's cube root), and each contact tells its volume and
+whether it only touches.
+"""
+
+import hashlib
+
+import numpy as np
+
+import ist
+
+__all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collision"]
+
+_ASIDE = 1e-9  # of an object's size
+_FIRST = 16  # distances that are asked first: the best of them bounds the others
+
+
+class _Data:
+    """What both kinds of data have: names, and the face of a mesh that is nearest to a point."""
+
+    def __init__(self, names, objects):
+        self.names = set(names)
+        self._objects = dict(zip(names, objects))
+
+    def _face(self, name, point):
+        return self._objects[name].face(point)
+
+
+class ContactData(_Data):
+    """A contact of two objects.
+
+    normal: (3,) unit, from the first object to the second; zero where they touch in a point or edge.
+    point: (3,) [u] world. depth: [u] ≥ 0. volume: [u³] of the overlap there. touching: whether they
+    touch, and do not overlap.
+    """
+
+    def __init__(self, names, objects, normal, point, depth, volume):
+        super().__init__(names, objects)
+        self.normal, self.point = normal, point
+        self.depth, self.volume = float(depth), float(volume)
+
+    @property
+    def touching(self):
+        return self.volume == 0
+
+    def index(self, name):
+        """The face of that object's mesh which is nearest to the point."""
+        return self._face(name, self.point)
+
+
+class DistanceData(_Data):
+    """The distance of two objects [u]: negative where they overlap, by the depth of the deepest contact."""
+
+    def __init__(self, names, objects, distance, points):
+        super().__init__(names, objects)
+        self.distance = float(distance)
+        self._points = dict(zip(names, points))
+
+    def point(self, name):
+        """(3,) [u] on that object, world."""
+        return self._points[name]
+
+    def index(self, name):
+        """The face of that object's mesh which is nearest to its point."""
+        return self._face(name, self._points[name])
+
+
+class _Object:
+    """A mesh at a pose."""
+
+    def __init__(self, name, mesh, asset, transform):
+        self.name, self.mesh, self.asset = name, mesh, asset
+        self.set_transform(transform)
+
+    def set_transform(self, transform):
+        transform = np.eye(4) if transform is None else np.asanyarray(transform, dtype=np.float64)
+        if transform.shape != (4, 4):
+            raise ValueError("transform must be (4,4)!")
+        self.pose = ist.poses(transform)
+        self.transform = transform
+        box = self.asset.bounds()
+        middle, half = (box.upper + box.lower) / 2, (box.upper - box.lower) / 2
+        middle = transform[:3, :3] @ middle + transform[:3, 3]
+        half = np.abs(transform[:3, :3]) @ half
+        # (more than what placing a solid rounds)
+        half = half + 1e-12 * (np.abs(middle).max() + half.max())
+        self.low, self.high = middle - half, middle + half
+
+    def face(self, point):
+        import trimesh
+
+        inverse = np.linalg.inv(self.transform)
+        local = inverse[:3, :3] @ np.asarray(point) + inverse[:3, 3]
+        triangles = np.asarray(self.mesh.triangles)
+        near = trimesh.triangles.closest_point(triangles, np.broadcast_to(local, (len(triangles), 3)))
+        return int(((near - local)**2).sum(axis=1).argmin())
+
+
+class CollisionManager:
+    """Objects by name, and what of them collides. Meshes of equal content are prepared once.
+
+    repair: close open meshes, as ist.close_mesh does, instead of raising.
+    """
+
+    def __init__(self, *, repair=False):
+        self._repair = repair
+        self._objs = {}
+        self._assets = {}
+        self._scene, self._room = None, 0  # made where it is needed, for so many
+
+    def add_object(self, name, mesh, transform=None):
+        """Adds or replaces an object: anything with `vertices` and `faces`. transform: (4, 4), rigid.
+
+        Returns its ist.Asset.
+        """
+        added = self._object(name, mesh, transform)
+        if name in self._objs:
+            self.remove_object(name)
+        self._objs[name] = added
+        if self._scene is not None and len(self._objs) <= self._room:
+            added.number = self._scene.add(added.asset, added.pose)
+        else:
+            self._scene = None
+        return added.asset
+
+    def remove_object(self, name):
+        gone = self._of(name)
+        if self._scene is not None:
+            self._scene.remove(gone.number)
+        del self._objs[name]
+
+    def set_transform(self, name, transform):
+        moved = self._of(name)
+        moved.set_transform(transform)
+        if self._scene is not None:
+            self._scene.step(moved.pose[None], numbers=[moved.number])
+
+    def in_collision_single(self, mesh, transform=None, return_names=False, return_data=False):
+        """Whether a mesh collides with any object; the set of their names; a list of ContactData."""
+        single = self._object("__external", mesh, transform)
+        pairs = _pairs_of(list(self._objs.values()), [single])
+        found, names, data = _collide(pairs, return_names, return_data)
+        return _told(found, {a for a, _ in names}, data, return_names, return_data)
+
+    def in_collision_internal(self, return_names=False, return_data=False):
+        """Whether any two objects collide; the set of their names, sorted in each pair."""
+        found, names, data = _collide(self._pairs_within(), return_names, return_data)
+        return _told(found, {tuple(sorted(pair)) for pair in names}, data, return_names, return_data)
+
+    def in_collision_other(self, other_manager, return_names=False, return_data=False):
+        """Whether an object collides with one of another manager; names are (own, other's)."""
+        pairs = _pairs_of(list(self._objs.values()), list(other_manager._objs.values()))
+        found, names, data = _collide(pairs, return_names, return_data)
+        return _told(found, set(names), data, return_names, return_data)
+
+    def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
+        """The least distance of a mesh from any object [u], negative inside; inf without objects."""
+        single = self._object("__external", mesh, transform)
+        distance, names, data = _nearest(_all_of(list(self._objs.values()), [single]), return_data)
+        return _told(distance, names and names[0], data, return_name, return_data)
+
+    def min_distance_internal(self, name=None, return_names=False, return_data=False):
+        """The least distance of two objects, or of object `name` from the others."""
+        if name is None:
+            pairs = _all_within(list(self._objs.values()))
+        else:
+            one = self._of(name)
+            pairs = _all_of([one], [other for other in self._objs.values() if other is not one])
+        distance, names, data = _nearest(pairs, return_data)
+        return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
+
+    def min_distance_other(self, other_manager, return_names=False, return_data=False):
+        """The least distance of an object from one of another manager; names are (own, other's)."""
+        pairs = _all_of(list(self._objs.values()), list(other_manager._objs.values()))
+        distance, names, data = _nearest(pairs, return_data)
+        return _told(distance, names, data, return_names, return_data)
+
+    def _pairs_within(self):
+        """Those whose boxes meet, by a scene: not all pairs are looked at."""
+        objects = list(self._objs.values())
+        if len(objects) < 2:
+            return _all_of(objects, [])
+        if self._scene is None:
+            self._room = room = 2 * len(objects)
+            self._scene = ist.Scene(max_bodies=room, max_pairs=room * room // 2, threads=1)
+            self._scene.set_rule(answer="boxes", measure="exact")
+            for one in objects:
+                one.number = self._scene.add(one.asset, one.pose)
+        at = np.full(1 + max(one.number for one in objects), -1)
+        at[[one.number for one in objects]] = np.arange(len(objects))
+        found = at[self._scene.step().pairs]
+        return _Pairs(objects, objects, found[:, 0], found[:, 1], np.zeros(len(found)))
+
+    def _of(self, name):
+        if name not in self._objs:
+            raise ValueError(f"{name} not in collision manager!")
+        return self._objs[name]
+
+    def _object(self, name, mesh, transform):
+        content = hashlib.blake2b()
+        for array in (mesh.vertices, mesh.faces):
+            content.update(np.ascontiguousarray(array).tobytes())
+        key = content.digest()
+        asset = self._assets.get(key)
+        if asset is None:
+            closed = ist.close_mesh(ist.from_trimesh(mesh), name=str(name), repair=self._repair)
+            asset = self._assets[key] = ist.bake_surface(closed)
+        return _Object(name, mesh, asset, transform)
+
+
+def scene_to_collision(scene, *, repair=False):
+    """A CollisionManager of a trimesh.Scene, and {node: ist.Asset}."""
+    manager = CollisionManager(repair=repair)
+    assets = {}
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        assets[node] = manager.add_object(node, scene.geometry[geometry], transform)
+    return manager, assets
+
+
+class _Pairs:
+    """Pairs of objects: their numbers among those of either side, and how far their boxes are apart."""
+
+    def __init__(self, of_a, of_b, first, second, gap):
+        self.of_a, self.of_b, self.first, self.second, self.gap = of_a, of_b, first, second, gap
+
+    def ask(self, query, chosen, poses=None, **settings):
+        """The query of some of them, in one call. poses: of B; None: its own."""
+        first, second = self.first[chosen], self.second[chosen]
+        a = ist.Solids([one.asset for one in self.of_a])
+        b = ist.Solids([one.asset for one in self.of_b])
+        if poses is None:
+            poses = np.array([self.of_b[i].pose for i in second])
+        return query(a[first], b[second], poses, poses_a=np.array([self.of_a[i].pose for i in first]),
+                     **settings)
+
+    def aside(self, i):
+        """Two poses of B beside its own: where faces are flush beside an overlap its slope jumps there,
+        and the mean of both sides is that of neither face."""
+        a, b = self.objects(i)
+        move = _ASIDE * (a.high - a.low).max() * np.array([0, 0, 0, 0, 0.36, 0.48, 0.8])
+        return b.pose + move, b.pose - move
+
+    def overlaps(self, chosen):
+        """Volumes, forces on B and centroids."""
+        sides = [self.ask(ist.penetration, chosen, poses=np.array([self.aside(i)[k] for i in chosen]),
+                          measure="exact") for k in range(2)]
+        _refuse_unanswered(self, sides[0].status)
+        return ((getattr(sides[0], what) + getattr(sides[1], what)) / 2
+                for what in ("volume", "force", "centroid"))
+
+    def parts(self, i):
+        """The connected parts of the overlap of a pair, largest first."""
+        a, b = self.objects(i)
+        sides = []
+        for pose in self.aside(i):
+            found = ist.overlap_outline(a.asset, b.asset, pose, poses_a=a.pose, max_patches=32).contact
+            sides.append((found, np.argsort(-found.volume[:found.count])))
+        if sides[0][0].count != sides[1][0].count:
+            sides = sides[:1]
+        out = []
+        for k in range(sides[0][0].count):
+            force, volume, point = (sum(getattr(found, what)[order[k]] for found, order in sides) / len(sides)
+                                    for what in ("force", "volume", "point"))
+            area = np.linalg.norm(force)
+            out.append(ContactData(self.names(i), (a, b), force / max(area, 1e-300), point,
+                                   min(volume / max(area, 1e-300), np.cbrt(volume)), volume))
+        return out
+
+    def objects(self, i):
+        return self.of_a[self.first[i]], self.of_b[self.second[i]]
+
+    def names(self, i):
+        return tuple(one.name for one in self.objects(i))
+
+
+def _gaps(of_a, of_b):
+    """[u] (n, m): how far boxes are apart."""
+    low_a, high_a = np.array([one.low for one in of_a]), np.array([one.high for one in of_a])
+    out = np.zeros((len(of_a), len(of_b)))
+    for j, b in enumerate(of_b):
+        apart = np.maximum(np.maximum(low_a - b.high, b.low - high_a), 0)
+        out[:, j] = np.sqrt((apart**2).sum(axis=1))
+    return out
+
+
+def _all_of(of_a, of_b):
+    gap = _gaps(of_a, of_b) if of_a and of_b else np.zeros((0, 0))
+    first, second = (i.ravel() for i in np.indices(gap.shape))
+    return _Pairs(of_a, of_b, first, second, gap.ravel())
+
+
+def _all_within(objects):
+    pairs = _all_of(objects, objects)
+    kept = pairs.first < pairs.second
+    return _Pairs(objects, objects, pairs.first[kept], pairs.second[kept], pairs.gap[kept])
+
+
+def _meeting(pairs):
+    kept = pairs.gap == 0
+    return _Pairs(pairs.of_a, pairs.of_b, pairs.first[kept], pairs.second[kept], pairs.gap[kept])
+
+
+def _pairs_of(of_a, of_b):
+    return _meeting(_all_of(of_a, of_b))
+
+
+def _collide(pairs, with_names, with_data):
+    """(whether any collide, their names, their ContactData); the first to collide, where that is all"""
+    with_names = with_names or with_data
+    hits, touches = [], []
+    begin, count = 0, len(pairs.first) if with_names else _FIRST
+    while begin < len(pairs.first) and (with_names or not hits):
+        chosen = np.arange(begin, min(begin + count, len(pairs.first)))
+        answers = pairs.ask(ist.penetration, chosen, measure="exact")
+        _refuse_unanswered(pairs, answers.status)
+        for k in np.flatnonzero((answers.volume > 0) | answers.touching):
+            hits.append(chosen[k])
+            touches.append(None if answers.volume[k] > 0 else answers.contact_normal[k])
+        begin, count = begin + count, 4 * count
+    data = []
+    for i, normal in zip(hits, touches) if with_data else ():
+        if normal is None:
+            data += pairs.parts(i)
+        else:
+            point = pairs.ask(ist.separation, [i]).point_a[0]
+            data.append(ContactData(pairs.names(i), pairs.objects(i), normal, point, 0, 0))
+    return bool(len(hits)), [pairs.names(i) for i in hits], data
+
+
+def _nearest(pairs, with_data):
+    """(least distance, names, DistanceData); negative where solids overlap, by volume over area"""
+    order = np.argsort(pairs.gap, kind="stable")
+    near = order[:np.searchsorted(pairs.gap[order], 0, side="right")]
+    best, nearest = np.inf, None
+    if len(near) > 0:
+        answers = pairs.ask(ist.penetration, near, measure="exact")
+        _refuse_unanswered(pairs, answers.status)
+        near = near[answers.volume > 0]
+    if len(near) > 0:
+        volume, force, point = pairs.overlaps(near)
+        area = np.linalg.norm(force, axis=1)
+        # (where forces cancel, as of a solid inside another, the size of the overlap)
+        depth = np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
+        k = int(depth.argmax())
+        half = 0.5 * depth[k] * force[k] / max(area[k], 1e-300)
+        best, nearest = -depth[k], (near[k], (point[k] + half, point[k] - half))
+    begin, count = 0, _FIRST
+    while best > 0 and begin < len(order) and pairs.gap[order[begin]] < best:
+        chosen = order[begin:begin + count]
+        limit = {"max_distance": best} if best < np.inf else {}
+        gaps = pairs.ask(ist.separation, chosen[pairs.gap[chosen] < best], **limit)
+        _refuse_unanswered(pairs, gaps.status)
+        k = int(gaps.distance.argmin())
+        if gaps.distance[k] < best:
+            best, nearest = gaps.distance[k], (chosen[k], (gaps.point_a[k], gaps.point_b[k]))
+        begin, count = begin + count, 4 * count
+    if nearest is None:
+        return float("inf"), None, None
+    i, points = nearest
+    data = DistanceData(pairs.names(i), pairs.objects(i), best, points) if with_data else None
+    return float(best), pairs.names(i), data
+
+
+def _refuse_unanswered(pairs, status):
+    for i in np.flatnonzero(status != int(ist.QueryStatus.ok))[:1]:
+        name = ist.QueryStatus(int(status[i])).name
+        raise ist.Error(f"{' and '.join(map(str, pairs.names(i)))}: {name}")
+
+
+def _told(found, names, data, with_names, with_data):
+    out = [found] + [names] * bool(with_names) + [data] * bool(with_data)
+    return out[0] if len(out) == 1 else tuple(out)

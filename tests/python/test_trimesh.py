@@ -1,0 +1,116 @@
+"""ist.trimesh.CollisionManager: what it tells, beside queries of pairs and solids whose answers are known."""
+import itertools
+
+import numpy as np
+import pytest
+
+import ist
+from ist.trimesh import CollisionManager
+
+
+class Box:
+    """A mesh as trimesh has it, of side 2 · half."""
+
+    def __init__(self, half=0.5, top=True):
+        corners = np.array(list(itertools.product((-half, half), repeat=3)))
+        quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4)] + [(1, 5, 7, 3)] * top
+        self.vertices = corners
+        self.faces = np.array([f for a, b, c, d in quads for f in ((a, b, c), (a, c, d))])
+
+
+def at(x, y=0, z=0):
+    out = np.eye(4)
+    out[:3, 3] = x, y, z
+    return out
+
+
+def test_what_collides():
+    m = CollisionManager()
+    m.add_object("a", Box())
+    m.add_object("b", Box(), at(5))
+    assert m.in_collision_internal() is False and m.in_collision_single(Box()) is True
+    hit, names, data = m.in_collision_single(Box(), at(5.75), return_names=True, return_data=True)
+    assert hit is True and names == {"b"} and len(data) == 1 and data[0].names == {"b", "__external"}
+    assert data[0].depth == pytest.approx(0.25) and data[0].volume == pytest.approx(0.25)
+    assert data[0].normal == pytest.approx([1, 0, 0], abs=1e-8) and not data[0].touching
+    assert data[0].point == pytest.approx([5.375, 0, 0], abs=1e-6)
+    assert m.in_collision_single(Box(), at(2), return_names=True) == (False, set())
+    m.add_object("c", Box(), at(5, 1))  # flush
+    hit, names, data = m.in_collision_internal(return_names=True, return_data=True)
+    assert hit is True and names == {("b", "c")}
+    assert data[0].touching and data[0].depth == 0 and np.abs(data[0].normal) == pytest.approx([0, 1, 0])
+    m.set_transform("c", at(5, 1.001))
+    assert m.in_collision_internal() is False
+    m.add_object("c", Box(0.1), at(0.1))  # within: a solid has no hollow
+    assert m.in_collision_internal(return_names=True) == (True, {("a", "c")})
+    m.remove_object("c")
+    assert m.in_collision_internal() is False
+    n = CollisionManager()
+    n.add_object("a", Box(), at(-5))
+    assert m.in_collision_other(n) is False
+    n.add_object("d", Box(), at(5))
+    assert m.in_collision_other(n, return_names=True) == (True, {("b", "d")})
+
+
+def test_how_far():
+    m = CollisionManager()
+    assert m.min_distance_single(Box()) == np.inf and m.min_distance_internal() == np.inf
+    m.add_object("a", Box(), at(5))
+    assert m.min_distance_single(Box(), return_name=True) == (4, "a")
+    assert m.min_distance_single(Box(), at(5.75)) == pytest.approx(-0.25)
+    assert m.min_distance_single(Box(), at(6)) == 0
+    m.add_object("b", Box(), at(-5))
+    assert m.min_distance_internal(return_names=True) == (9, ("a", "b"))
+    m.add_object("c", Box(), at(2))
+    assert m.min_distance_internal(return_names=True) == (2, ("a", "c"))
+    assert m.min_distance_internal("b", return_names=True) == (6, ("b", "c"))
+    n = CollisionManager()
+    n.add_object("d", Box(), at(0, 0, 3))
+    far, names, data = m.min_distance_other(n, return_names=True, return_data=True)
+    assert names == ("c", "d") and data.distance == far
+    assert np.linalg.norm(data.point("c") - data.point("d")) == pytest.approx(far)
+
+
+def test_many_are_asked_as_pairs():
+    rng = np.random.default_rng(3)
+    m, boxes = CollisionManager(), []
+    for i in range(60):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        transform = at(*rng.uniform(0, 5, 3))
+        transform[:3, :3] = turn * np.sign(np.linalg.det(turn)) if i % 2 else np.eye(3)
+        transform[:3, 3] = transform[:3, 3] if i % 2 else np.round(transform[:3, 3])
+        boxes.append(transform)
+        m.add_object(i, Box(), transform)
+    asset = m.add_object(0, Box(), boxes[0])
+    poses = ist.poses(np.array(boxes))
+    told = m.in_collision_internal(return_names=True)[1]
+    for i in range(60):
+        for j in range(i):
+            found = ist.penetration(asset, asset, poses[i], poses_a=poses[j], measure="exact")
+            assert (tuple(sorted((i, j))) in told) == (found.volume > 0 or found.touching), (i, j)
+    moved = at(9, 9, 9)
+    gaps = [ist.separation(asset, asset, ist.poses(moved), poses_a=pose).distance for pose in poses]
+    assert m.min_distance_single(Box(), moved, return_name=True) == (min(gaps), int(np.argmin(gaps)))
+
+
+def test_mistakes_are_told():
+    m = CollisionManager()
+    with pytest.raises(ist.OpenMeshError, match="lid: .*not closed"):
+        m.add_object("lid", Box(top=False))
+    CollisionManager(repair=True).add_object("lid", Box(top=False))
+    for call in (lambda: m.remove_object("x"), lambda: m.set_transform("x", at(1)),
+                 lambda: m.min_distance_internal("x")):
+        with pytest.raises(ValueError, match="x not in collision manager!"):
+            call()
+    with pytest.raises(ValueError, match="transform must be"):
+        m.add_object("a", Box(), np.eye(3))
+
+
+def test_the_face_of_a_contact():
+    pytest.importorskip("trimesh")
+    import trimesh
+
+    m = CollisionManager()
+    m.add_object("a", trimesh.creation.box((1, 1, 1)))
+    data = m.min_distance_single(trimesh.creation.box((0.2, 0.2, 0.2)), at(3), return_data=True)[1]
+    assert trimesh.creation.box((1, 1, 1)).face_normals[data.index("a")] == pytest.approx([1, 0, 0])
