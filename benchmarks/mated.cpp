@@ -3,6 +3,7 @@
 // so that no pose is asked twice in a row; a row's time is its least of all rounds.
 
 #include <ist/bake.h>
+#include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
 #include <ist/query.h>
 
@@ -240,7 +241,7 @@ void report_copies(Report& report) {
     const std::size_t triangles = mesh.triangles.size();
     if (report.quick() && triangles > 10'000) continue;
     const Part part(std::move(mesh), name);
-    const double size = 2 * part.asset.view().header().ball_radius;
+    const double size = 2 * ist::bounds(part.asset.view()).radius;
     const std::vector<double> asides = {0, 1e-9, 1e-6, 1e-3};
     std::vector<Row> rows;
     for (const double aside : asides)

@@ -481,6 +481,15 @@ TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
         ++steps;
       }
     }
+  // A ball rolls about another: the nearest blocks change again and again.
+  const Body ball(testing::icosphere_mesh(4));
+  for (int i = 0; i < 1500; ++i) {
+    const double at = 2e-3 * i, half = 0.7 * at;
+    const Pose pose{{std::cos(half), 0, 0.6 * std::sin(half), 0.8 * std::sin(half)},
+                    {2.01 * std::cos(at), 2.01 * std::sin(at), 0.1 * at}};
+    const PlacedTree a{ball.asset.view(), {}, 1}, b{ball.asset.view(), pose, 1};
+    expect_same_gap(separation(a, b, {.pair_id = 99}, kept), separation(a, b, {}, scratch), i);
+  }
   EXPECT_GT(fewer, 80);
   EXPECT_GT(steps, 800);
 }
