@@ -68,10 +68,8 @@ class TriangleSearch {
     TrianglePairs& pairs = *scratch_.pairs;
     const auto add_areas = [&] {
       alignas(64) double area[8], along[3][8];
-      const std::uint32_t far = far_in_planes(pairs, pairs.count, 0);
       find_areas(pairs, area, along);
-      for (std::uint32_t left = ((1u << pairs.count) - 1) & ~far; left != 0; left &= left - 1) {
-        const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
+      for (std::uint32_t n = 0; n < pairs.count; ++n) {
         out.area += area[n];
         out.normal = out.normal + exact::Point{along[0][n], along[1][n], along[2][n]};
       }
@@ -502,7 +500,10 @@ class TriangleSearch {
   }
 
   void test_pairs() {
-    if (scratch_.pairs->asks != 0 || !found_.settled)
+    TrianglePairs& pairs = *scratch_.pairs;
+    // Others of their blocks may have marked them meanwhile.
+    pairs.asks = not_marked(pairs, pairs.asks);
+    if (pairs.asks != 0 || !found_.settled)
       test_pairs<true>();
     else
       test_pairs<false>();
@@ -524,17 +525,13 @@ class TriangleSearch {
       find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
     const std::uint32_t apart = heights.apart(heights.certain);
     if constexpr (kAsks) {
-      std::uint32_t unsettled = asks & all & apart & ~heights.apart(heights.settled);
-      if (unsettled != 0) unsettled &= ~far_in_planes(pairs, count, double{search_.near});
-      for (; unsettled != 0; unsettled &= unsettled - 1)
-        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(unsettled)));
+      note_near(pairs, asks & all & apart & ~heights.apart(heights.settled));
     }
     if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
   }
 
-  /// Pairs that are further apart than `reach` along the plane of one of them, as those in one
-  /// plane may be.
-  HWY_NOINLINE std::uint32_t far_in_planes(const TrianglePairs& pairs, std::uint32_t count,
+  /// Pairs that are further apart than `reach` across or along the plane of one of them.
+  HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
     const D d;
     std::uint32_t out = 0;
@@ -545,6 +542,10 @@ class TriangleSearch {
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       for (int s = 0; s < 2; ++s) {
         const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
+        const auto height = [&](int k) { return dot(normal, corner[1 - s][k] - corner[s][0]); };
+        const V low = min3(height(0), height(1), height(2)),
+                high = max3(height(0), height(1), height(2)), off = hn::Max(low, hn::Neg(high));
+        out |= mask_bits(d, off * hn::Abs(off) > least * dot(normal, normal)) << l;
         for (int k = 0; k < 3; ++k) {
           const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
           const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
@@ -659,8 +660,7 @@ class TriangleSearch {
     if constexpr (kAsks) {
       settled =
           each(heights.settled[0]) & each(heights.settled[1]) & round.decided(parts, round.settled);
-      for (std::uint32_t left = asks & all & ~settled; left != 0; left &= left - 1)
-        note_near(pairs, static_cast<std::uint32_t>(std::countr_zero(left)));
+      note_near(pairs, asks & all & ~settled);
     }
     for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
          left &= left - 1)
@@ -695,16 +695,33 @@ class TriangleSearch {
       }
   }
 
-  /// A pair whose signs might be others if points moved by the room marks its blocks, if it is as
-  /// near: the same ones whichever search found it.
-  HWY_NOINLINE void note_near(const TrianglePairs& pairs, std::uint32_t n) {
-    const std::uint32_t block_a = pairs.triangle[0][n] / kWidth,
-                        block_b = pairs.triangle[1][n] / kWidth;
-    if (are_near(block_a, block_b)) return;
-    const ExactCorners corners(pairs, n);
-    if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
-    set(scratch_.a.near, block_a);
-    set(scratch_.b.near, block_b);
+  /// Those whose blocks are not both marked as near.
+  std::uint32_t not_marked(const TrianglePairs& pairs, std::uint32_t which) const {
+    std::uint32_t out = 0;
+    for (; which != 0; which &= which - 1) {
+      const int n = std::countr_zero(which);
+      const bool marked = are_near(pairs.triangle[0][n] / kWidth, pairs.triangle[1][n] / kWidth);
+      out |= static_cast<std::uint32_t>(!marked) << n;
+    }
+    return out;
+  }
+
+  /// Pairs whose signs might be others if points moved by the room mark their blocks, if they are
+  /// as near: the same ones whichever search found them.
+  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t which) {
+    std::uint32_t fresh = not_marked(pairs, which);
+    if (fresh == 0) return;
+    fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
+                            double{search_.near});
+    for (; fresh != 0; fresh &= fresh - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(fresh));
+      const ExactCorners corners(pairs, n);
+      if (not_marked(pairs, 1u << n) == 0 ||
+          !exact::come_within(search_.near, corners.of[0], corners.of[1]))
+        continue;
+      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
+    }
   }
 
   /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps

@@ -77,8 +77,7 @@ HWY_INLINE V common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& nor
   const V found = hn::Abs(twice), least = hn::Set(d, 1e-14) * ((right - left) * (high - low));
   const V size = one_of(nx, ny, nz);
   const auto counts = hn::And(found > least, size > zero);
-  return hn::IfThenElseZero(counts,
-                            hn::Set(d, 0.5) * found / hn::IfThenElse(counts, size, one));
+  return hn::IfThenElseZero(counts, hn::Set(d, 0.5) * found / hn::IfThenElse(counts, size, one));
 }
 
 }  // namespace ist::HWY_NAMESPACE

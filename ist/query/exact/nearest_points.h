@@ -76,14 +76,17 @@ inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept
 /// Of a triangle's corners over the other's plane, times the length of its normal.
 using Heights = std::array<double, 3>;
 
-/// Takes the nearest points of two triangles that do not cross, if they are nearer.
+/// Takes the nearest points of two triangles that do not cross, if they are nearer. `enough`: any
+/// that are nearer will do.
 inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Heights& over_a,
-                         const Heights& over_b, NearestPair& best) noexcept {
+                         const Heights& over_b, NearestPair& best, bool enough = false) noexcept {
   for (int k = 0; k < 3; ++k) {
-    if (over_b[k] * over_b[k] < best.squared * b.squared_normal || b.squared_normal == 0)
-      best.take(a.corner[k], nearest_on_triangle(a.corner[k], b));
-    if (over_a[k] * over_a[k] < best.squared * a.squared_normal || a.squared_normal == 0)
-      best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]);
+    if ((over_b[k] * over_b[k] < best.squared * b.squared_normal || b.squared_normal == 0) &&
+        best.take(a.corner[k], nearest_on_triangle(a.corner[k], b)) && enough)
+      return;
+    if ((over_a[k] * over_a[k] < best.squared * a.squared_normal || a.squared_normal == 0) &&
+        best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]) && enough)
+      return;
   }
   // Edges whose nearest points are no corners; by products of vectors, which keep the digits of
   // edges that are nearly parallel.
@@ -108,7 +111,7 @@ inline bool come_within(double distance, const Point (&a)[3], const Point (&b)[3
   }
   NearestPair best;
   best.squared = distance * distance;
-  take_nearest(of_a, of_b, over_a, over_b, best);
+  take_nearest(of_a, of_b, over_a, over_b, best, true);
   return best.squared < distance * distance;
 }
 
