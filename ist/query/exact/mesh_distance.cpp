@@ -168,8 +168,10 @@ class MeshGapSearch {
     out_.a = best_.on_a;
     out_.b = best_.on_a + best_.between;
     out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
-    if (!out_.stopped) least = best_.least;
-    out_.least = std::max(0.0, (1 - 1e-12) * std::sqrt(least) - slack_);
+    // From the pair that answers: which of those that are alike is the least depends on the search.
+    const double nearest =
+        out_.stopped ? std::sqrt(least) : std::sqrt(best_.squared) - best_.rounding;
+    out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
   void push(const GapPair& pair) {
