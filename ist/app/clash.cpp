@@ -29,6 +29,7 @@ struct ClashOptions {
   std::string input, baseline, bcf, glb;
   AssemblyOptions assembly;
   ClashSettings settings;
+  SettingOptions closing;
   double tolerance = -1;
   bool json = false, csv = false;
 };
@@ -248,6 +249,7 @@ void add_clash(CLI::App& app) {
       ->take_all()
       ->excludes(poses);
   add_robot_options(command, options->assembly.robot);
+  add_setting_options(command, options->closing, closing_settings());
   add_whole(command, "--threads", options->settings.threads,
             "Number of threads; 0 = all cores. The result does not depend on it", 0u, 1024u);
   const auto add_file = [&](const std::string& name, std::string& path, const std::string& help) {
@@ -264,6 +266,8 @@ void add_clash(CLI::App& app) {
       "         ist clash gearbox.toml --json --baseline accepted.json\n"
       "         ist clash arm.urdf --pose elbow=0:1.5:16");
   command->callback([options] {
+    complete_settings(options->closing);
+    options->assembly.closing = options->closing.settings.mesh;
     options->assembly.threads = options->settings.threads;
     clash(*options);
   });

@@ -13,6 +13,7 @@
 #include <ist/error.h>
 
 #include "clash/sources.h"
+#include "library/input_mesh.h"
 #include "library/settings/numbers.h"
 #include "mesh/import/source_file.h"
 #include "stage/thread_arena.h"
@@ -28,35 +29,27 @@ bool names(const Pattern& patterns, const std::string& name) {
   });
 }
 
-/// [a][b], symmetric: pairs that rules name. A group's name stands for its parts.
-std::vector<std::vector<bool>> ignored_pairs(ClashSource& source) {
-  const std::size_t n = source.parts.size();
-  std::vector<std::vector<bool>> out(n, std::vector<bool>(n, false));
-  const auto which = [&](const Pattern& patterns) {
-    std::vector<std::size_t> found;
-    for (std::size_t i = 0; i < n; ++i) {
-      const std::string& name = source.parts[i].name;
-      if (names(patterns, name) ||
-          std::any_of(source.groups.begin(), source.groups.end(), [&](const auto& group) {
-            return names(patterns, group.first) && names(group.second, name);
-          }))
-        found.push_back(i);
-    }
-    if (found.empty())
+/// A group's name stands for its parts.
+std::vector<Assembly::Rule> rules_of(ClashSource& source) {
+  const auto set = [&](const Pattern& patterns) {
+    std::vector<bool> found;
+    for (const ClashSource::Part& part : source.parts)
+      found.push_back(names(patterns, part.name) ||
+                      std::any_of(source.groups.begin(), source.groups.end(), [&](const auto& one) {
+                        return names(patterns, one.first) && names(one.second, part.name);
+                      }));
+    if (std::count(found.begin(), found.end(), true) == 0)
       source.notes.push_back(
           fmt::format("a rule for '{}' names no part", fmt::join(patterns, ", ")));
     return found;
   };
-  const auto ignore = [&](const std::vector<std::size_t>& a, const std::vector<std::size_t>& b) {
-    for (const std::size_t i : a)
-      for (const std::size_t j : b) out[i][j] = out[j][i] = true;
-  };
-  for (const auto& [a, b] : source.ignored) ignore(which(a), which(b.empty() ? Pattern{"*"} : b));
+  std::vector<Assembly::Rule> rules;
+  for (const auto& [a, b] : source.ignored) rules.push_back({set(a), set(b)});
   for (const auto& [name, patterns] : source.groups) {
-    const auto members = which(patterns);
-    ignore(members, members);
+    const std::vector<bool> members = set(patterns);
+    rules.push_back({members, members});
   }
-  return out;
+  return rules;
 }
 
 std::vector<std::string_view> fields_of(std::string_view line) {
@@ -174,7 +167,7 @@ struct Made {
   std::vector<std::string> notes;
 };
 
-Made make(const ClashShape& shape) {
+Made make(const ClashShape& shape, const MeshSettings& closing) {
   Made out;
   try {
     if (!shape.mesh) {
@@ -183,11 +176,10 @@ Made make(const ClashShape& shape) {
         out.fault = shape.name + ": keeps no mesh; bake it again with --surface all";
       return out;
     }
-    const ClosedMesh closed = close_mesh(shape.mesh(), shape.name);
+    const ClosedMesh closed = close_as_asked(shape.mesh(), shape.name, closing);
     out.notes = closed.report.notes;
     // One thread: many shapes are made at once.
     out.asset = std::make_shared<const Asset>(bake_surface(closed, {}, 1));
-    if (closed.report.meets_itself) out.notes.push_back("it meets itself: its volume counts once");
   } catch (const Error& error) {
     out.fault = error.what();
   }
@@ -211,7 +203,7 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
                 ": is no assembly: name a .toml of parts, a scene (.glb, .gltf) or a robot "
                 "(.urdf, .xml, .mjcf)");
   if (!options.rules.empty()) read_clash_toml(options.rules, true, source);
-  const auto ignored = ignored_pairs(source);
+  const std::vector<Assembly::Rule> rules = rules_of(source);
 
   std::vector<Pose> still;
   for (const ClashSource::Part& part : source.parts) still.push_back(part.pose);
@@ -223,17 +215,18 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
 
   // What no pair asks for is not read.
   const std::size_t n = source.parts.size();
-  std::vector<bool> asked(source.shapes.size(), false), part_asked(n, false);
+  std::vector<bool> asked(source.shapes.size(), false), part_asked(n, true);
   for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j)
-      if (i != j && !ignored[i][j]) part_asked[i] = true;
-    if (n == 1) part_asked[i] = true;
+    for (const auto& [a, b] : rules)
+      for (const auto& [one, other] : {std::pair(&a, &b), std::pair(&b, &a)})
+        if ((*one)[i] && std::count(other->begin(), other->end(), false) == 0)
+          part_asked[i] = false;
     if (part_asked[i]) asked[source.parts[i].shape] = true;
   }
   std::vector<Made> made(source.shapes.size());
   thread_arena(options.threads).execute([&] {
     for_each_index(0, made.size(), 1, [&](std::size_t i) {
-      if (asked[i]) made[i] = make(source.shapes[i]);
+      if (asked[i]) made[i] = make(source.shapes[i], options.closing);
     });
   });
 
@@ -271,9 +264,12 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
             fmt::format("{}{}: {}", of.front(),
                         of.size() > 1 ? fmt::format(" and {} more", of.size() - 1) : "", note));
   }
-  for (const std::size_t i : kept) {
-    auto& row = out.ignored.emplace_back();
-    for (const std::size_t j : kept) row.push_back(ignored[i][j]);
+  for (const auto& [a, b] : rules) {
+    Assembly::Rule& rule = out.rules.emplace_back();
+    for (const std::size_t i : kept) {
+      rule.a.push_back(a[i]);
+      rule.b.push_back(b[i]);
+    }
   }
   return out;
 }
@@ -292,7 +288,10 @@ std::vector<Clash> find_clashes(const Assembly& assembly, const ClashSettings& s
       as_first[i] = &row != &assembly.rows.front() && same(row.poses[i], first[i]);
     }
     for (Clash& found : find_clashes(parts, settings, [&](std::size_t a, std::size_t b) {
-           return assembly.ignored[a][b] || (as_first[a] && as_first[b]);
+           return (as_first[a] && as_first[b]) ||
+                  std::any_of(assembly.rules.begin(), assembly.rules.end(), [&](const auto& rule) {
+                    return (rule.a[a] && rule.b[b]) || (rule.a[b] && rule.b[a]);
+                  });
          })) {
       found.pose = row.name;
       const auto [known, fresh] = worst.try_emplace({found.a, found.b}, found);

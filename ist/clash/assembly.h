@@ -11,6 +11,7 @@
 
 #include "clash/clash.h"
 #include "library/robot_assets.h"
+#include "library/settings/bake_settings.h"
 
 namespace ist {
 
@@ -26,6 +27,7 @@ struct AssemblyOptions {
   std::vector<JointRange> joints;  ///< robots: of each, one value or several
   std::string poses;               ///< CSV: a sweep; "": none
   std::string rules;               ///< TOML with [[ignore]] and [[group]] alone; "": none
+  MeshSettings closing;            ///< repair and wrap, for meshes that are open
   unsigned threads = 0;            ///< 0: all cores
 };
 
@@ -35,6 +37,10 @@ struct Assembly {
   struct Row {
     std::string name;
     std::vector<Pose> poses;
+  };
+  /// Pairs of one part of each set, by index of parts, are not asked.
+  struct Rule {
+    std::vector<bool> a, b;
   };
   /// A part without an answer: it is open, cannot be read, or cannot be resolved.
   struct Fault {
@@ -46,7 +52,7 @@ struct Assembly {
   std::vector<Fault> faults;     ///< these are no parts
   std::vector<std::string> notes;
   std::vector<std::shared_ptr<const Asset>> assets;  ///< which the parts view
-  std::vector<std::vector<bool>> ignored;            ///< [a][b], symmetric
+  std::vector<Rule> rules;
   std::size_t count = 0;  ///< parts of the file, also those with faults and those ignored
 };
 

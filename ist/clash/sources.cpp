@@ -159,6 +159,7 @@ class TomlReader {
       (key == "a" ? rule.first : rule.second) = patterns(value, std::string(key.str()));
     }
     if (rule.first.empty()) std::swap(rule.first, rule.second);
+    if (rule.second.empty()) rule.second = {"*"};
     if (rule.first.empty())
       fail(line_of(table),
            "add a = \"PART\", alone or with b = \"PART\"; * stands for any letters");

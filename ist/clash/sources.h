@@ -34,7 +34,7 @@ struct ClashSource {
   std::vector<ClashShape> shapes;
   std::vector<Part> parts;
   std::vector<std::string> notes;
-  std::vector<std::pair<Patterns, Patterns>> ignored;  ///< of either order; empty: all others
+  std::vector<std::pair<Patterns, Patterns>> ignored;  ///< in either order
   std::map<std::string, Patterns> groups;              ///< pairs within one are not asked
   /// Poses of a row of a sweep by its columns' numbers; null: rows hold a part's pose.
   std::function<std::vector<Pose>(const std::map<std::string, double>&)> posed;
