@@ -1,4 +1,5 @@
-// All clashes of assemblies, beside Manifold's booleans on the same pairs. One thread, its CPU time.
+// All clashes of assemblies, beside Manifold's booleans on the same pairs. One thread, its CPU
+// time.
 
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
@@ -41,8 +42,7 @@ struct Scene {
   std::vector<const Shape*> shapes;
 
   void add(const Shape& shape, const ist::Pose& pose) {
-    parts.push_back(
-        {std::to_string(parts.size()), {shape.asset.view(), pose, 1}, ist::kFloat64});
+    parts.push_back({std::to_string(parts.size()), {shape.asset.view(), pose, 1}, ist::kFloat64});
     shapes.push_back(&shape);
   }
 };
@@ -62,8 +62,9 @@ void measure(Report& report, const std::string& name, const Scene& scene) {
   for (std::size_t i = 0; i < asked; ++i) {
     const ist::Clash& clash = found[i * found.size() / asked];
     const Shape &a = *scene.shapes[clash.a], &b = *scene.shapes[clash.b];
-    const ist::Pose pose = ist::to_pose(ist::to_isometry(scene.parts[clash.a].solid.pose).inverse() *
-                                        ist::to_isometry(scene.parts[clash.b].solid.pose));
+    const ist::Pose pose =
+        ist::to_pose(ist::to_isometry(scene.parts[clash.a].solid.pose).inverse() *
+                     ist::to_isometry(scene.parts[clash.b].solid.pose));
     start = thread_seconds();
     const double volume = a.manifold.overlap(b.manifold, pose);
     others += thread_seconds() - start;
@@ -90,10 +91,12 @@ void measure(Report& report, const std::string& name, const Scene& scene) {
 int main(int argc, char** argv) {
   Report report("clash_assemblies", argc, argv);
   report.page("Clashes of assemblies");
-  report.remark("One thread, its CPU time: all of find_clashes(), boxes, volumes, depths and areas; "
-                "beside it Manifold's boolean of up to 400 of the pairs that it lists.");
-  report.remark("Wall: bricks flush with all their neighbours. Heap: twelve parts of a CAD kernel in "
-                "a cube, half of them in right-angled turns.");
+  report.remark(
+      "One thread, its CPU time: all of find_clashes(), boxes, volumes, depths and areas; "
+      "beside it Manifold's boolean of up to 400 of the pairs that it lists.");
+  report.remark(
+      "Wall: bricks flush with all their neighbours. Heap: twelve parts of a CAD kernel in "
+      "a cube, half of them in right-angled turns.");
   const Shape brick("brick");
   const int edge = report.quick() ? 3 : 10;
   Scene wall;

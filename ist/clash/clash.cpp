@@ -111,8 +111,8 @@ class PairQuery {
 
   /// False: there is nothing to list.
   bool ask(Clash& out) {
-    const Sums whole = patches(b_.part->solid, &out.depth);
-    const Penetration& found = penetration_;
+    Penetration found;
+    const Sums whole = patches(b_.part->solid, found, &out.depth);
     out.status = found.status;
     out.volume = found.volume;
     out.volume_min = found.volume_min;
@@ -124,7 +124,7 @@ class PairQuery {
     }
     if (!(found.volume > 0)) {
       out.depth = 0;  // patches may hold rounding
-      return found.touching ? touches(out) : is_near(out);
+      return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {
@@ -139,14 +139,17 @@ class PairQuery {
   }
 
  private:
-  /// Sums of the overlap with B at this place; penetration_ is the whole answer. `depth`: of the
-  /// connected part that is the deepest.
-  Sums patches(const PlacedTree& solid_b, double* depth = nullptr) {
+  static PenetrationSettings exactly() {
     PenetrationSettings exact;
     exact.measure = Measure::exact;
+    return exact;
+  }
+
+  /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
+  Sums patches(const PlacedTree& solid_b, Penetration& found, double* depth = nullptr) {
     const ContactPatches all =
-        contact_patches(a_.part->solid, solid_b, exact, scratch_.workspace, scratch_.patches);
-    penetration_ = all.penetration;
+        contact_patches(a_.part->solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
+    found = all.penetration;
     std::map<std::uint64_t, Sums> parts;
     Sums whole;
     for (std::size_t i = 0; i < all.count; ++i) {
@@ -165,12 +168,19 @@ class PairQuery {
     return whole;
   }
 
+  /// The overlap once B has moved.
+  Penetration aside(const Vector3d& by) {
+    return penetration(a_.part->solid, moved(by), exactly(), scratch_.workspace);
+  }
+
   /// Where sides are flush the volume falls whichever way B goes across them: the mean of two
   /// places a little aside leaves that out.
   void way_out(Clash& out, const Sums& whole) {
-    const double aside = std::min(1e-7 * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth);
-    Vector3d force = Vector3d::Zero();
-    for (const double by : {-aside, aside}) force += patches(moved(by * out.direction)).force / 2;
+    const Vector3d by =
+        std::min(1e-7 * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
+    Vector3d force = -aside(-by).translation_gradient;
+    if ((force - whole.force).norm() > 1e-4 * whole.force.norm())
+      force = (force - aside(by).translation_gradient) / 2;
     if (!(force.norm() > whole.area / 4)) return;
     out.direction = unit(force);
     if (parts_ == 1) out.depth = whole.volume / force.norm();
@@ -211,14 +221,14 @@ class PairQuery {
   }
 
   /// The solids touch exactly.
-  bool touches(Clash& out) {
-    out.kind = ClashKind::touching;
-    const Penetration exact = penetration_;
-    out.direction = exact.contact_normal;
-    const Separation nearest = distance(0);
-    out.centroid = (nearest.point_a + nearest.point_b) / 2;
+  bool touches(const Penetration& found, Clash& out) {
+    out.direction = found.contact_normal;
+    if (out.direction.isZero(0)) {
+      const Separation nearest = distance(0);
+      out.centroid = (nearest.point_a + nearest.point_b) / 2;
+    }
     measure_contact(out, std::max(touch_, 1e-7 * std::min(a_.diameter, b_.diameter)));
-    out.contact_area = exact.contact_area;
+    out.contact_area = found.contact_area;
     return true;
   }
 
@@ -240,17 +250,20 @@ class PairQuery {
   /// Area and centroid of a contact once B has moved towards A, if there is one way to do so.
   void measure_contact(Clash& out, double by) {
     out.kind = ClashKind::touching;
-    const Sums sums = patches(moved(-by * out.direction));
-    const bool one_way = !out.direction.isZero(0);
-    out.contact_area = one_way ? std::max(0.0, sums.force.dot(out.direction)) : sums.area;
-    if (sums.volume > 0 && (one_way || out.volume > 0)) out.centroid = penetration_.centroid;
+    Penetration found;
+    if (!out.direction.isZero(0)) {
+      found = aside(-by * out.direction);
+      out.contact_area = std::max(0.0, -found.translation_gradient.dot(out.direction));
+    } else if (out.volume > 0) {
+      out.contact_area = patches(b_.part->solid, found).area;
+    }
+    if (found.volume > 0) out.centroid = found.centroid;
   }
 
   const Placed &a_, &b_;
   const double touch_, clearance_;
   Scratch& scratch_;
-  Penetration penetration_;  ///< of the last patches(), and of how many connected parts
-  std::size_t parts_ = 0;
+  std::size_t parts_ = 0;  ///< connected ones that patches() found
 };
 
 }  // namespace
