@@ -134,7 +134,7 @@ std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource
 /// All combinations of the joints' values.
 std::vector<Assembly::Row> joint_rows(const std::vector<JointRange>& ranges,
                                       const ClashSource& source) {
-  constexpr std::size_t kMost = 1'000'000;
+  constexpr std::size_t kMost = 100'000;
   std::size_t count = 1;
   for (const JointRange& range : ranges)
     if ((count *= range.count) > kMost)

@@ -1,5 +1,7 @@
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -24,7 +26,11 @@ class ClashFiles : public CommandLine {
            std::to_string(x) + ",0,0]\n";
   }
   void SetUp() override {
-    CommandLine::SetUp();
+    // No bakes: most of these tests need none.
+    std::string pattern = (std::filesystem::temp_directory_path() / "ist_clash_XXXXXX").string();
+    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+    folder_ = pattern;
+    ASSERT_EQ(ist({"sample", "cube", "-o", "cube.obj"}).exit_code, 0);
     double low = 1e9, high = -1e9;  // of the cube in x
     for (const std::string& line : lines_of(read("cube.obj")))
       if (line.starts_with("v ")) {
@@ -177,6 +183,7 @@ TEST_F(ClashFiles, PartsThatAreNoSolidsAreReportedAndTheRestIsAnswered) {
 }
 
 TEST_F(ClashFiles, CopiesInOnePlaceAndAssets) {
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "cube.ist", "--surface-only"}).exit_code, 0);
   ASSERT_EQ(
       ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
       0);
@@ -409,7 +416,7 @@ TEST_F(ClashFiles, BadFilesSayWhereAndWhatToDo) {
            {"[[part]]\nmesh = \".\"\n", ":2: mesh: no file"},
            {"[[part]]\nmesh = \"file.toml\"\n", ":2: mesh: 'file.toml' has not the ending"},
            {"[[part]]\nmesh = 3\n", ":2: mesh: write a name in quotes"},
-           {"[[part]]\nmesh = \"cube.obj\"\nasset = \"cube.ist\"\n", "not both"},
+           {"[[part]]\nmesh = \"cube.obj\"\nasset = \"cube.obj\"\n", "not both"},
            {"[[part]]\nmesh = \"cube.obj\"\npose = [1,0,0,0]\n", ":3: pose: write 7 numbers"},
            {"[[part]]\nmesh = \"cube.obj\"\npose = [1,0,0,0,nan,0,0]\n", ":3: pose: write finite"},
            {"[[part]]\nmesh = \"cube.obj\"\npose = [0,0,0,0,1,0,0]\n", "a quaternion, w first"},
