@@ -291,8 +291,9 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
     for (const RobotJoint& joint : robot->joints)
       if (joint.is_free()) free.push_back(joint.name);
     for (const auto& [name, value] : values) {
-      const auto at = std::find_if(robot->joints.begin(), robot->joints.end(),
-                                   [&](const RobotJoint& j) { return j.name == name; });
+      const auto at =
+          std::find_if(robot->joints.begin(), robot->joints.end(),
+                       [&sought = name](const RobotJoint& j) { return j.name == sought; });
       if (at == robot->joints.end() || !at->is_free()) {
         const std::string nearest = nearest_word(name, free);
         throw Error(fmt::format("{}: no joint that moves freely is called '{}'{}", path, name,
