@@ -28,6 +28,7 @@ void add_summary(CLI::App& app);
 void add_query(CLI::App& app);
 void add_info(CLI::App& app);
 void add_check(CLI::App& app);
+void add_clash(CLI::App& app);
 void add_medial(CLI::App& app);
 void add_export(CLI::App& app);
 void add_sample(CLI::App& app);

@@ -110,6 +110,11 @@ def close_mesh(
     mesh: _OpenMesh, *, name: str = "mesh", repair: bool = False, scale: _Scale = 1.0,
 ) -> ClosedMesh: ...
 def sample_mesh(name: str) -> Mesh: ...
+def clash(
+    meshes: Sequence[Asset | ClosedMesh | _OpenMesh], poses: ArrayLike | None = None, *,
+    names: Sequence[str] | None = None, scales: ArrayLike | None = None, clearance: float = 0.0,
+    tolerance: float | None = None, touch_within: float | None = None, threads: int = 0,
+) -> dict[str, Any]: ...
 
 @final
 class MassProperties:

@@ -77,6 +77,20 @@ Eigen::AlignedBox3d finite_bounds(const SourceFile& file, const PolygonMesh& mes
   return bounds.box;
 }
 
+TriangleMesh mesh_of(const SourceFile& file, PolygonMesh polygons, const ImportSettings& settings) {
+  if (polygons.ends.empty() && polygons.triangles.empty())
+    fail(file, "contains no faces, so it does not bound a solid");
+  const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
+  std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
+  TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};
+  mesh = weld(std::move(mesh), settings.weld_tolerance * bounds.diagonal().norm());
+  mesh.declared = polygons.declared;
+  std::set<std::string> said;  // many meshes of a scene may share a note
+  for (std::string& note : polygons.notes)
+    if (said.insert(note).second) mesh.notes.push_back(std::move(note));
+  return mesh;
+}
+
 /// Not read by a third party.
 bool is_ours(const std::string& ending) {
   return ending == ".vdb" || std::any_of(kReaders.begin(), kReaders.end(),
@@ -118,18 +132,23 @@ TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings) 
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings) {
   refuse_other_content(file);
   if (ending_of(file.path) != ".stl") refuse_other_format(file);  // its header may be any text
-  PolygonMesh polygons = reader_of(file.path)(file);
-  if (polygons.ends.empty() && polygons.triangles.empty())
-    fail(file, "contains no faces, so it does not bound a solid");
-  const Eigen::AlignedBox3d bounds = finite_bounds(file, polygons);
-  std::vector<std::array<std::uint32_t, 3>> triangles = triangulate(polygons);
-  TriangleMesh mesh{std::move(polygons.vertices), std::move(triangles)};
-  mesh = weld(std::move(mesh), settings.weld_tolerance * bounds.diagonal().norm());
-  mesh.declared = polygons.declared;
-  std::set<std::string> said;  // many meshes of a scene may share a note
-  for (std::string& note : polygons.notes)
-    if (said.insert(note).second) mesh.notes.push_back(std::move(note));
-  return mesh;
+  return mesh_of(file, reader_of(file.path)(file), settings);
+}
+
+MeshScene read_mesh_scene(const std::string& path) {
+  const SourceFile file = read_source_file(path);
+  refuse_other_content(file);
+  refuse_other_format(file);
+  GltfParts read = read_gltf_parts(file);
+  MeshScene scene;
+  for (PolygonMesh& mesh : read.meshes) {
+    const bool empty = mesh.ends.empty();  // lines or points alone
+    scene.meshes.push_back(empty ? TriangleMesh{} : mesh_of(file, std::move(mesh), {}));
+  }
+  for (GltfParts::Part& part : read.parts)
+    scene.parts.push_back({std::move(part.name), part.mesh, part.in_world});
+  scene.notes = std::move(read.notes);
+  return scene;
 }
 
 }  // namespace ist

@@ -13,6 +13,21 @@ namespace ist {
 /// What load_mesh() does with a file once its bytes are in memory.
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings);
 
+/// A glTF node by node, in the file's frame: x_world = in_world · x.
+struct MeshScene {
+  struct Part {
+    std::string name;          ///< may be another's too
+    std::size_t mesh = 0;      ///< index into `meshes`, which parts share
+    Eigen::Affine3d in_world;  ///< it may mirror and shear
+  };
+  std::vector<TriangleMesh> meshes;  ///< one without triangles is empty
+  std::vector<Part> parts;
+  std::vector<std::string> notes;  ///< as TriangleMesh::notes
+};
+
+/// Throws Error as load_mesh() does.
+MeshScene read_mesh_scene(const std::string& path);
+
 /// Whether load_mesh() has a reader for files that end like this one.
 bool is_mesh_format(const std::string& path);
 

@@ -132,4 +132,20 @@ TEST_F(JsonSchema, CheckQueryAndExport) {
   EXPECT_EQ(exported, documented("`ist export -o F.json`"));
 }
 
+TEST_F(JsonSchema, Clash) {
+  write("open.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\n");
+  write("two.toml",
+        "[[part]]\nname = 'a'\nmesh = 'cube.obj'\n[[part]]\nname = 'b'\nmesh = 'cube.obj'\n"
+        "[[part]]\nname = 'open'\nmesh = 'open.obj'\n[[ignore]]\na = 'c'\n");
+  write("poses.csv", "id,part,qw,qx,qy,qz,tx,ty,tz\n0,b,1,0,0,0,0.1,0,0\n1,b,1,0,0,0,0.2,0,0\n");
+  write("old.json",
+        R"({"schema": "ist.clash/1", "pairs": [{"a": "x", "b": "y", "kind": "overlapping"}]})");
+  const Outcome outcome = ist({"clash", "two.toml", "--json", "--tolerance", "0", "--poses",
+                               "poses.csv", "--baseline", "old.json"});
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.err;
+  Paths clash;
+  add_paths(nlohmann::json::parse(outcome.out), "", clash);
+  EXPECT_EQ(clash, documented("`ist clash --json`"));
+}
+
 }  // namespace

@@ -13,8 +13,8 @@ class Usage : public CommandLine {};
 TEST_F(Usage, HelpNamesEverySubcommandAndExitsWith0) {
   const Outcome outcome = ist({"--help"});
   EXPECT_EQ(outcome.exit_code, 0);
-  for (const std::string name : {"bake", "cache", "summary", "query", "info", "check", "export",
-                                 "medial", "sample", "spheres"}) {
+  for (const std::string name : {"bake", "cache", "summary", "query", "info", "check", "clash",
+                                 "export", "medial", "sample", "spheres"}) {
     EXPECT_NE(outcome.out.find(name), std::string::npos) << name;
     const Outcome help = ist({name, "--help"});
     EXPECT_EQ(help.exit_code, 0) << name;

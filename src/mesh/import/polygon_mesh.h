@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -43,6 +44,19 @@ PolygonMesh read_off(const SourceFile& file);
 /// glTF 2.0: the default scene with its node transforms, instances, skins where their joints stand
 /// and morph targets by the default weights.
 PolygonMesh read_gltf(const SourceFile& file);
+
+/// The same, node by node: meshes in their own frames, shared by the nodes that show them.
+struct GltfParts {
+  struct Part {
+    std::string name;          ///< the node's; of several instances numbered
+    std::size_t mesh = 0;      ///< index into `meshes`
+    Eigen::Affine3d in_world;  ///< it may mirror and shear
+  };
+  std::vector<PolygonMesh> meshes;
+  std::vector<Part> parts;  ///< in the order of the scene
+  std::vector<std::string> notes;
+};
+GltfParts read_gltf_parts(const SourceFile& file);
 
 /// COLLADA: the visual scene with its node transforms, in metres and on the file's own axes; skins
 /// in their bind pose.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -253,12 +254,42 @@ class GltfScene {
   PolygonMesh read() {
     mesh_.declared = {.up_axis = 'Y', .unit = 1};  // every glTF file, by its specification
     place_nodes();
-    for (const std::size_t node : in_order_) append_node(node);
+    for (const std::size_t node : in_order_)
+      if (has_mesh(node)) append_node(node, world_places(node), mesh_);
     note_unread();
     return std::move(mesh_);
   }
 
+  GltfParts read_parts() {
+    place_nodes();
+    GltfParts out;
+    std::map<std::size_t, std::size_t> shared;  // by the file's mesh
+    for (const std::size_t index : in_order_) {
+      if (!has_mesh(index)) continue;
+      const Json& node = document_.root().at("nodes")[index];
+      const bool own = node.contains("weights") || node.contains("skin");
+      const std::size_t mesh = document_.whole(node, "mesh");
+      const auto [known, fresh] = shared.try_emplace(mesh, out.meshes.size());
+      const std::size_t at = own || fresh ? out.meshes.size() : known->second;
+      if (own && fresh) shared.erase(known);
+      if (at == out.meshes.size())
+        append_node(index, {Transform::Identity()}, out.meshes.emplace_back());
+      const std::vector<Transform> places = world_places(index);
+      const std::string name = node.value("name", "node " + std::to_string(index));
+      for (std::size_t i = 0; i < places.size(); ++i)
+        out.parts.push_back(
+            {places.size() > 1 ? name + "[" + std::to_string(i) + "]" : name, at, places[i]});
+    }
+    note_unread();
+    out.notes = std::move(mesh_.notes);
+    return out;
+  }
+
  private:
+  bool has_mesh(const std::size_t index) const {
+    return document_.root().at("nodes")[index].contains("mesh");
+  }
+
   /// The nodes of the scene, each after its parent, with their frames.
   void place_nodes() {
     worlds_.resize(document_.root().value("nodes", Json::array()).size());
@@ -285,17 +316,25 @@ class GltfScene {
     }
   }
 
-  void append_node(const std::size_t index) {
+  /// Where a node's mesh stands, all its instances; the joints place a skinned one.
+  std::vector<Transform> world_places(const std::size_t index) const {
+    const Json& node = document_.root().at("nodes")[index];
+    std::vector<Transform> places = instances(document_, node, "node " + std::to_string(index));
+    for (Transform& place : places)
+      place = node.contains("skin") ? Transform::Identity() : *worlds_[index] * place;
+    return places;
+  }
+
+  void append_node(const std::size_t index, const std::vector<Transform>& places,
+                   PolygonMesh& out) const {
     const std::string name = "node " + std::to_string(index);
     const Json& node = document_.at("nodes", index, name);
-    if (!node.contains("mesh")) return;
     const std::size_t mesh_index = document_.whole(node, "mesh");
     const std::string mesh_name = "mesh " + std::to_string(mesh_index);
     const Json& gltf_mesh = document_.at("meshes", mesh_index, name);
     const Json& weighted = node.contains("weights") ? node : gltf_mesh;
     const std::vector<double> weights =
         reals(document_, weighted.value("weights", Json::array()), mesh_name);
-    const std::vector<Transform> copies = instances(document_, node, name);
     const bool skinned = node.contains("skin");
     std::vector<Transform> joints;
     if (skinned) joints = joints_of(document_.whole(node, "skin"), name);
@@ -303,11 +342,8 @@ class GltfScene {
       Primitive primitive = read_primitive(document_, json, mesh_name);
       if (primitive.triangles.empty()) continue;
       morph(document_, json, weights, mesh_name, primitive);
-      // The joints place a skinned mesh, not its node.
       if (skinned) pose(document_, json, joints, mesh_name, primitive);
-      for (const Transform& copy : copies)
-        append(document_, primitive, skinned ? Transform::Identity() : *worlds_[index] * copy,
-               mesh_);
+      for (const Transform& place : places) append(document_, primitive, place, out);
     }
   }
 
@@ -353,15 +389,25 @@ class GltfScene {
 
 }  // namespace
 
-PolygonMesh read_gltf(const SourceFile& file) {
+/// `read` of a scene; what the JSON library says becomes an Error.
+template <class Read>
+static auto of_scene(const SourceFile& file, Read read) {
   try {
-    return GltfScene(file).read();
+    return read(GltfScene(file));
   } catch (const nlohmann::json::exception& error) {
     std::string reason = error.what();
     for (char& c : reason)
       if (c < ' ' || c > '~') c = '?';
     fail(file, "is not valid glTF: " + reason);
   }
+}
+
+PolygonMesh read_gltf(const SourceFile& file) {
+  return of_scene(file, [](GltfScene&& scene) { return scene.read(); });
+}
+
+GltfParts read_gltf_parts(const SourceFile& file) {
+  return of_scene(file, [](GltfScene&& scene) { return scene.read_parts(); });
 }
 
 }  // namespace ist

@@ -1,0 +1,276 @@
+#include <fmt/format.h>
+#include <ist/error.h>
+#include <ist/mass_properties.h>
+#include <ist/pose_eigen.h>
+#include <ist/surface.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include <ist/asset_layout.h>
+
+#include "app/commands.h"
+#include "app/glb_scene.h"
+#include "app/options.h"
+#include "clash/assembly.h"
+#include "clash/report.h"
+#include "library/text.h"
+
+namespace ist::app {
+namespace {
+
+using Eigen::Vector3d;
+
+struct ClashOptions {
+  std::string input, baseline, bcf, glb;
+  AssemblyOptions assembly;
+  ClashSettings settings;
+  SettingOptions closing;
+  double tolerance = -1;
+  bool json = false, csv = false;
+};
+
+using Triangle = std::array<Vector3d, 3>;
+
+/// The triangles of a part in its place.
+std::vector<Triangle> triangles_of(const PlacedTree& solid) {
+  const AssetHeader& asset = solid.tree.header();
+  const char* const bytes = reinterpret_cast<const char*>(&asset);
+  const auto& mesh = *reinterpret_cast<const MeshHeader*>(bytes + asset.mesh);
+  const auto* const vertices = reinterpret_cast<const double*>(bytes + mesh.vertices);
+  const auto* const blocks = reinterpret_cast<const MeshBlock*>(bytes + mesh.level[0].blocks);
+  const Eigen::Isometry3d place = to_isometry(solid.pose);
+  const double size = std::ldexp(1.0, asset.exponent);
+  std::vector<Triangle> out;
+  for (std::uint32_t b = 0; b < mesh.level[0].count; ++b)
+    for (std::uint32_t t = 0; t < blocks[b].triangles; ++t) {
+      Triangle& triangle = out.emplace_back();
+      for (std::size_t k = 0; k < 3; ++k)
+        triangle[k] =
+            place *
+            Vector3d(solid.scale *
+                     (size * Vector3d(vertices + 3 * blocks[b].vertex[blocks[b].corner[k][t]]) +
+                      Vector3d(asset.centre)));
+    }
+  return out;
+}
+
+/// The pieces of a triangle that lie in a solid, to a size of `finest`.
+void add_inside(const Triangle& t, const PlacedTree& solid, const Eigen::AlignedBox3d& near,
+                double finest, std::vector<Triangle>& out) {
+  Eigen::AlignedBox3d box(t[0]);
+  box.extend(t[1]).extend(t[2]);
+  if (!box.intersects(near)) return;
+  const Vector3d middle = (t[0] + t[1] + t[2]) / 3;
+  double radius = 0, longest = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    radius = std::max(radius, (t[k] - middle).norm());
+    longest = std::max(longest, (t[k] - t[(k + 1) % 3]).norm());
+  }
+  const double distance = closest_point(solid, middle).distance;
+  if (distance > radius) return;
+  if (distance < -radius || longest < finest) {
+    if (distance <= 0) out.push_back(t);
+    return;
+  }
+  const Vector3d ab = (t[0] + t[1]) / 2, bc = (t[1] + t[2]) / 2, ca = (t[2] + t[0]) / 2;
+  for (const Triangle& piece : {Triangle{t[0], ab, ca}, Triangle{ab, t[1], bc},
+                                Triangle{ca, bc, t[2]}, Triangle{ab, bc, ca}})
+    add_inside(piece, solid, near, finest, out);
+}
+
+void add_mesh(GlbScene& scene, const std::string& name, const std::array<double, 4>& colour,
+              const std::vector<Triangle>& triangles) {
+  if (triangles.empty()) return;
+  std::vector<Vector3d> vertices;
+  std::vector<std::array<std::uint32_t, 3>> corners;
+  for (const Triangle& t : triangles) {
+    const auto first = static_cast<std::uint32_t>(vertices.size());
+    vertices.insert(vertices.end(), t.begin(), t.end());
+    corners.push_back({first, first + 1, first + 2});
+  }
+  scene.add_node(0, {{"name", name}, {"mesh", scene.add_mesh(name, colour, vertices, corners)}});
+}
+
+/// Parts in grey, and in red what of each one's surface lies in another.
+std::string drawn(const Assembly& assembly, const ClashReport& report) {
+  constexpr std::array<double, 4> kGrey = {0.6, 0.6, 0.6, 0.35}, kRed = {0.9, 0.1, 0.1, 1};
+  constexpr double kPieces = 48;
+  GlbScene scene(GlbScene::Json::object({{"name", "clashes"}}));
+  for (const ClashPart& part : assembly.parts)
+    add_mesh(scene, part.name, kGrey, triangles_of(part.solid));
+  for (const Clash& clash : report.pairs) {
+    if (!report.is_clash(clash)) continue;
+    const PlacedTree &a = assembly.parts[clash.a].solid, &b = assembly.parts[clash.b].solid;
+    const Bounds in_a = bounds(a), in_b = bounds(b);
+    const Eigen::AlignedBox3d both = Eigen::AlignedBox3d(in_a.lower, in_a.upper)
+                                         .intersection(Eigen::AlignedBox3d(in_b.lower, in_b.upper));
+    const double finest = both.diagonal().norm() / kPieces;
+    std::vector<Triangle> inside;
+    for (const auto& [of, in] : {std::pair(&a, &b), std::pair(&b, &a)})
+      for (const Triangle& t : triangles_of(*of)) add_inside(t, *in, both, finest, inside);
+    add_mesh(scene, assembly.parts[clash.a].name + " and " + assembly.parts[clash.b].name, kRed,
+             inside);
+  }
+  return scene.bytes();
+}
+
+std::string now() {
+  const std::time_t seconds = std::time(nullptr);
+  char text[32];
+  std::strftime(text, sizeof(text), "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&seconds));
+  return text;
+}
+
+void check_options(const ClashOptions& options) {
+  refuse_idle_options(options.assembly.robot, options.input);
+  if (!options.assembly.joints.empty() && !is_robot_file(options.input))
+    throw CLI::ValidationError(
+        "--pose", "has no effect: '" + options.input + "' is not a robot (.urdf, .xml)");
+  for (const auto& [path, what] : {std::pair(&options.bcf, "the BCF"), {&options.glb, "the scene"}})
+    if (!path->empty()) require_output(*path, options.input, what);
+}
+
+void clash(const ClashOptions& options) {
+  check_options(options);
+  ClashReport report;
+  report.compared = !options.baseline.empty();
+  if (report.compared) report.earlier = read_clashes(options.baseline);
+  const Assembly assembly = read_assembly(options.input, options.assembly);
+  if (!options.glb.empty() && assembly.rows.size() > 1)
+    throw CLI::ValidationError(
+        "--glb", "draws one pose, and there are " + std::to_string(assembly.rows.size()));
+  const std::vector<Clash> pairs = find_clashes(assembly, options.settings);
+  report.parts = assembly.count;
+  for (const ClashPart& part : assembly.parts) report.names.push_back(part.name);
+  report.pairs = pairs;
+  report.tolerance = options.tolerance;
+  report.swept = assembly.rows.size() > 1;
+  for (const auto& [part, what] : assembly.faults) report.faults.emplace_back(part, what);
+  report.notes = assembly.notes;
+  if (!options.bcf.empty()) write_text(options.bcf, clashes_bcf(report, now()));
+  if (!options.glb.empty()) write_text(options.glb, drawn(assembly, report));
+  fmt::print("{}", options.json  ? json_text(clashes_json(report)) + "\n"
+                   : options.csv ? clashes_csv(report)
+                                 : clashes_text(report));
+  if (options.csv)  // the other forms hold them
+    for (const auto& [part, what] : report.faults)
+      fmt::print(stderr, "not answered: {}: {}\n", part, what);
+  if (report.new_clashes() > 0) throw ExitCode{kExitViolation};
+  if (!report.faults.empty()) throw ExitCode{kExitError};
+}
+
+/// JOINT=NUMBER or JOINT=FIRST:LAST:COUNT.
+JointRange joint_range(const std::string& text) {
+  constexpr std::size_t kMost = 1'000'000;
+  const std::size_t equals = text.rfind('=');
+  JointRange range;
+  std::vector<std::string> words;
+  if (equals != std::string::npos && equals > 0) {
+    range.joint = text.substr(0, equals);
+    for (std::size_t at = equals; at != std::string::npos;) {
+      const std::size_t next = text.find(':', at + 1);
+      words.push_back(text.substr(at + 1, next == std::string::npos ? next : next - at - 1));
+      at = next;
+    }
+  }
+  const auto take = [&](const std::string& word, double& value) {
+    const std::optional<double> parsed = parse_number(word);
+    value = parsed.value_or(0);
+    return parsed && std::isfinite(*parsed);
+  };
+  bool right = words.size() == 1 && take(words[0], range.first);
+  if (words.size() == 3)
+    right = take(words[0], range.first) && take(words[1], range.last) &&
+            take_whole<std::size_t>(words[2], 2, kMost, range.count);
+  if (!right)
+    throw CLI::ValidationError(
+        "--pose", fmt::format("'{}' is not JOINT=NUMBER or JOINT=FIRST:LAST:COUNT", text));
+  return range;
+}
+
+}  // namespace
+
+void add_clash(CLI::App& app) {
+  const auto options = std::make_shared<ClashOptions>();
+  CLI::App* const command = app.add_subcommand(
+      "clash", "All pairs of an assembly's parts that overlap, by the exact measure");
+  add_input(command, "FILE", options->input,
+            "Parts in a .toml, a scene (.glb, .gltf: nodes are parts) or a robot (.urdf, .xml, "
+            ".mjcf: links are)");
+  add_number(command, "--clearance", options->settings.clearance, {.least = 0},
+             "Also list pairs that are nearer than this, in u");
+  add_parsed(
+      command, "--tolerance", "a finite number ≥ 0",
+      [options](const std::string& text) {
+        return take_number(text, {.least = 0}, false, options->tolerance);
+      },
+      "Accepted volume of an overlap, in u³: each pair is certainly above it, certainly below, or "
+      "undecided. What is certainly below is no clash")
+      ->type_name("NUMBER");
+  add_parsed(
+      command, "--touch-within", "a finite number ≥ 0",
+      [options](const std::string& text) {
+        return take_number(text, {.least = 0}, false, options->settings.touch_within);
+      },
+      "Parts that reach no further into each other than this, in u, or are no further apart, "
+      "touch. Default: what rounding to the file's float32 or float64 comes to")
+      ->type_name("NUMBER");
+  add_input(command, "--rules", options->assembly.rules,
+            "A TOML with [[ignore]] and [[group]], for scenes and robots")
+      ->required(false)
+      ->type_name("FILE");
+  add_input(command, "--baseline", options->baseline,
+            "An earlier --json: pairs are added, persistent or resolved, and only added ones end "
+            "with exit code 3")
+      ->required(false)
+      ->type_name("FILE");
+  CLI::Option* const poses =
+      add_input(command, "--poses", options->assembly.poses,
+                "CSV of poses to sweep: id,part,qw,qx,qy,qz,tx,ty,tz, or of a robot a column a "
+                "joint. The worst of each pair is listed, with its id")
+          ->required(false)
+          ->type_name("FILE");
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--pose",
+          [options](const std::vector<std::string>& given) {
+            for (const std::string& one : given)
+              options->assembly.joints.push_back(joint_range(one));
+          },
+          "Robots: position of a joint [rad or u]; FIRST:LAST:COUNT sweeps. Repeatable. Default: 0 "
+          "or the middle of its limits")
+      ->type_name("JOINT=NUMBER")
+      ->expected(1)
+      ->take_all()
+      ->excludes(poses);
+  add_robot_options(command, options->assembly.robot);
+  add_setting_options(command, options->closing, closing_settings());
+  add_whole(command, "--threads", options->settings.threads,
+            "Number of threads; 0 = all cores. The result does not depend on it", 0u, 1024u);
+  const auto add_file = [&](const std::string& name, std::string& path, const std::string& help) {
+    add_input(command, name, path, help)->required(false)->type_name("FILE");
+  };
+  add_file("--bcf", options->bcf, "Write the clashes as a BCF 2.1 archive, a topic each");
+  add_file("--glb", options->glb, "Write a scene: parts in grey, overlaps in red");
+  CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");
+  command->add_flag("--csv", options->csv, "Print CSV")->excludes(json);
+  command->footer(
+      "Exit codes: 0 no clash, 3 clashes, 1 where there is none but a part could not be answered.\n"
+      "Touching pairs and those within the clearance are no clashes.\n"
+      "Example: ist clash gearbox.toml\n"
+      "         ist clash gearbox.toml --json --baseline accepted.json\n"
+      "         ist clash arm.urdf --pose elbow=0:1.5:16");
+  command->callback([options] {
+    complete_settings(options->closing);
+    options->assembly.closing = options->closing.settings.mesh;
+    options->assembly.threads = options->settings.threads;
+    clash(*options);
+  });
+}
+
+}  // namespace ist::app

@@ -1,0 +1,313 @@
+#include "clash/clash.h"
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+#include <ist/asset_layout.h>
+#include <ist/error.h>
+#include <ist/mass_properties.h>
+#include <ist/pose_eigen.h>
+#include <ist/surface.h>
+
+#include "mesh/import/source_file.h"
+#include "stage/thread_arena.h"
+
+namespace ist {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::size_t kPatches = 512;
+
+struct Scratch {
+  Workspace workspace;
+  std::vector<ContactPatch> patches = std::vector<ContactPatch>(kPatches);
+};
+
+/// A part as pairs see it.
+struct Placed {
+  const ClashPart* part = nullptr;
+  Eigen::AlignedBox3d box;
+  double touch = 0;  ///< [u] its share of what counts as touching
+  double volume = 0, diameter = 0;
+};
+
+Placed placed(const ClashPart& part, const ClashSettings& settings) {
+  const PlacedTree& solid = part.solid;
+  if (!solid.tree.has_mesh()) throw Error(part.name + ": its asset keeps no mesh");
+  const Bounds world = bounds(solid), own = bounds(solid.tree);
+  if (!world.lower.allFinite() || !world.upper.allFinite())
+    throw Error(part.name +
+                ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, the "
+                "scale above 0");
+  const auto reach = [](const Bounds& b) {
+    return std::max(b.lower.cwiseAbs().maxCoeff(), b.upper.cwiseAbs().maxCoeff());
+  };
+  const double largest = std::max(reach(world), solid.scale * reach(own));
+  Placed out{&part, {world.lower, world.upper}, settings.touch_within / 2};
+  // Coordinates, and poses of as many digits, are each off by up to this.
+  if (settings.touch_within < 0)
+    out.touch = 4 * part.rounding * largest + part.slack + solid.scale * solid.tree.mesh_error();
+  const double margin = out.touch + settings.clearance / 2 + 4 * kFloat64 * largest;
+  out.box.min().array() -= margin;
+  out.box.max().array() += margin;
+  out.volume = solid.tree.volume() * solid.scale * solid.scale * solid.scale;
+  out.diameter = 2 * world.radius;
+  return out;
+}
+
+/// Pairs whose boxes meet, sorted.
+std::vector<std::pair<std::size_t, std::size_t>> candidates(const std::vector<Placed>& parts,
+                                                            const PairFilter& ignored) {
+  std::vector<std::size_t> order(parts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
+    return parts[i].box.min().x() < parts[j].box.min().x();
+  });
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < order.size(); ++i)
+    for (std::size_t j = i + 1; j < order.size(); ++j) {
+      const auto [a, b] = std::minmax(order[i], order[j]);
+      if (parts[order[j]].box.min().x() > parts[order[i]].box.max().x()) break;
+      if (parts[a].box.intersects(parts[b].box) && !(ignored && ignored(a, b)))
+        pairs.emplace_back(a, b);
+    }
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+Vector3d unit(const Vector3d& v) {
+  const double length = v.norm();
+  return length > 0 ? Vector3d(v / length) : Vector3d::Zero();
+}
+
+/// What patches add up to.
+struct Sums {
+  double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
+  Vector3d force = Vector3d::Zero();
+
+  /// Faces that look one way have more than a quarter of their area along it; a pin's in its hole
+  /// cancel.
+  bool has_way_out() const { return force.norm() > area / 4; }
+  double depth() const { return volume / (has_way_out() ? force.norm() : area); }
+};
+
+class PairQuery {
+ public:
+  PairQuery(const Placed& a, const Placed& b, const ClashSettings& settings, Scratch& scratch)
+      : a_(a),
+        b_(b),
+        touch_(settings.touch_within < 0 ? a.touch + b.touch : settings.touch_within),
+        clearance_(settings.clearance),
+        scratch_(scratch) {}
+
+  /// False: there is nothing to list.
+  bool ask(Clash& out) {
+    Penetration found;
+    const Sums whole = patches(b_.part->solid, found, &out.depth);
+    out.status = found.status;
+    out.volume = found.volume;
+    out.volume_min = found.volume_min;
+    out.volume_max = found.volume_max;
+    out.centroid = found.centroid;
+    if (found.status != QueryStatus::ok) {
+      out.kind = ClashKind::overlapping;
+      return true;
+    }
+    if (!(found.volume > 0)) {
+      out.depth = 0;  // patches may hold rounding
+      return found.touching ? touches(found, out) : is_near(out);
+    }
+    if (whole.has_way_out()) out.direction = unit(whole.force);
+    if (out.depth <= touch_ && deepest_vertex() <= touch_) {
+      measure_contact(out, touch_);
+      return true;
+    }
+    out.kind = ClashKind::overlapping;
+    if (whole.has_way_out()) way_out(out, whole);
+    const double most = std::max(a_.volume, b_.volume);
+    out.duplicate = most - out.volume <= (1e-9 + 20 * touch_ / std::cbrt(most)) * most;
+    return true;
+  }
+
+ private:
+  static PenetrationSettings exactly() {
+    PenetrationSettings exact;
+    exact.measure = Measure::exact;
+    return exact;
+  }
+
+  /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
+  Sums patches(const PlacedTree& solid_b, Penetration& found, double* depth = nullptr) {
+    const ContactPatches all =
+        contact_patches(a_.part->solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
+    found = all.penetration;
+    std::map<std::uint64_t, Sums> parts;
+    Sums whole;
+    for (std::size_t i = 0; i < all.count; ++i) {
+      const ContactPatch& patch = scratch_.patches[i];
+      for (Sums* const sums : {&whole, &parts[patch.id / 8]}) {  // the octant is in the last digits
+        sums->volume += patch.volume;
+        sums->area += patch.area;
+        sums->force += patch.force;
+      }
+    }
+    parts_ = parts.size();
+    const double most = std::min(a_.diameter, b_.diameter);
+    for (const auto& [id, sums] : parts)
+      if (depth != nullptr && sums.volume > 0)
+        *depth = std::max(*depth, sums.area > 0 ? std::min(sums.depth(), most) : most);
+    return whole;
+  }
+
+  /// The overlap once B has moved.
+  Penetration aside(const Vector3d& by) {
+    return penetration(a_.part->solid, moved(by), exactly(), scratch_.workspace);
+  }
+
+  /// Where sides are flush the volume falls whichever way B goes across them: the mean of two
+  /// places a little aside leaves that out.
+  void way_out(Clash& out, const Sums& whole) {
+    const Vector3d by =
+        std::min(1e-7 * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
+    Vector3d force = -aside(-by).translation_gradient;
+    if ((force - whole.force).norm() > 1e-4 * whole.force.norm())
+      force = (force - aside(by).translation_gradient) / 2;
+    if (!(force.norm() > whole.area / 4)) return;
+    out.direction = unit(force);
+    if (parts_ == 1) out.depth = whole.volume / force.norm();
+  }
+
+  PlacedTree moved(const Vector3d& by) const {
+    PlacedTree solid = b_.part->solid;
+    for (int k = 0; k < 3; ++k) solid.pose.t[k] += by[k];
+    return solid;
+  }
+
+  /// [u] How far a vertex of either solid lies inside the other, as far as it matters.
+  double deepest_vertex() const {
+    const Eigen::AlignedBox3d both = a_.box.intersection(b_.box);
+    double deepest = 0;
+    for (const auto& [of, in] : {std::pair(&a_, &b_), std::pair(&b_, &a_)}) {
+      const PlacedTree& solid = of->part->solid;
+      const AssetHeader& asset = solid.tree.header();
+      const char* const bytes = reinterpret_cast<const char*>(&asset);
+      const auto& mesh = *reinterpret_cast<const MeshHeader*>(bytes + asset.mesh);
+      const auto* const vertices = reinterpret_cast<const double*>(bytes + mesh.vertices);
+      const Eigen::Isometry3d place = to_isometry(solid.pose);
+      const double size = std::ldexp(1.0, asset.exponent);
+      for (std::uint32_t v = 0; v < mesh.vertex_count && deepest <= touch_; ++v) {
+        const Vector3d own = size * Vector3d(vertices + 3 * v) + Vector3d(asset.centre);
+        const Vector3d world = place * Vector3d(solid.scale * own);
+        if (both.contains(world))
+          deepest = std::max(deepest, -closest_point(in->part->solid, world).distance);
+      }
+    }
+    return deepest;
+  }
+
+  Separation distance(double limit) {
+    SeparationSettings settings;
+    settings.max_distance = limit;
+    return separation(a_.part->solid, b_.part->solid, settings, scratch_.workspace);
+  }
+
+  /// The solids touch exactly.
+  bool touches(const Penetration& found, Clash& out) {
+    out.direction = found.contact_normal;
+    if (out.direction.isZero(0)) {
+      const Separation nearest = distance(0);
+      out.centroid = (nearest.point_a + nearest.point_b) / 2;
+    }
+    measure_contact(out, std::max(touch_, 1e-7 * std::min(a_.diameter, b_.diameter)));
+    out.contact_area = found.contact_area;
+    return true;
+  }
+
+  bool is_near(Clash& out) {
+    const double limit = std::max(touch_, clearance_);
+    if (!(limit > 0)) return false;
+    const Separation found = distance(limit);
+    out.status = found.status;
+    out.distance_min = found.distance_min;
+    out.distance_max = found.distance_max;
+    out.direction = found.normal;
+    out.centroid = (found.point_a + found.point_b) / 2;
+    if (found.status == QueryStatus::ok && !(found.distance < limit)) return false;
+    if (found.distance > touch_) return true;
+    measure_contact(out, touch_ + found.distance);
+    return true;
+  }
+
+  /// Area and centroid of a contact once B has moved towards A, if there is one way to do so.
+  void measure_contact(Clash& out, double by) {
+    out.kind = ClashKind::touching;
+    Penetration found;
+    if (!out.direction.isZero(0)) {
+      found = aside(-by * out.direction);
+      out.contact_area = std::max(0.0, -found.translation_gradient.dot(out.direction));
+    } else if (out.volume > 0) {
+      out.contact_area = patches(b_.part->solid, found).area;
+    }
+    if (found.volume > 0) out.centroid = found.centroid;
+  }
+
+  const Placed &a_, &b_;
+  const double touch_, clearance_;
+  Scratch& scratch_;
+  std::size_t parts_ = 0;  ///< connected ones that patches() found
+};
+
+}  // namespace
+
+double rounding_of_file(const std::string& path) {
+  const std::string ending = ending_of(path);
+  if (ending == ".obj" || ending == ".off" || ending == ".dae") return kFloat64;
+  if (ending != ".ply") return kFloat32;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line) && !line.starts_with("end_header");)
+    if (line.starts_with("property double x") || line.starts_with("property float64 x"))
+      return kFloat64;
+  return kFloat32;
+}
+
+std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,
+                                const PairFilter& ignored) {
+  std::vector<Placed> all;
+  for (const ClashPart& part : parts) all.push_back(placed(part, settings));
+  const auto pairs = candidates(all, ignored);
+  std::vector<Clash> answers(pairs.size());
+  std::vector<char> listed(pairs.size());
+  tbb::enumerable_thread_specific<Scratch> scratch;
+  thread_arena(settings.threads).execute([&] {
+    for_each_index(0, pairs.size(), 1, [&](std::size_t i) {
+      std::tie(answers[i].a, answers[i].b) = pairs[i];
+      listed[i] = PairQuery(all[answers[i].a], all[answers[i].b], settings, scratch.local())
+                      .ask(answers[i]);
+    });
+  });
+  std::vector<Clash> out;
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (listed[i] != 0) out.push_back(std::move(answers[i]));
+  return out;
+}
+
+bool is_worse(const Clash& x, const Clash& y) {
+  const auto rank = [](const Clash& c) {
+    // What could not be answered first, of its volume nothing is known.
+    return std::tuple(c.status != QueryStatus::ok ? 0 : 1, static_cast<int>(c.kind),
+                      c.kind == ClashKind::overlapping ? -c.volume : 0.0, c.distance_min,
+                      -c.contact_area);
+  };
+  return rank(x) < rank(y);
+}
+
+}  // namespace ist

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <ist/query.h>
+
+namespace ist {
+
+/// A part of an assembly. Its asset keeps a mesh.
+struct ClashPart {
+  std::string name;
+  PlacedTree solid;
+  /// What its coordinates are rounded by, as a share of them: that of float32 or of float64.
+  double rounding = 0;
+  double slack = 0;  ///< [u] how far its mesh may lie from the shape that is meant
+};
+
+inline constexpr double kFloat32 = 0x1p-23, kFloat64 = 0x1p-52;
+
+/// How coordinates of a mesh's file are rounded: as its format stores them.
+double rounding_of_file(const std::string& path);
+
+struct ClashSettings {
+  double clearance = 0;  ///< [u] ≥ 0: pairs that are nearer are listed too
+  /// [u] Parts that reach no further into each other than this touch, and so do parts that are no
+  /// further apart. Below 0: what rounding and slack of both parts come to.
+  double touch_within = -1;
+  unsigned threads = 0;  ///< 0: all cores
+};
+
+enum class ClashKind { overlapping, touching, apart };
+
+/// Two parts that overlap, touch, or are nearer than the clearance: a before b. Lengths are [u], in
+/// the world's frame.
+struct Clash {
+  std::size_t a = 0, b = 0;
+  ClashKind kind = ClashKind::apart;
+  double volume = 0, volume_min = 0, volume_max = 0;  ///< [u³] of the overlap, and bounds of it
+  /// [u²] Touching: of the faces that lie on each other; where they do so within the tolerance
+  /// alone, of the overlap once B has moved by this towards A.
+  double contact_area = 0;
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the overlap or the contact
+  Eigen::Vector3d direction =
+      Eigen::Vector3d::Zero();  ///< unit: B's way out of A; zero: no one way
+  /// Mean depth of the overlap's deepest connected part, its volume over its area seen along the
+  /// way out; of one wholly inside the other solid, the diameter of the smaller one's bounds.
+  double depth = 0;
+  double distance_min = 0, distance_max = 0;
+  QueryStatus status = QueryStatus::ok;  ///< not ok: told as overlapping, since it may be
+  bool duplicate = false;                ///< both are one shape in one place
+  std::string pose;                      ///< of a sweep: where it was found
+};
+
+/// Pairs that nobody asks for, by indices of parts.
+using PairFilter = std::function<bool(std::size_t a, std::size_t b)>;
+
+/// All pairs that overlap, touch or are nearer than the clearance, by the exact measure; in the
+/// order of a, then b. The same bits for any number of threads. Throws Error, naming the part, for
+/// a pose or a scale that is invalid, or an asset without a mesh.
+std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,
+                                const PairFilter& ignored = {});
+
+/// Whether x is the worse clash of two between the same parts: by kind, then volume, area,
+/// nearness.
+bool is_worse(const Clash& x, const Clash& y);
+
+}  // namespace ist
