@@ -271,7 +271,7 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
 }
 
 std::optional<Partner> Partner::of(const btCollisionShape& shape) {
-  Partner partner;
+  Partner partner(shape);
   switch (shape.getShapeType()) {
     case STATIC_PLANE_PROXYTYPE: {
       const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
