@@ -245,23 +245,26 @@ Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
   const Body one = body_of(first), other = body_of(second);
   const Body& lighter = one.mass < other.mass ? one : other;
   const double size = std::cbrt(meeting.volume()), face = size * size;
+  const double sag = settings.depth * size;  // [u] by default
+  const double pull = lighter.gravity > 0 ? lighter.gravity : sag / (step * step);
   Spring spring;
   spring.stiffness = settings.law.stiffness > 0 ? settings.law.stiffness : meeting.stiffness();
   spring.linear = std::numeric_limits<double>::infinity();
-  if (!std::isfinite(lighter.mass)) return spring;  // nothing moves
-  if (!(spring.stiffness > 0)) {
-    const double rest = settings.depth * size;
-    spring.linear = rest;
-    const double pull = lighter.gravity > 0 ? lighter.gravity : rest / (step * step);
-    spring.stiffness = stiffness_for_depth(lighter.mass * pull, face, rest);
-  }
-  const double held = spring.stiffness * face / lighter.mass;  // [1/s²]
-  spring.rest = (lighter.gravity > 0 ? lighter.gravity / held : settings.depth * size);
-  spring.slow = std::sqrt(2 * held) * spring.rest;
-  spring.relaxation = 2 * settings.damping / std::sqrt(held);
-  spring.push_out = settings.push_out > 0 ? settings.push_out : 3 * spring.slow;
   spring.rebound = std::exp(-2 * settings.damping);
   spring.step = step;
+  if (!std::isfinite(lighter.mass)) return spring;  // nothing moves
+  if (!(spring.stiffness > 0)) {
+    spring.linear = sag;
+    spring.stiffness = stiffness_for_depth(lighter.mass * pull, face, sag);
+  }
+  const double held = spring.stiffness * face / lighter.mass;  // [1/s²]
+  spring.rest = lighter.gravity > 0 ? lighter.gravity / held : sag;
+  spring.slow = std::sqrt(2 * held) * spring.rest;
+  spring.relaxation = 2 * settings.damping / std::sqrt(held);
+  // A stiff spring parts bodies no more slowly.
+  const double fall = std::sqrt(2 * pull * std::max(spring.rest, sag));
+  spring.push_out = settings.push_out > 0 ? settings.push_out : 3 * fall;
+  spring.least = std::min(fall, spring.push_out);
   return spring;
 }
 

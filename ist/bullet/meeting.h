@@ -73,7 +73,8 @@ struct Spring {
   double rest = 0;        ///< [u] depth at which the lighter body rests
   double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
   double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
-  double push_out = 0;    ///< [u/s] it drives bodies apart no faster
+  double push_out = 1;    ///< [u/s] it drives bodies apart no faster
+  double least = 1;       ///< [u/s] at least, where other points push against it
   double rebound = 0;     ///< of a closing speed that it may give back
   double step = 0;        ///< [s] the world's
 
@@ -82,7 +83,7 @@ struct Spring {
   /// [u/s] At which an implicit step parts bodies at rest that are so deep: the spring's speed, but
   /// no more than `most`.
   double parting(double depth, double most) const {
-    return std::min(depth / (step + relaxation), std::max(most, std::min(slow, push_out)));
+    return std::min(depth / (step + relaxation), std::max(most, least));
   }
 };
 

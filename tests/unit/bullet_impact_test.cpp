@@ -31,7 +31,8 @@ double kinetic(const btRigidBody& body) {
   const btVector3 turning =
       body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
   double sum = 0.5 * body.getLinearVelocity().length2() / body.getInvMass();
-  for (int k = 0; k < 3; ++k) sum += 0.5 * turning[k] * turning[k] / body.getInvInertiaDiagLocal()[k];
+  for (int k = 0; k < 3; ++k)
+    sum += 0.5 * turning[k] * turning[k] / body.getInvInertiaDiagLocal()[k];
   return sum;
 }
 
@@ -80,8 +81,8 @@ TEST(BulletImpact, ABodyThatFallsGainsNoEnergy) {
               },
               hz);
           ASSERT_GT(before, 0);
-          ASSERT_LE(after, 0.3 * before) << solid.name << " turned " << turn << " falls " << height
-                                         << " m at " << hz << " Hz";
+          ASSERT_LE(after, 0.3 * before)
+              << solid.name << " turned " << turn << " falls " << height << " m at " << hz << " Hz";
           ASSERT_GT(body.getWorldTransform().getOrigin().z(), 0);
         }
       }
@@ -203,8 +204,8 @@ TEST(BulletInside, AHalfSpaceLetsNothingThrough) {
       body.setLinearVelocity({0, 0, -speed});
       double lowest = 0;
       world.step(
-          600,
-          [&] { lowest = std::min<double>(lowest, body.getWorldTransform().getOrigin().z()); }, 60);
+          600, [&] { lowest = std::min<double>(lowest, body.getWorldTransform().getOrigin().z()); },
+          60);
       EXPECT_GT(lowest, -speed / 60);
       EXPECT_LT(body.getLinearVelocity().length(), speed / 100) << solid.name;
     }

@@ -56,10 +56,11 @@ struct Settings {
   /// Damping of a contact over critical damping; solver only. At 1 a body without restitution
   /// rebounds with less than a seventh of its speed, e⁻².
   double damping = 1;
-  /// [u/s] Solver only: the spring of a patch never drives two bodies apart faster than this,
-  /// however deep they are when they are first seen in each other; its damper grows instead. Bodies
-  /// that part faster by themselves, as with restitution, are not held back. 0: twice the speed of
-  /// a fall by the depth at which the lighter body rests.
+  /// [u/s] Solver only: springs part two bodies no faster than this, or than e^(−2 damping) of the
+  /// speed at which they closed, however deep they are when they are first seen in each other.
+  /// Their dampers grow instead. Bodies that part faster by themselves, as with restitution, are
+  /// not held back. 0: three times the speed of a fall by the resting depth (`depth`, or that of a
+  /// softer spring).
   double push_out = 0;
   /// Solver only: two objects are queried again once a point of one has moved relative to the other
   /// by more than this share of the depth at which the lighter body rests. Until then their patches
