@@ -84,15 +84,13 @@ SceneResult run_impacts(const SceneOptions& options) {
   Run run(world, options);
   run.go(options.seconds > 0 ? options.seconds : 0.6, [&] {
     for (Fall& fall : falls) {
-      const double z = fall.body->getCenterOfMassPosition().z(),
-                   mass = 1 / fall.body->getInvMass();
+      const double z = fall.body->getCenterOfMassPosition().z(), mass = 1 / fall.body->getInvMass();
       const bool touches = world.contact_force(*fall.body).norm() > 0;
       if (touches && fall.before == 0) fall.before = fall.energy, fall.height = fall.was;
       fall.energy = kinetic_energy(*fall.body);
       fall.was = z;
       if (world.time() > 0.1 && fall.before > 0 && !touches)
-        fall.after =
-            std::max(fall.after, fall.energy + mass * kGravity * (z - fall.height));
+        fall.after = std::max(fall.after, fall.energy + mass * kGravity * (z - fall.height));
     }
   });
   double worst = 0, gains = 0, lost = 0, sum = 0;
@@ -127,8 +125,7 @@ SceneResult run_overlap(const SceneOptions& options) {
       fastest = std::max<double>(fastest, body->getLinearVelocity().length());
   });
   SceneResult result = run.finish(0.2, {{"fastest [m/s]", fastest, 0, 4}});
-  result.truths.push_back(
-      {"kinetic energy, of weight times side", result.kinetic_energy / (5 * kGravity * 0.2), 0,
-       1e-3});
+  result.truths.push_back({"kinetic energy, of weight times side",
+                           result.kinetic_energy / (5 * kGravity * 0.2), 0, 1e-3});
   return result;
 }
