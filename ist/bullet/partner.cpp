@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
+#include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
@@ -71,6 +72,26 @@ FieldSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept 
 
 FieldSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const HullDistance*>(context)->at(x);
+}
+
+std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
+  if (shape.getShapeType() == CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE) {
+    // It counts no corners. Triangles come scaled by the mesh, as its support does.
+    struct Corners : btInternalTriangleIndexCallback {
+      std::vector<btVector3> all;
+      void internalProcessTriangleIndex(btVector3* corners, int, int) override {
+        all.insert(all.end(), corners, corners + 3);
+      }
+    } corners;
+    const btVector3 none(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
+    static_cast<const btConvexTriangleMeshShape&>(shape)
+        .getMeshInterface()
+        ->InternalProcessAllTriangles(&corners, -none, none);
+    return corners.all;
+  }
+  std::vector<btVector3> corners(static_cast<std::size_t>(shape.getNumVertices()));
+  for (std::size_t i = 0; i < corners.size(); ++i) shape.getVertex(static_cast<int>(i), corners[i]);
+  return corners;
 }
 
 /// Bullet tells nobody what its terrain is made of: an heir may look.
@@ -308,11 +329,8 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
     case TETRAHEDRAL_SHAPE_PROXYTYPE:
     case CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE:
     case CONVEX_POINT_CLOUD_SHAPE_PROXYTYPE: {
-      const auto& polyhedron = static_cast<const btPolyhedralConvexShape&>(shape);
-      std::vector<btVector3> points(static_cast<std::size_t>(polyhedron.getNumVertices()));
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        polyhedron.getVertex(static_cast<int>(i), points[i]);
-      }
+      std::vector<btVector3> points =
+          corners_of(static_cast<const btPolyhedralConvexShape&>(shape));
       partner.hull_ = std::make_shared<const HullDistance>(points);
       if (partner.hull_->faces() < 4) return std::nullopt;
       partner.field_.field = FunctionField{hull_sample, partner.hull_.get(), 0};

@@ -45,9 +45,9 @@ class Shape : public btConcaveShape {
   void setLocalScaling(const btVector3& scaling) override;
   const btVector3& getLocalScaling() const override { return scaling_; }
 
-  /// Gives Bullet's rays, sweeps and debug drawing the triangles of the kept mesh
-  /// (TreeView::has_mesh), all of them in turn: raycast() of <ist/surface.h> is faster. Without a
-  /// mesh there are none, and warn() says so.
+  /// Gives Bullet's sweeps and debug drawing the triangles of the kept mesh (TreeView::has_mesh),
+  /// all of them in turn, and its rays those that they hit, by raycast() of <ist/surface.h>.
+  /// Without a mesh there are none, and warn() says so.
   void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                            const btVector3& upper) const override;
 
