@@ -235,21 +235,38 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // Where several triangles are as near, as at a common side, all of them tell front from back: by
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
-  double nearest = std::numeric_limits<double>::max(), reach = 1e150, size = 0;
+  if (boxes_.empty()) return {-1e100, Eigen::Vector3d::Zero()};
+  // The triangles of the nearest box say first how near is near.
+  const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
+    const auto& corner = triangle.corner;
+    return Eigen::Vector3d(share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2]);
+  };
+  const auto first =
+      std::min_element(boxes_.begin(), boxes_.end(),
+                       [&](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
+                         return a.squaredExteriorDistance(x) < b.squaredExteriorDistance(x);
+                       });
+  const std::size_t near_block = static_cast<std::size_t>(first - boxes_.begin());
+  double most = std::numeric_limits<double>::max();
+  for (std::size_t i = kBlock * near_block;
+       i < std::min(triangles_.size(), kBlock * (near_block + 1)); ++i) {
+    const Triangle& triangle = triangles_[i];
+    most = std::min(most, (x - foot_on(triangle, triangle.nearest(x))).squaredNorm());
+  }
+  double nearest = kAsNear * most, reach = kAsNear * std::sqrt(nearest), size = 0;
   Eigen::Vector3d foot = x, front = x, border = x;
   for (std::size_t block = 0; block < boxes_.size(); ++block) {
     if (boxes_[block].squaredExteriorDistance(x) > kAsNear * nearest) continue;
     const std::size_t end = std::min(triangles_.size(), kBlock * (block + 1));
     for (std::size_t i = kBlock * block; i < end; ++i) {
       const Triangle& triangle = triangles_[i];
-      const double far = reach + triangle.reach;
+      const double far = kAsNear * (reach + triangle.reach);
       if ((x - triangle.centre).squaredNorm() > far * far) continue;
       const auto& corner = triangle.corner;
       const Eigen::Vector3d share = triangle.nearest(x);
-      const Eigen::Vector3d point =
-          share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2];
+      const Eigen::Vector3d point = foot_on(triangle, share);
       const double distance = (x - point).squaredNorm();
-      const bool nearer = kAsNear * distance < nearest;
+      const bool nearer = size == 0 ? distance <= nearest : kAsNear * distance < nearest;
       if (!nearer && (distance > kAsNear * nearest ||
                       (point - foot).squaredNorm() > 1e-8 * nearest + 1e-28 * foot.squaredNorm()))
         continue;
