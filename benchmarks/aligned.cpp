@@ -107,7 +107,10 @@ void ask_copies(Report& report, const std::string& name, std::size_t spheres) {
     const ist::PlacedTree a{baked.asset->view(), {}, 1};
     const ist::PlacedTree b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
     // What penetration() would say without minding copies.
-    const auto alike = [&] { return ist::contact_patches(a, b, {}, workspace, {}).penetration; };
+    ist::ContactPatch patch;
+    const auto alike = [&] {
+      return ist::contact_patches(a, b, {}, workspace, {&patch, 1}).penetration;
+    };
     const auto answer = [&] { return ist::penetration(a, b, {}, workspace); };
     const double error_alike = 100 * (alike().volume / exact[k] - 1);
     const double error = 100 * (answer().volume / exact[k] - 1);

@@ -5,10 +5,27 @@ include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/ist)
 
+# What a build of some targets leaves out is said before anything is installed.
+set(installed ${ist_query_LIBRARIES} ${ist_LIBRARIES} ${ist_bullet_LIBRARIES})
+foreach(program ist_app ist_reference)
+  if(TARGET ${program})
+    list(APPEND installed ${program})
+  endif()
+endforeach()
+add_custom_target(ist_installed DEPENDS ${installed})
+list(REMOVE_ITEM installed ist_reference)
+list(TRANSFORM installed REPLACE "(.+)" "$<TARGET_FILE:\\1>")
+install(CODE "foreach(file IN ITEMS ${installed})
+  if(NOT EXISTS \"\${file}\")
+    message(FATAL_ERROR \"\${file} is not built, and nothing was installed. First: \"
+      \"cmake --build '${PROJECT_BINARY_DIR}' --target ist_installed\")
+  endif()
+endforeach()")
+
 set(others PATTERN bullet EXCLUDE)
 if(IST_QUERY_ONLY)  # headers of functions that ist::query lacks
   foreach(header IN ITEMS bake cover_spheres gpu gpu_query grid_settings ist_bake level_set medial
-      mesh packing progress solid stop_reason)
+      mesh packing progress query_tbb solid stop_reason)
     list(APPEND others PATTERN ist/${header}.h EXCLUDE)
   endforeach()
 endif()
@@ -87,8 +104,8 @@ install(FILES ${PROJECT_BINARY_DIR}/ist-config.cmake ${PROJECT_BINARY_DIR}/ist-c
   DESTINATION ${package_dir} COMPONENT libist-dev)
 
 # pkg-config. What only a static library needs is private where there is a shared one.
-# ist_install_pc(name description requires library private…)
-function(ist_install_pc pc description requires library)
+# ist_install_pc(name component description requires library private…)
+function(ist_install_pc pc component description requires library)
   cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_LIBDIR BASE_DIRECTORY ${CMAKE_INSTALL_PREFIX}
     OUTPUT_VARIABLE libdir)
   cmake_path(RELATIVE_PATH CMAKE_INSTALL_FULL_INCLUDEDIR BASE_DIRECTORY ${CMAKE_INSTALL_PREFIX}
@@ -104,9 +121,9 @@ function(ist_install_pc pc description requires library)
   endif()
   configure_file(cmake/ist.pc.in ${PROJECT_BINARY_DIR}/${pc}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/${pc}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
-    COMPONENT libist-dev)
+    COMPONENT ${component})
 endfunction()
-ist_install_pc(ist-query "Queries of inner sphere trees: overlap volume, force, distance" eigen3
+ist_install_pc(ist-query libist-dev "Queries of inner sphere trees: overlap volume, force, distance" eigen3
   ist_query -lhwy -lstdc++ -lm)
 if(NOT IST_QUERY_ONLY)
   set(private -lassimp -ltbb)
@@ -116,6 +133,11 @@ if(NOT IST_QUERY_ONLY)
   if(IST_HAVE_OPENVDB)
     list(APPEND private ${IST_OPENVDB_LINK})
   endif()
-  ist_install_pc(ist "Sphere packings and inner sphere trees: bakes and queries" ist-query ist
+  ist_install_pc(ist libist-dev "Sphere packings and inner sphere trees: bakes and queries" ist-query ist
     ${private} -lstdc++ -lm)
 endif()
+foreach(library IN LISTS ist_bullet_LIBRARIES)
+  string(REPLACE ist_ "" bullet ${library})
+  ist_install_pc(ist-${bullet} libist-bullet-dev "Assets of ist as shapes of Bullet"
+    "ist-query ${bullet}" ${library})
+endforeach()

@@ -449,8 +449,8 @@ typedef struct ist_contact_patches_t {
   uint32_t size;
   uint32_t patch_size;          /* sizeof(ist_contact_patch_t) */
   ist_contact_patch_t* patches; /* [capacity] */
-  size_t capacity;
-  size_t count; /* answer: patches written */
+  size_t capacity;              /* 0: IST_INVALID_INPUT of ist_contact_patches() */
+  size_t count;                 /* answer: patches written */
 } ist_contact_patches_t;
 
 /* OutlineSegment: a piece of the curve on which two surfaces cross. */

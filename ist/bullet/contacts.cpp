@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <typeinfo>
 #include <vector>
@@ -32,6 +33,14 @@ void set_name(btManifoldPoint& point, std::uint64_t id) {
 }
 bool same_name(const btManifoldPoint& a, const btManifoldPoint& b) {
   return a.m_partId0 == b.m_partId0 && a.m_index0 == b.m_index0;
+}
+
+/// The solver begins with the last step's impulses. What stopped an impact is not needed again: no
+/// more than twice what the point's spring gives in a step to bodies at rest.
+void forget_impact(btManifoldPoint& point, double step) {
+  const btScalar most = static_cast<btScalar>(2 * step) * point.m_combinedContactStiffness1 *
+                        std::max(-point.m_distance1, btScalar(0));
+  point.m_appliedImpulse = std::min(point.m_appliedImpulse, most);
 }
 
 btRigidBody* movable(const btCollisionObject& object) {
@@ -75,21 +84,39 @@ btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
   return body->getVelocityInLocalPoint(point - body->getCenterOfMassPosition());
 }
 
+Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
+                     const btTransform& now, btScalar step) {
+  Unsaid motion;
+  if (!object.isKinematicObject()) return motion;
+  btTransformUtil::calculateVelocity(before, now, step, motion.velocity, motion.turning);
+  motion.origin = now.getOrigin();
+  if (const btRigidBody* const body = btRigidBody::upcast(&object)) {
+    motion.velocity -=
+        body->getVelocityInLocalPoint(motion.origin - body->getCenterOfMassPosition());
+    motion.turning -= body->getAngularVelocity();
+  }
+  return motion;
+}
+
 }  // namespace
 
 struct PairAlgorithm::State {
-  State(const btCollisionShape& first, const btCollisionShape& second) : meeting(first, second) {}
+  State(const btCollisionShape& first, const btCollisionShape& second, const Contacts& world)
+      : meeting(first, second, &world) {}
 
-  void move_points(const btCollisionObject& first, const btCollisionObject& second);
+  void move_points(const btCollisionObject& first, const btCollisionObject& second, double step);
   void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
             const Contact& contact, const Spring& spring, btDispatcher& dispatcher);
   std::size_t points() const;
 
   Meeting meeting;
+  std::optional<Places> before;  // where the shapes were in the last step
+  std::array<Unsaid, 2> unsaid;
   std::vector<btPersistentManifold*> manifolds;       // the first ones are full
   std::array<btVector3, Settings::kPatches> normals;  // of all points, in the first's frame
   btTransform second_in_first;                        // when last asked
-  double still = -1;  // [u] until a point has moved by more than this that answer holds
+  double closing = 0;  // [u/s] of an impact, forgotten as the bodies part
+  double still = -1;   // [u] until a point has moved by more than this that answer holds
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -115,6 +142,15 @@ void Contacts::register_with(btCollisionDispatcher& dispatcher) {
   }
 }
 
+void Contacts::configure(btDynamicsWorld& world) {
+  register_with(dynamic_cast<btCollisionDispatcher&>(*world.getDispatcher()));
+  btContactSolverInfo& solver = world.getSolverInfo();
+  solver.m_splitImpulse = false;    // the patches' springs push by speed
+  solver.m_numIterations = 50;      // a stack is a chain of contacts
+  solver.m_warmstartingFactor = 1;  // else friction begins too weak in every step
+  solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+}
+
 void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
   btBroadphasePairArray& pairs = world->getPairCache()->getOverlappingPairArray();
   const auto objects_of = [](const btBroadphasePair& pair) {
@@ -130,8 +166,8 @@ void Contacts::updateAction(btCollisionWorld* world, btScalar step) {
           object->getCcdSquareMotionThreshold() > 0) {
         warn(
             "A link of a multibody has a CCD threshold, but Contacts stops rigid bodies alone: "
-            "take "
-            "smaller steps.");
+            "take smaller steps.",
+            this);
       }
     }
     const auto share = static_cast<btScalar>(share_of(pairs[i].m_algorithm, *first, *second, step));
@@ -166,9 +202,10 @@ double Contacts::share_of(const btCollisionAlgorithm* algorithm, const btCollisi
                 [&](const btCollisionShape& part, const btTransform& in_body) {
                   for_each_part(other, btTransform::getIdentity(),
                                 [&](const btCollisionShape& met, const btTransform& in_other) {
-                                  share = std::min(share, Meeting(part, met).share_until_impact(
-                                                              from, to, {in_body, in_other},
-                                                              threshold, settings));
+                                  share = std::min(
+                                      share, Meeting(part, met, this)
+                                                 .share_until_impact(from, to, {in_body, in_other},
+                                                                     threshold, settings));
                                 });
                 });
   return share;
@@ -188,7 +225,8 @@ btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
     warn((std::string(first.getName()) + " and " + second.getName() +
           " do not meet: they pass through each other. docs/engines.md lists what an asset meets, "
           "and what to use in place of the rest.")
-             .c_str());
+             .c_str(),
+         contacts);
   }
   void* const place = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(PairAlgorithm));
   return new (place) PairAlgorithm(info, *contacts, first, second);
@@ -197,7 +235,9 @@ btCollisionAlgorithm* Contacts::CreateFunc::CreateCollisionAlgorithm(
 PairAlgorithm::PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
                              const Contacts& contacts, const btCollisionShape& first,
                              const btCollisionShape& second)
-    : btActivatingCollisionAlgorithm(info), contacts_(contacts), state_(new State(first, second)) {}
+    : btActivatingCollisionAlgorithm(info),
+      contacts_(contacts),
+      state_(new State(first, second, contacts)) {}
 
 PairAlgorithm::~PairAlgorithm() {
   for (btPersistentManifold* manifold : state_->manifolds) {
@@ -243,16 +283,23 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     if (a->m_parent != nullptr || b->m_parent != nullptr) {
       warn(
           "Settings::Response::wrench pushes no compounds: they pass through each other. Use "
-          "Response::solver for their pairs.");
+          "Response::solver for their pairs.",
+          &contacts_);
     }
     return;
   }
   const btTransform second_in_first = at_first.inverseTimes(at_second);
+  const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
+  if (state_->before) {
+    const auto time = static_cast<btScalar>(step);
+    state_->unsaid = {unsaid_motion(first, (*state_->before)[0], at_first, time),
+                      unsaid_motion(second, (*state_->before)[1], at_second, time)};
+  }
+  state_->before = Places{at_first, at_second};
   if (state_->still > 0 &&
       state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
-    state_->move_points(first, second);
+    state_->move_points(first, second, step);
   } else {
-    const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
     const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
@@ -278,7 +325,7 @@ std::size_t PairAlgorithm::State::points() const {
 }
 
 void PairAlgorithm::State::move_points(const btCollisionObject& first,
-                                       const btCollisionObject& second) {
+                                       const btCollisionObject& second, double step) {
   const btTransform& to_world_first = first.getWorldTransform();
   const btTransform& to_world_second = second.getWorldTransform();
   std::size_t at = 0;
@@ -290,6 +337,7 @@ void PairAlgorithm::State::move_points(const btCollisionObject& first,
       point.m_normalWorldOnB = to_world_first.getBasis() * normals[at++];
       point.m_distance1 =
           (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
+      forget_impact(point, step);
       ++point.m_lifeTime;
     }
   }
@@ -309,6 +357,24 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     manifold->setNumContacts(0);
   }
   const bool touched = old_count > 0;
+
+  // Points that push against each other, as of wedged bodies, part none.
+  Eigen::Vector3d together = Eigen::Vector3d::Zero();
+  double apart = 0;
+  closing *= 1 - spring.step / (8 * (spring.step + spring.relaxation));
+  for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
+    const double force = spring.at(patch.depth) * patch.area * patch.depth;
+    if (!(force > 0)) continue;
+    together += force * patch.normal;
+    apart += force;
+    const btVector3 middle = to_bullet(patch.centroid);
+    const btVector3 motion = velocity_of(first, middle) + unsaid[0].at(middle) -
+                             velocity_of(second, middle) - unsaid[1].at(middle);
+    closing = std::max(closing, to_eigen(motion).dot(patch.normal));
+  }
+  if (contact.count == 0) closing = 0;
+  const double most = std::max(spring.push_out, spring.rebound * closing);
+  if (apart > 0) together *= most / apart;
 
   // Bullet's normal pushes the manifold's first body.
   const btTransform to_first = first.getWorldTransform().inverse();
@@ -337,16 +403,25 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
     } else {
-      const double stiffness = spring.at(patch.depth) * patch.area;
+      // Bullet takes spring and damper, and makes of them the speed at which they part bodies,
+      // depth · spring / (step · spring + damper), and the impulse of a unit of speed that is
+      // missing. At rest, against what is placed, the force is the spring's.
+      const double parting = spring.parting(patch.depth, together.dot(patch.normal));
+      const double speed =
+          parting +
+          std::max(0.0, to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal));
+      const double stiffness = spring.at(patch.depth) * patch.area * speed / parting;
       point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
       point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
-      point.m_combinedContactDamping1 = static_cast<btScalar>(spring.relaxation * stiffness);
+      point.m_combinedContactDamping1 =
+          static_cast<btScalar>(stiffness * (patch.depth / speed - spring.step));
     }
     set_name(point, patch.id);
     for (std::size_t k = 0; k < old_count; ++k) {
       if (!same_name(old[k], point)) continue;
       point.m_userPersistentData = old[k].m_userPersistentData;
       point.m_appliedImpulse = old[k].m_appliedImpulse;
+      forget_impact(point, spring.step);
       point.m_prevRHS = old[k].m_prevRHS;
       point.m_appliedImpulseLateral1 = old[k].m_appliedImpulseLateral1;
       point.m_appliedImpulseLateral2 = old[k].m_appliedImpulseLateral2;
@@ -403,7 +478,7 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
   if (whole) settings.patches = 1;
   Contact contact;
   state_->meeting.find(first.getWorldTransform(), second.getWorldTransform(), settings, contact);
-  if (!(contact.whole.volume > 0)) {
+  if (!(contact.whole.volume > 0) || contact.inside) {
     state_->memory = {};
     return;
   }

@@ -9,6 +9,8 @@
 #include <limits>
 
 #include <ist/bullet/convert.h>
+#include <ist/mass_properties.h>
+#include <ist/surface.h>
 
 namespace ist::bullet {
 
@@ -38,8 +40,10 @@ Body body_of(const btCollisionObject& object) {
 
 }  // namespace
 
-Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second)
-    : pair_id_(static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(this) >> 3)),
+Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second,
+                 const Contacts* world)
+    : world_(world),
+      pair_id_(static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(this) >> 3)),
       // SDF shapes of Bullet's have the same type.
       first_(dynamic_cast<const Shape*>(&first)),
       second_(dynamic_cast<const Shape*>(&second)) {
@@ -113,11 +117,58 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   if (std::isnan(found.penetration.volume)) {
     warn(
         "A contact query gave no answer, so two bodies pass through each other: a transform is not "
-        "finite, or Settings::query needs what an asset does not hold.");
+        "finite, or Settings::query needs what an asset does not hold.",
+        world_);
     contact.clearance = 0;
   }
   contact.whole = found.penetration;
   contact.count = found.count;
+  contact.inside = found.penetration.volume > 0 && find_way_out({a, b}, {first, second}, contact);
+}
+
+bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& contact) const {
+  // Inside the other a solid's overlap is all of it and changes with no motion. Patches may be left
+  // that push against each other.
+  constexpr double kWhole = 0.99, kNone = 0.01;
+  const double overlap = contact.whole.volume;
+  if (!(contact.whole.translation_gradient.norm() < kNone * std::pow(overlap, 2.0 / 3)))
+    return false;
+  for (const int inner : {0, 1}) {
+    const Shape* const shape = inner == 0 ? first_ : second_;
+    Eigen::Vector3d centre;
+    double radius = 0;
+    if (shape != nullptr) {
+      if (!(overlap > kWhole * shape->volume())) continue;
+      const Bounds box = bounds(shape->tree());
+      centre = to_eigen(at[inner] * (shape->mesh_in_body() *
+                                     to_bullet(Eigen::Vector3d(shape->scale() * box.centre))));
+      radius = shape->scale() * box.radius;
+    } else {
+      btVector3 middle;
+      btScalar reach;
+      partner_->shape().getBoundingSphere(middle, reach);
+      centre = to_eigen(at[inner] * middle);
+      radius = reach;
+    }
+    const SurfacePoint near = closest_point(solids[1 - inner], centre);
+    if (shape == nullptr && !(near.distance <= -radius)) continue;
+    ContactPatch& way = contact.patches[0] = {};
+    way.id = ~std::uint64_t{0};
+    way.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
+    way.depth = radius - near.distance;
+    if (near.status != QueryStatus::ok) {  // it keeps no mesh
+      const Eigen::Vector3d between = to_eigen(at[1].getOrigin() - at[0].getOrigin());
+      way.normal =
+          between.norm() > 0 ? Eigen::Vector3d(between.normalized()) : Eigen::Vector3d::UnitZ();
+      way.depth = first_->reach() + second_->reach() - between.norm();
+    }
+    way.centroid = way.point = centre;
+    way.area = std::pow(volume(), 2.0 / 3);
+    way.volume = overlap;
+    contact.count = 1;
+    return true;
+  }
+  return false;
 }
 
 TimeOfImpact Meeting::impact(const Places& from, const Places& to, const Places& in_body,
@@ -194,20 +245,26 @@ Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
   const Body one = body_of(first), other = body_of(second);
   const Body& lighter = one.mass < other.mass ? one : other;
   const double size = std::cbrt(meeting.volume()), face = size * size;
+  const double sag = settings.depth * size;  // [u] by default
+  const double pull = lighter.gravity > 0 ? lighter.gravity : sag / (step * step);
   Spring spring;
   spring.stiffness = settings.law.stiffness > 0 ? settings.law.stiffness : meeting.stiffness();
   spring.linear = std::numeric_limits<double>::infinity();
+  spring.rebound = std::exp(-2 * settings.damping);
+  spring.step = step;
   if (!std::isfinite(lighter.mass)) return spring;  // nothing moves
   if (!(spring.stiffness > 0)) {
-    const double rest = settings.depth * size;
-    spring.linear = rest;
-    const double pull = lighter.gravity > 0 ? lighter.gravity : rest / (step * step);
-    spring.stiffness = stiffness_for_depth(lighter.mass * pull, face, rest);
+    spring.linear = sag;
+    spring.stiffness = stiffness_for_depth(lighter.mass * pull, face, sag);
   }
   const double held = spring.stiffness * face / lighter.mass;  // [1/s²]
-  spring.rest = (lighter.gravity > 0 ? lighter.gravity / held : settings.depth * size);
+  spring.rest = lighter.gravity > 0 ? lighter.gravity / held : sag;
   spring.slow = std::sqrt(2 * held) * spring.rest;
   spring.relaxation = 2 * settings.damping / std::sqrt(held);
+  // A stiff spring parts bodies no more slowly.
+  const double fall = std::sqrt(2 * pull * std::max(spring.rest, sag));
+  spring.push_out = settings.push_out > 0 ? settings.push_out : 3 * fall;
+  spring.least = std::min(fall, spring.push_out);
   return spring;
 }
 

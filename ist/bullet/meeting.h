@@ -17,7 +17,9 @@ inline Places operator*(const Places& a, const Places& b) { return {a[0] * b[0],
 /// Two shapes of which one is a Shape, prepared for many queries. Both must outlive it.
 class Meeting {
  public:
-  Meeting(const btCollisionShape& first, const btCollisionShape& second);
+  /// `world`: where to warn.
+  Meeting(const btCollisionShape& first, const btCollisionShape& second,
+          const Contacts* world = nullptr);
 
   /// One of them is a Shape.
   bool has_shape() const { return first_ != nullptr || second_ != nullptr; }
@@ -42,16 +44,26 @@ class Meeting {
 
  private:
   using Solids = std::array<PlacedSolid, 2>;
+  /// Of overlapping solids: whether one is wholly inside the other, and then the way out.
+  bool find_way_out(const Solids& solids, const Places& at, Contact& contact) const;
   /// At the beginning of a motion.
   Solids placed(const Places& from, const Places& to, const Settings& settings) const;
   /// The first impact of a motion of both bodies in a time of 1.
   TimeOfImpact impact(const Places& from, const Places& to, const Places& in_body,
                       const Settings& settings) const;
 
+  const Contacts* world_;
   std::uint32_t pair_id_;         // no two at a time have the same
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;
   std::optional<Partner> partner_;
+};
+
+/// The motion of an object that is placed anew in every step and given no speed: Bullet's solver
+/// does not see it.
+struct Unsaid {
+  btVector3 velocity{0, 0, 0}, turning{0, 0, 0}, origin{0, 0, 0};
+  btVector3 at(const btVector3& point) const { return velocity + turning.cross(point - origin); }
 };
 
 /// What holds two bodies apart.
@@ -61,9 +73,18 @@ struct Spring {
   double rest = 0;        ///< [u] depth at which the lighter body rests
   double slow = 0;        ///< [u/s] a body that fell by `rest` is this fast
   double linear = 0;      ///< [u] deeper, the pressure grows with the depth's square
+  double push_out = 1;    ///< [u/s] it drives bodies apart no faster
+  double least = 1;       ///< [u/s] at least, where other points push against it
+  double rebound = 0;     ///< of a closing speed that it may give back
+  double step = 0;        ///< [s] the world's
 
   /// [force/u³] at that depth.
   double at(double depth) const { return stiffness * std::max(1.0, depth / linear); }
+  /// [u/s] At which an implicit step parts bodies at rest that are so deep: the spring's speed, but
+  /// no more than `most`.
+  double parting(double depth, double most) const {
+    return std::min(depth / (step + relaxation), std::max(most, least));
+  }
 };
 
 /// `step` [s]: the world's.

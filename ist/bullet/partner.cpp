@@ -3,6 +3,7 @@
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
+#include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
@@ -71,6 +72,26 @@ FieldSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept 
 
 FieldSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const HullDistance*>(context)->at(x);
+}
+
+std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
+  if (shape.getShapeType() == CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE) {
+    // It counts no corners. Triangles come scaled by the mesh, as its support does.
+    struct Corners : btInternalTriangleIndexCallback {
+      std::vector<btVector3> all;
+      void internalProcessTriangleIndex(btVector3* corners, int, int) override {
+        all.insert(all.end(), corners, corners + 3);
+      }
+    } corners;
+    const btVector3 none(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
+    static_cast<const btConvexTriangleMeshShape&>(shape)
+        .getMeshInterface()
+        ->InternalProcessAllTriangles(&corners, -none, none);
+    return corners.all;
+  }
+  std::vector<btVector3> corners(static_cast<std::size_t>(shape.getNumVertices()));
+  for (std::size_t i = 0; i < corners.size(); ++i) shape.getVertex(static_cast<int>(i), corners[i]);
+  return corners;
 }
 
 /// Bullet tells nobody what its terrain is made of: an heir may look.
@@ -214,21 +235,38 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // Where several triangles are as near, as at a common side, all of them tell front from back: by
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
-  double nearest = std::numeric_limits<double>::max(), reach = 1e150, size = 0;
+  if (boxes_.empty()) return {-1e100, Eigen::Vector3d::Zero()};
+  // The triangles of the nearest box say first how near is near.
+  const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
+    const auto& corner = triangle.corner;
+    return Eigen::Vector3d(share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2]);
+  };
+  const auto first =
+      std::min_element(boxes_.begin(), boxes_.end(),
+                       [&](const Eigen::AlignedBox3d& a, const Eigen::AlignedBox3d& b) {
+                         return a.squaredExteriorDistance(x) < b.squaredExteriorDistance(x);
+                       });
+  const std::size_t near_block = static_cast<std::size_t>(first - boxes_.begin());
+  double most = std::numeric_limits<double>::max();
+  for (std::size_t i = kBlock * near_block;
+       i < std::min(triangles_.size(), kBlock * (near_block + 1)); ++i) {
+    const Triangle& triangle = triangles_[i];
+    most = std::min(most, (x - foot_on(triangle, triangle.nearest(x))).squaredNorm());
+  }
+  double nearest = kAsNear * most, reach = kAsNear * std::sqrt(nearest), size = 0;
   Eigen::Vector3d foot = x, front = x, border = x;
   for (std::size_t block = 0; block < boxes_.size(); ++block) {
     if (boxes_[block].squaredExteriorDistance(x) > kAsNear * nearest) continue;
     const std::size_t end = std::min(triangles_.size(), kBlock * (block + 1));
     for (std::size_t i = kBlock * block; i < end; ++i) {
       const Triangle& triangle = triangles_[i];
-      const double far = reach + triangle.reach;
+      const double far = kAsNear * (reach + triangle.reach);
       if ((x - triangle.centre).squaredNorm() > far * far) continue;
       const auto& corner = triangle.corner;
       const Eigen::Vector3d share = triangle.nearest(x);
-      const Eigen::Vector3d point =
-          share[0] * corner[0] + share[1] * corner[1] + share[2] * corner[2];
+      const Eigen::Vector3d point = foot_on(triangle, share);
       const double distance = (x - point).squaredNorm();
-      const bool nearer = kAsNear * distance < nearest;
+      const bool nearer = size == 0 ? distance <= nearest : kAsNear * distance < nearest;
       if (!nearer && (distance > kAsNear * nearest ||
                       (point - foot).squaredNorm() > 1e-8 * nearest + 1e-28 * foot.squaredNorm()))
         continue;
@@ -271,7 +309,7 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
 }
 
 std::optional<Partner> Partner::of(const btCollisionShape& shape) {
-  Partner partner;
+  Partner partner(shape);
   switch (shape.getShapeType()) {
     case STATIC_PLANE_PROXYTYPE: {
       const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
@@ -308,11 +346,8 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
     case TETRAHEDRAL_SHAPE_PROXYTYPE:
     case CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE:
     case CONVEX_POINT_CLOUD_SHAPE_PROXYTYPE: {
-      const auto& polyhedron = static_cast<const btPolyhedralConvexShape&>(shape);
-      std::vector<btVector3> points(static_cast<std::size_t>(polyhedron.getNumVertices()));
-      for (std::size_t i = 0; i < points.size(); ++i) {
-        polyhedron.getVertex(static_cast<int>(i), points[i]);
-      }
+      std::vector<btVector3> points =
+          corners_of(static_cast<const btPolyhedralConvexShape&>(shape));
       partner.hull_ = std::make_shared<const HullDistance>(points);
       if (partner.hull_->faces() < 4) return std::nullopt;
       partner.field_.field = FunctionField{hull_sample, partner.hull_.get(), 0};

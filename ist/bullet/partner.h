@@ -70,7 +70,12 @@ class Partner {
   PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
 
+  const btCollisionShape& shape() const { return *shape_; }
+
  private:
+  explicit Partner(const btCollisionShape& shape) : shape_(&shape) {}
+
+  const btCollisionShape* shape_;
   PlacedField field_;  // its pose is in_shape_, each time
   btTransform in_shape_ = btTransform::getIdentity();
   std::shared_ptr<const HullDistance> hull_;

@@ -1,5 +1,6 @@
 #include <ist/bullet/shape.h>
 
+#include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <LinearMath/btAabbUtil2.h>
 
 #include <Eigen/Eigenvalues>
@@ -9,6 +10,7 @@
 #include <ist/asset_layout.h>
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
+#include <ist/surface.h>
 
 namespace ist::bullet {
 
@@ -73,21 +75,36 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
   const double* const vertices = at<double>(asset, mesh.vertices);
   const MeshBlock* const blocks = at<MeshBlock>(asset, mesh.level[0].blocks);
   const Eigen::Vector3d centre(asset.centre);
+  const auto placed = [&](std::uint32_t vertex) {
+    const Eigen::Vector3d unit(vertices + 3 * std::size_t{vertex});
+    return mesh_in_body_ *
+           to_bullet(Eigen::Vector3d(scale_ * (std::ldexp(1.0, asset.exponent) * unit + centre)));
+  };
+  const auto process = [&](std::uint32_t triangle) {
+    const MeshBlock& block = blocks[triangle / kWidth];
+    btVector3 corners[3];
+    for (int k = 0; k < 3; ++k)
+      corners[k] = placed(block.vertex[block.corner[k][triangle % kWidth]]);
+    if (TestTriangleAgainstAabb2(corners, lower, upper))
+      callback->processTriangle(corners, 0, static_cast<int>(triangle));
+  };
+  // A ray's triangles are found one after another, until one hit is the last that counts.
+  if (auto* const ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
+    const PlacedTree mesh_placed{tree_, to_pose(mesh_in_body_), scale_};
+    const Eigen::Vector3d from = to_eigen(ray->m_from), way = to_eigen(ray->m_to) - from;
+    const double length = way.norm(), past = 1e-9 * (length + reach());
+    for (double begin = 0; begin < ray->m_hitFraction * length;) {
+      const RayHit hit =
+          raycast(mesh_placed, Ray{from + begin / length * way, way, length * (1 + 1e-9) - begin});
+      if (!hit.hit()) return;
+      process(hit.triangle);
+      begin += hit.distance + past;
+    }
+    return;
+  }
   for (std::uint32_t b = 0; b < mesh.level[0].count; ++b) {
-    const MeshBlock& block = blocks[b];
-    btVector3 placed[kWidth];
-    for (int v = 0; v < block.vertices; ++v) {
-      const Eigen::Vector3d unit(vertices + 3 * std::size_t{block.vertex[v]});
-      placed[v] =
-          mesh_in_body_ *
-          to_bullet(Eigen::Vector3d(scale_ * (std::ldexp(1.0, asset.exponent) * unit + centre)));
-    }
-    for (int t = 0; t < block.triangles; ++t) {
-      btVector3 corners[3];
-      for (int k = 0; k < 3; ++k) corners[k] = placed[block.corner[k][t]];
-      if (!TestTriangleAgainstAabb2(corners, lower, upper)) continue;
-      callback->processTriangle(corners, 0, static_cast<int>(b * kWidth) + t);
-    }
+    for (int t = 0; t < blocks[b].triangles; ++t)
+      process(b * static_cast<std::uint32_t>(kWidth) + static_cast<std::uint32_t>(t));
   }
 }
 

@@ -2,8 +2,9 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 
-#include <ist/bullet/shape.h>
+#include <ist/bullet/contacts.h>
 
 namespace ist::bullet {
 
@@ -14,7 +15,7 @@ void print(const char* sentence) { std::fprintf(stderr, "ist::bullet: %s\n", sen
 struct Warnings {
   std::mutex mutex;
   WarningHandler handler = print;
-  std::set<std::string> given;
+  std::set<std::pair<const Contacts*, std::string>> given;
 };
 Warnings& warnings() {
   static Warnings all;
@@ -30,14 +31,19 @@ WarningHandler set_warning_handler(WarningHandler handler) {
   return before;
 }
 
-void warn(const char* sentence) {
+void warn(const char* sentence, const Contacts* world) {
   WarningHandler handler = nullptr;
   {
     const std::lock_guard lock(warnings().mutex);
-    if (!warnings().given.insert(sentence).second) return;
+    if (!warnings().given.emplace(world, sentence).second) return;
     handler = warnings().handler;
   }
   handler(sentence);
+}
+
+Contacts::~Contacts() {
+  const std::lock_guard lock(warnings().mutex);
+  std::erase_if(warnings().given, [this](const auto& one) { return one.first == this; });
 }
 
 }  // namespace ist::bullet

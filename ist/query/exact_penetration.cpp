@@ -11,6 +11,7 @@
 #include "query/descent/workspace.h"
 #include "query/exact/exact_octants.h"
 #include "query/exact/kept_mesh.h"
+#include "query/solid_queries.h"
 
 namespace ist {
 namespace {
@@ -195,7 +196,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
       ContactSettings others = settings;
       others.measure = Measure::matched;
       others.relative_error = 0;
-      return contact_patches(a, b, others, workspace, patches);
+      return find_patches(a, b, others, workspace, patches);
     };
     answer.contact = stopped<ContactPatches>(
         a, b, not_held<ContactPatches>(), by_spheres,

@@ -8,6 +8,7 @@
 #include "query/base/batch.h"
 #include "query/base/no_answer.h"
 #include "query/base/turned_over.h"
+#include "query/descent/workspace.h"
 #include "query/solid_queries.h"
 
 // Every query of two solids: as they come, or turned over where the second is the field.
@@ -18,8 +19,9 @@ namespace {
 /// ask(a, b) of assets, or of a field and an asset. Its answer comes back by turn(answer), if the
 /// order was the other one; two fields get `none`.
 template <class Answer, class Ask, class Turn>
-Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, const Answer& none, const Ask& ask,
-                const Turn& turn) noexcept {
+Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace,
+                const Answer& none, const Ask& ask, const Turn& turn) noexcept {
+  const WorkspaceInUse in_use(workspace);
   const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
   const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
   if (tree_b != nullptr)
@@ -29,6 +31,11 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, const Answer& none, 
   Answer answer = ask(*std::get_if<PlacedField>(&b.placed), *tree_a);
   turn(answer);
   return answer;
+}
+
+/// C's functions refuse other numbers too.
+bool are_known(const PenetrationSettings& settings) noexcept {
+  return settings.measure <= Measure::exact && settings.surface <= SurfaceUse::always;
 }
 
 const Pose& pose_of(const PlacedSolid& solid) noexcept {
@@ -61,8 +68,9 @@ void turn_witnesses(Answer& answer) noexcept {
 
 Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
+  if (!are_known(settings)) return invalid_input<Penetration>();
   return ask_pair(
-      a, b, not_held<Penetration>(),
+      a, b, workspace, not_held<Penetration>(),
       [&](const auto& x, const PlacedTree& y) {
         return find_penetration(x, y, settings, workspace);
       },
@@ -72,7 +80,7 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
                       const SeparationSettings& settings, Workspace& workspace) noexcept {
   return ask_pair(
-      a, b, not_held<Separation>(),
+      a, b, workspace, not_held<Separation>(),
       [&](const auto& x, const PlacedTree& y) {
         return find_separation(x, y, settings, workspace);
       },
@@ -95,8 +103,9 @@ PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
 ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches) noexcept {
+  if (!are_known(settings) || patches.empty()) return invalid_input<ContactPatches>();
   return ask_pair(
-      a, b, not_held<ContactPatches>(),
+      a, b, workspace, not_held<ContactPatches>(),
       [&](const auto& x, const PlacedTree& y) {
         return find_patches(x, y, settings, workspace, patches);
       },
@@ -108,7 +117,7 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
 
 Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept {
   return ask_pair(
-      a, b, Overlapping::unknown,
+      a, b, workspace, Overlapping::unknown,
       [&](const auto& x, const PlacedTree& y) { return find_overlap(x, y, workspace); },
       [](Overlapping) {});
 }
@@ -116,6 +125,7 @@ Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& works
 Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
                     Workspace& workspace) noexcept {
   if (!(margin >= 0)) return Overlapping::unknown;
+  const WorkspaceInUse in_use(workspace);
   const SeparationSettings settings{.max_distance = margin};
   const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
   const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
@@ -133,7 +143,7 @@ TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Mo
   const bool turned = std::holds_alternative<PlacedField>(b.placed);
   const Motions ordered = turned ? Motions{motions.b, motions.a} : motions;
   return ask_pair(
-      a, b, not_held<TimeOfImpact>(),
+      a, b, workspace, not_held<TimeOfImpact>(),
       [&](const auto& x, const PlacedTree& y) {
         return find_impact(x, y, ordered, settings, workspace);
       },

@@ -393,6 +393,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   const int usual = settings.measure == IST_EXACT ? 16 : 8;
   const int most = second->patches > 0 ? second->patches : usual;
   patches.capacity = static_cast<size_t>(std::max(0, std::min(most, room)));
+  if (patches.capacity == 0) return 0;
   ist_penetration_t whole = {};
   whole.size = sizeof whole;
   ist_status_t status = ist_contact_patches(&a, &b, &settings, &memory.workspace, &patches, &whole);

@@ -148,7 +148,7 @@ constexpr const char* kPatchesDoc =
     R"(The contact condensed into at most max_patches patches.
 
 Arguments as for penetration(). The patches sum to the whole contact. max_patches:
-on the CPU any number.
+on the CPU any number from 1.
 
 Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Field is not_held. Beyond
 count[i] a pair's patches are zero, or unchanged with `out`.
@@ -289,6 +289,7 @@ void add_separation(py::module_& module) {
               });
         }
         refuse_output(given);
+        if (max_patches < 1) throw value_error("max_patches: 0; wanted 1 or more");
         return py::cast(patches(
             pair.rows(), max_patches,
             contact_settings(measure, surface, pair_budget, max_visits, relative_error, pair_id),

@@ -286,7 +286,7 @@ int patches_answer(scene_t* s) {
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, NULL, &patches) == IST_NULL_POINTER);
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_NULL_POINTER);
   patches.capacity = 0;
-  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_OK);
+  CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_INVALID_INPUT);
   patches.patch_size = 0;
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, NULL) == IST_WRONG_SIZE);
   patches.patch_size = sizeof room[0];

@@ -29,6 +29,17 @@ rpath="-Wl,-rpath,$(pkg-config --variable=libdir ist-query)"
 "$work/bake_and_query" "$@"
 readelf -d "$work/bake_and_query" | grep -q 'libist\.so'
 
+# Bullet in either precision, where it was found.
+for bullet in ist-bullet ist-bullet-float64; do
+  [ -e "$whole/lib/lib$(echo $bullet | sed s/-/_/).a" ] || continue
+  echo '#include <ist/bullet/contacts.h>
+    int main() { ist::bullet::Contacts contacts; btTransform at(btQuaternion::getIdentity()); }' \
+    >"$work/bullet.cpp"
+  "$cxx" -std=c++20 "$work/bullet.cpp" $(pkg-config --cflags --libs $bullet) "$rpath" \
+    -o "$work/bullet"
+  "$work/bullet"
+done
+
 # The static libraries of the same tree, by name.
 "$cxx" "$work/bake_and_query.o" -o "$work/bake_and_query" \
   $(pkg-config --static --libs ist | sed 's/-list_query/-l:libist_query.a/; s/-list /-l:libist.a /')
@@ -50,7 +61,7 @@ int main(int, char** argv) try {
   return std::puts(error.what()), 2;
 }
 END
-for lacking in bake mesh packing gpu_query; do [ ! -e "$headers/$lacking.h" ]; done
+for lacking in bake mesh packing gpu_query query_tbb; do [ ! -e "$headers/$lacking.h" ]; done
 "$cxx" -std=c++20 -Wall -Wextra -Wshadow -Wconversion -Werror "$work/headers.cpp" \
   $(pkg-config --cflags --libs ist-query | sed 's/-I\([^ ]*eigen3\)/-isystem \1/') -o "$work/headers"
 "$work/headers" "$a"

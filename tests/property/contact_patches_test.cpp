@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <thread>
 
 #include "support/query_settings.h"
 #include "support/random_assets.h"
@@ -227,6 +228,45 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(whole.status, QueryStatus::not_held);
   EXPECT_TRUE(std::isnan(whole.volume));
 }
+
+TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
+  Workspace workspace;
+  const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
+  const PlacedTree placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
+  ContactPatch patch;
+  for (const PenetrationSettings& settings : {PenetrationSettings{.measure = Measure{77}},
+                                              PenetrationSettings{.surface = SurfaceUse{3}}}) {
+    const Penetration whole = penetration(placed, other, settings, workspace);
+    EXPECT_EQ(whole.status, QueryStatus::invalid_input);
+    EXPECT_TRUE(std::isnan(whole.volume));
+    EXPECT_EQ(contact_patches(placed, other, settings, workspace, {&patch, 1}).penetration.status,
+              QueryStatus::invalid_input);
+  }
+  const ContactPatches none = contact_patches(placed, other, {}, workspace, {});
+  EXPECT_EQ(none.penetration.status, QueryStatus::invalid_input);
+  EXPECT_TRUE(std::isnan(none.penetration.volume));
+}
+
+#ifndef NDEBUG
+TEST(WorkspaceDeathTest, TwoThreadsInOneAreSaid) {
+  Workspace workspace;
+  const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
+  const PlacedTree placed{a.view(), {}, 1};
+  // A field that asks on another thread what its own query asks on this one.
+  struct Both {
+    Workspace& workspace;
+    PlacedTree placed;
+  } both{workspace, placed};
+  const FunctionField field{
+      [](const void* context, const Eigen::Vector3d&) noexcept {
+        const auto& asked = *static_cast<const Both*>(context);
+        std::thread([&] { penetration(asked.placed, asked.placed, {}, asked.workspace); }).join();
+        return FieldSample{1, Eigen::Vector3d::UnitX()};
+      },
+      &both, 0};
+  EXPECT_DEATH(penetration(PlacedField{field, {}}, placed, {}, workspace), "two threads use one");
+}
+#endif
 
 }  // namespace
 }  // namespace ist

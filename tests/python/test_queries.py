@@ -95,7 +95,8 @@ def test_batches_of_none_and_of_one(gear, knot):
     assert ist.separation(gear, knot, np.empty((0, 7))).distance.shape == (0,)
     assert ist.contact_patches(gear, knot, np.empty((0, 7))).id.shape == (0, 8)
     assert ist.penetration(gear, knot, [IDENTITY]).volume.shape == (1,)
-    assert ist.contact_patches(gear, knot, IDENTITY, max_patches=0).count == 0
+    with pytest.raises(ValueError, match="max_patches: 0; wanted 1 or more"):
+        ist.contact_patches(gear, knot, IDENTITY, max_patches=0)
 
 
 def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):

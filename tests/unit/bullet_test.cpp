@@ -1,6 +1,7 @@
 // Assets in Bullet: partners, contact events, resting depths.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
+#include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -135,6 +136,17 @@ TEST(BulletPartners, ACubeRestsOnEachOfThem) {
        {0, 0, -0.5}},
       {"cone, base up", [] { return std::make_unique<btConeShapeZ>(1, 2); }, {0, 0, -1}, SIMD_PI},
       {"hull", hull_of_box, {0, 0, -1}},
+      {"convex triangle mesh",
+       [] {
+         static btTriangleMesh mesh;
+         if (mesh.getNumTriangles() == 0) {
+           for (const btVector3& p : corners(0.5)) mesh.addTriangle(p, p, -p);
+         }
+         auto shape = std::make_unique<btConvexTriangleMeshShape>(&mesh);
+         shape->setLocalScaling({2, 2, 2});
+         return shape;
+       },
+       {0, 0, -1}},
       {"terrain",
        [] {
          auto terrain =
@@ -252,6 +264,19 @@ TEST(BulletShape, RaysAndSweepsMeetItsSurface) {
   ASSERT_TRUE(ray.hasHit());
   EXPECT_NEAR(ray.m_hitPointWorld.z(), 4, 1e-6);
   EXPECT_NEAR(ray.m_hitNormalWorld.z(), 1, 1e-6);
+  // All of them, and neither more than its length nor those seen from behind.
+  btCollisionWorld::AllHitsRayResultCallback all(from, to);
+  world.world.rayTest(from, to, all);
+  ASSERT_EQ(all.m_hitFractions.size(), 2);
+  EXPECT_NEAR(all.m_hitPointWorld[0].z() + all.m_hitPointWorld[1].z(), 6, 1e-6);
+  btCollisionWorld::AllHitsRayResultCallback fronts(from, to);
+  fronts.m_flags |= btTriangleRaycastCallback::kF_FilterBackfaces;
+  world.world.rayTest(from, to, fronts);
+  ASSERT_EQ(fronts.m_hitFractions.size(), 1);
+  EXPECT_NEAR(fronts.m_hitPointWorld[0].z(), 4, 1e-6);
+  btCollisionWorld::ClosestRayResultCallback short_of_it(from, {0.3, 0.2, 4.01});
+  world.world.rayTest(from, {0.3, 0.2, 4.01}, short_of_it);
+  EXPECT_FALSE(short_of_it.hasHit());
   const btSphereShape ball(0.5);
   btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
   world.world.convexSweepTest(&ball, at_place(from), at_place(to), sweep);

@@ -16,6 +16,8 @@ const std::vector<Scene>& scenes() {
       {"nut", "a nut turns down a bolt by its weight", run_nut},
       {"screw", "a screw falls on a table a hundred times its size", run_screw},
       {"drop", "eight screws fall on a thin plate", run_drop},
+      {"impacts", "five solids fall on a plane at every turn", run_impacts},
+      {"overlap", "five boxes that begin in each other", run_overlap},
       {"bowl", "a ball in a bowl in a box", run_bowl},
       {"peg", "a peg slips into a hole with 0.1 mm of clearance", run_peg},
       {"bunnies", "thirty bunnies in a crate", run_bunnies},

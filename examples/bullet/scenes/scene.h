@@ -74,6 +74,8 @@ SceneResult run_cube_on_cube(const SceneOptions&);
 SceneResult run_nut(const SceneOptions&);
 SceneResult run_screw(const SceneOptions&);
 SceneResult run_drop(const SceneOptions&);
+SceneResult run_impacts(const SceneOptions&);
+SceneResult run_overlap(const SceneOptions&);
 SceneResult run_bowl(const SceneOptions&);
 SceneResult run_peg(const SceneOptions&);
 SceneResult run_bunnies(const SceneOptions&);

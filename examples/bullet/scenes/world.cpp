@@ -29,14 +29,11 @@ SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
                                     ? ist::bullet::Settings::Response::wrench
                                     : ist::bullet::Settings::Response::solver;
   btGImpactCollisionAlgorithm::registerAlgorithm(&dispatcher_);
-  contacts_.register_with(dispatcher_);
+  contacts_.configure(world_);
   world_.setGravity(to_bullet(settings.gravity));
-  // The patches' springs push by speed; Bullet's own contacts part bodies as it does by default.
+  // Bullet's own contacts part bodies as it does by default.
   world_.getSolverInfo().m_splitImpulse =
       settings.way == Way::gimpact || settings.way == Way::hulls;
-  world_.getSolverInfo().m_numIterations = 50;
-  world_.getSolverInfo().m_warmstartingFactor = 1;
-  world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
   world_.addAction(&contacts_);  // stops bodies that ask for it
   if (settings.way == Way::wrench) ist::bullet::push_in_every_tick(world_);
 }

@@ -56,6 +56,12 @@ struct Settings {
   /// Damping of a contact over critical damping; solver only. At 1 a body without restitution
   /// rebounds with less than a seventh of its speed, e⁻².
   double damping = 1;
+  /// [u/s] Solver only: springs part two bodies no faster than this, or than e^(−2 damping) of the
+  /// speed at which they closed, however deep they are when they are first seen in each other.
+  /// Their dampers grow instead. Bodies that part faster by themselves, as with restitution, are
+  /// not held back. 0: three times the speed of a fall by the resting depth (`depth`, or that of a
+  /// softer spring).
+  double push_out = 0;
   /// Solver only: two objects are queried again once a point of one has moved relative to the other
   /// by more than this share of the depth at which the lighter body rests. Until then their patches
   /// move along: the motion changes their depths, and their areas stay. A new contact may be found
@@ -69,6 +75,10 @@ struct Contact {
   Penetration whole;                                 ///< the contact as one
   std::size_t count = 0;
   std::array<ContactPatch, Settings::kPatches> patches;
+  /// One solid is wholly inside the other: no force of the volume leads out. The one patch has the
+  /// way out in its place: `depth` along `normal` parts them, or brings the smaller solid across
+  /// the nearest face of the other; `area` is a face of the smaller asset's size.
+  bool inside = false;
   /// [u] Of separate objects: they stay apart while no point moves by more than this.
   double clearance = 0;
 };
@@ -84,6 +94,16 @@ bool find_contact(const btCollisionObject& first, const btCollisionObject& secon
 /// As an action of the world (btDynamicsWorld::addAction) it stops fast bodies where they meet.
 class Contacts : public btActionInterface {
  public:
+  Contacts() = default;
+  Contacts(const Contacts&) = delete;
+  Contacts& operator=(const Contacts&) = delete;
+  ~Contacts() override;
+
+  /// register_with() the world's dispatcher, a btCollisionDispatcher, and what the patches' springs
+  /// need of its solver: no split impulse, 50 iterations, a warm start of 1, two directions of
+  /// friction. This object must outlive the world.
+  void configure(btDynamicsWorld& world);
+
   /// Registers the algorithm for all types that collide with a Shape; warn() reports the others.
   /// Call it after the registration of other algorithms that take all types, as GImpact's does.
   /// This object must outlive the dispatcher.

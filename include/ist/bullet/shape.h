@@ -8,6 +8,8 @@
 
 namespace ist::bullet {
 
+class Contacts;
+
 /// Bullet's body frame of a baked solid: at its centre of mass, along principal axes: the asset's
 /// own axes if those are principal.
 struct BodyFrame {
@@ -43,9 +45,9 @@ class Shape : public btConcaveShape {
   void setLocalScaling(const btVector3& scaling) override;
   const btVector3& getLocalScaling() const override { return scaling_; }
 
-  /// Gives Bullet's rays, sweeps and debug drawing the triangles of the kept mesh
-  /// (TreeView::has_mesh), all of them in turn: raycast() of <ist/surface.h> is faster. Without a
-  /// mesh there are none, and warn() says so.
+  /// Gives Bullet's sweeps and debug drawing the triangles of the kept mesh (TreeView::has_mesh),
+  /// all of them in turn, and its rays those that they hit, by raycast() of <ist/surface.h>.
+  /// Without a mesh there are none, and warn() says so.
   void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                            const btVector3& upper) const override;
 
@@ -58,14 +60,16 @@ class Shape : public btConcaveShape {
   btVector3 scaling_{1, 1, 1};
 };
 
-/// Called once for each kind of shape or setting that is not supported, with a sentence that names
-/// it. Called on any thread that makes pairs. The default writes to stderr.
+/// Called once in each world (Contacts) for each kind of shape or setting that is not supported,
+/// with a sentence that names it. Called on any thread that makes pairs. The default writes to
+/// stderr.
 using WarningHandler = void (*)(const char* sentence);
 
 /// Replaces the handler; null: the default. Returns the previous one.
 WarningHandler set_warning_handler(WarningHandler handler);
 
-/// Passes a sentence to the handler, unless the same sentence was passed before.
-void warn(const char* sentence);
+/// Passes a sentence to the handler, unless the same sentence was passed before in the same world,
+/// or outside of worlds.
+void warn(const char* sentence, const Contacts* world = nullptr);
 
 }  // namespace ist::bullet

@@ -1,6 +1,8 @@
 #include "query/descent/workspace.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 
 namespace ist {
 namespace {
@@ -49,5 +51,24 @@ void Workspace::Release::operator()(Impl* impl) const noexcept {
 Workspace::~Workspace() = default;
 Workspace::Workspace(Workspace&&) noexcept = default;
 Workspace& Workspace::operator=(Workspace&&) noexcept = default;
+
+#ifndef NDEBUG
+WorkspaceInUse::WorkspaceInUse(Workspace& workspace) noexcept {
+  thread_local const char here = 0;
+  Workspace::Impl* const impl = workspace.impl();
+  if (impl == nullptr) return;
+  const void* user = nullptr;
+  if (impl->user.compare_exchange_strong(user, &here)) {
+    used_ = impl;
+  } else if (user != &here) {
+    std::fputs("ist: two threads use one Workspace at a time. Make one for each thread.\n", stderr);
+    std::abort();
+  }
+}
+
+WorkspaceInUse::~WorkspaceInUse() {
+  if (used_ != nullptr) used_->user = nullptr;
+}
+#endif
 
 }  // namespace ist

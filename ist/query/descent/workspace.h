@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 
@@ -52,6 +53,25 @@ struct [[gnu::visibility("hidden")]] Workspace::Impl {
   Hooked<PatchCache> patches;
   ContactBins contact;
   ExactScratch exact;
+#ifndef NDEBUG
+  std::atomic<const void*> user{nullptr};  ///< of the thread that asks now
+#endif
+};
+
+/// A query uses the workspace. In a debug build two threads that use one at a time end the program
+/// with a message, and not later with what they wrote into each other's lists.
+class WorkspaceInUse {
+ public:
+#ifdef NDEBUG
+  explicit WorkspaceInUse(Workspace&) noexcept {}
+#else
+  explicit WorkspaceInUse(Workspace& workspace) noexcept;
+  ~WorkspaceInUse();
+  WorkspaceInUse(const WorkspaceInUse&) = delete;
+
+ private:
+  Workspace::Impl* used_ = nullptr;  ///< null within another query of the thread
+#endif
 };
 
 }  // namespace ist
