@@ -12,18 +12,18 @@
 namespace ist::app {
 namespace {
 
-constexpr double kEnough = 0.1;             ///< of the free poses
-constexpr std::size_t kMostOfALink = 32;    ///< on average
+constexpr double kEnough = 0.1;           ///< of the free poses
+constexpr std::size_t kMostOfALink = 32;  ///< on average
 constexpr int kPatience = 3;  ///< rounds without gain: some gaps are too narrow for any spheres
 constexpr double kWorthwhile = 0.95;  ///< of the share before: less gain is none
-constexpr double kMore = 1.25;              ///< spheres of a link that is tightened
-constexpr double kMuchMore = 1.5;           ///< of one that protrudes kFurther
-constexpr double kFurther = 1.1;            ///< times as far as at first
-constexpr double kOften = 0.1;              ///< of the most meetings: what has fewer can wait
-constexpr double kAlike = 0.7;              ///< of the other's level: then both are to blame
-constexpr double kTighter = 0.5;            ///< share of the level, at a time
-constexpr double kTightest = 0.1;           ///< share of the level
-constexpr double kCells = 3;                ///< to the first protrusion
+constexpr double kMore = 1.25;        ///< spheres of a link that is tightened
+constexpr double kMuchMore = 1.5;     ///< of one that protrudes kFurther
+constexpr double kFurther = 1.1;      ///< times as far as at first
+constexpr double kOften = 0.1;        ///< of the most meetings: what has fewer can wait
+constexpr double kAlike = 0.7;        ///< of the other's level: then both are to blame
+constexpr double kTighter = 0.5;      ///< share of the level, at a time
+constexpr double kTightest = 0.1;     ///< share of the level
+constexpr double kCells = 3;          ///< to the first protrusion
 
 /// Places where a link's spheres protrude too much, by cells.
 class TightCells {

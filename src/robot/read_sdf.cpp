@@ -229,8 +229,9 @@ class SdfReader {
       joint.motion = RobotJoint::Motion::sliding;
     else if (type != "fixed" && type != "ball" && type != "universal" && type != "revolute2" &&
              type != "screw" && type != "gearbox")
-      xml_.fail(e, "its type " + in_quotes(type) + " is unknown. Use fixed, revolute, continuous or "
-                                                   "prismatic");
+      xml_.fail(e, "its type " + in_quotes(type) +
+                       " is unknown. Use fixed, revolute, continuous or "
+                       "prismatic");
     if (joint.motion != RobotJoint::Motion::fixed) {
       const std::uint32_t axis = xml_.child(e, "axis");
       if (axis == kNoTag) xml_.fail(e, "has no <axis>. Add one");
@@ -264,8 +265,7 @@ class SdfReader {
       if (in_model)
         joint.axis = frame.linear().transpose() * joint.axis;
       else if (!in.empty() && link_.contains(in))
-        joint.axis =
-            frame.linear().transpose() * (frame_of(link_.at(in)).linear() * joint.axis);
+        joint.axis = frame.linear().transpose() * (frame_of(link_.at(in)).linear() * joint.axis);
       else if (!in.empty() && in != joint.name)
         xml_.fail(xyz, "is expressed in " + in_quotes(in) + ", which is no link");
     } else {

@@ -36,7 +36,8 @@ std::string solid(const std::string& shape, const std::string& pose = "") {
 TEST(Sdf, LinksJointsAndShapes) {
   const RobotModel robot = sdf(
       "<link name='a'><pose>0 0 1 0 0 0</pose>" + solid("<box><size>1 2 3</size></box>") +
-      solid("<plane><normal>0 0 1</normal></plane>") + "</link>"
+      solid("<plane><normal>0 0 1</normal></plane>") +
+      "</link>"
       "<link name='b'><pose degrees='true'>1 0 1 0 0 90</pose>" +
       solid("<mesh><uri>model://m/b.stl</uri><scale>2 2 -1</scale></mesh>",
             "<pose>0 0 0.5 0 0 0</pose>") +
@@ -76,8 +77,8 @@ TEST(Sdf, LinksJointsAndShapes) {
   // k turns c about the model's x, which is b's −y, through b's (0, 1, 0).
   const Eigen::Isometry3d turned = rest[1].inverse() * rest[2];
   EXPECT_TRUE(turned.translation().isApprox(Vector3d(0, 2, 0)));
-  EXPECT_TRUE(turned.linear().isApprox(
-      Eigen::AngleAxisd(0.5, -Vector3d::UnitY()).toRotationMatrix()));
+  EXPECT_TRUE(
+      turned.linear().isApprox(Eigen::AngleAxisd(0.5, -Vector3d::UnitY()).toRotationMatrix()));
 }
 
 TEST(Sdf, MistakesAreToldWithTheirLines) {
