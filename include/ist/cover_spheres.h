@@ -24,6 +24,14 @@ struct CoverSphere {
 /// The largest number of spheres of a cover.
 inline constexpr std::size_t kMostCoverSpheres = 4096;
 
+/// A ball around a place where spheres are to protrude less than elsewhere, such as where another
+/// link of a robot passes close by.
+struct TightPlace {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u]
+  double radius = 0;  ///< [u] above 0; at twice as far the level is the common one again
+  double share = 1;   ///< (0, 1] of the common level of protrusion
+};
+
 /// Number of spheres, or their largest protrusion.
 struct SphereCoverSettings {
   /// [1, kMostCoverSpheres] of each mesh; with max_protrusion the most that may be used.
@@ -33,6 +41,9 @@ struct SphereCoverSettings {
   /// Not 0: largest number of spheres of all meshes together. Meshes without a count of their own
   /// share the rest, such that the largest protrusion of all is small. Excludes max_protrusion.
   std::size_t total = 0;
+  /// Places of each mesh where spheres are to protrude less: a wish, never proven. Empty, or one
+  /// list per mesh. Excludes total and max_protrusion.
+  std::vector<std::vector<TightPlace>> tight = {};
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: the fewest spheres
   /// found that protrude by no more.
   double max_protrusion = 0;

@@ -85,7 +85,7 @@ void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
   like.settings = settings;
   const RobotAssets all = robot_assets(robot, options.robot.shapes(), "", like);
   const PackagePaths paths = package_paths(options.mesh, options.robot);
-  LinkMeshes meshes(options.mesh, settings.mesh);
+  LinkMeshes meshes(options.mesh, settings.mesh, options.robot.repaired);
   std::vector<std::optional<ClosedMesh>> closed;
   for (std::size_t i = 0; i < all.jobs.size(); ++i)
     closed.push_back(meshes.close(
@@ -179,7 +179,7 @@ void add_bake(CLI::App& app) {
       "bake", "Pack a closed mesh with spheres and write an .ist asset, or many with --manifest");
   CLI::Option* const mesh =
       add_input(command, "MESH", options->mesh,
-                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf, .xml")
+                "OBJ, STL, PLY, OFF, GLB/glTF, DAE, VDB, …; or a robot: .urdf, .sdf, .xml")
           ->required(false);
   add_output(command, options->output,
              "The .ist file to write. With --manifest: the folder for NAME.ist. For a robot: the "

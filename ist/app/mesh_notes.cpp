@@ -37,16 +37,24 @@ ClosedMesh close_better(TriangleMesh mesh, const std::string& name, const MeshSe
 
 }  // namespace
 
+bool LinkMeshes::repairs(const std::vector<std::string>& links) const {
+  return settings_.repair || std::any_of(links.begin(), links.end(), [&](const std::string& link) {
+           return std::count(repaired_.begin(), repaired_.end(), link) != 0;
+         });
+}
+
 std::optional<ClosedMesh> LinkMeshes::close(const std::vector<std::string>& links,
                                             const std::function<TriangleMesh()>& make,
                                             const Otherwise& otherwise) {
+  MeshSettings settings = settings_;
+  settings.repair = repairs(links);
   for (const std::string& name : links) {
     try {
       const std::string whose = fmt::format("{}: link {}", robot_, name);
       TriangleMesh mesh = make();
       ClosedMesh closed = [&] {
         try {
-          return close_better(std::move(mesh), whose, settings_);
+          return close_better(std::move(mesh), whose, settings);
         } catch (const OpenMeshError& error) {
           if (otherwise)
             if (auto other = otherwise(error.what())) return std::move(*other);
@@ -82,8 +90,10 @@ void LinkMeshes::finish() const {
   if (faults_.size() == 1) throw Error(faults_[0]);
   if (faults_.empty()) return;
   for (const std::string& fault : faults_) spdlog::error("{}", fault);
-  throw Error(fmt::format("{}: {} links failed; nothing was written. --skip LINK leaves one out",
-                          robot_, faults_.size()));
+  throw Error(fmt::format(
+      "{}: {} links failed; nothing was written. --repair-link LINK repairs one, --skip "
+      "LINK leaves one out",
+      robot_, faults_.size()));
 }
 
 void warn_of_left_out(const std::vector<std::string>& links, const std::string& robot) {

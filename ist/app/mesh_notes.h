@@ -18,8 +18,9 @@ namespace ist::app {
 /// faults of each link, and warnings that differ in numbers alone in one line.
 class LinkMeshes {
  public:
-  LinkMeshes(std::string robot, MeshSettings settings)
-      : robot_(std::move(robot)), settings_(settings) {}
+  /// `repaired`: links that are repaired, whatever the settings.
+  LinkMeshes(std::string robot, MeshSettings settings, std::vector<std::string> repaired)
+      : robot_(std::move(robot)), settings_(settings), repaired_(std::move(repaired)) {}
 
   /// What stands for a mesh that cannot be closed, and why it cannot; nothing: that is a fault.
   using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
@@ -30,6 +31,9 @@ class LinkMeshes {
   std::optional<ClosedMesh> close(const std::vector<std::string>& links,
                                   const std::function<TriangleMesh()>& make,
                                   const Otherwise& otherwise = {});
+
+  /// Whether one of these links is to be repaired.
+  bool repairs(const std::vector<std::string>& links) const;
 
   /// Throws Error if any link failed.
   void finish() const;
@@ -45,6 +49,7 @@ class LinkMeshes {
   };
   const std::string robot_;
   const MeshSettings settings_;
+  const std::vector<std::string> repaired_;
   std::vector<std::string> faults_;
   std::map<std::string, Warning> warnings_;
 };

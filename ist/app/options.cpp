@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <tuple>
 
 #include "bake/asset/atomic_file.h"
 
@@ -69,19 +70,23 @@ void add_robot_options(CLI::App* command, RobotOptions& options) {
       ->take_all();
   command->add_flag("--visual", options.visual,
                     "Robots: use visual shapes instead of collision shapes");
-  command->add_option("--skip", options.skipped, "Robots: leave this link out. Repeatable")
-      ->type_name("LINK")
-      ->expected(1)
-      ->take_all();
+  for (const auto& [name, links, help] :
+       {std::tuple("--skip", &options.skipped, "Robots: leave this link out. Repeatable"),
+        std::tuple("--repair-link", &options.repaired,
+                   "Robots: as --repair, for this link alone. Repeatable")})
+    command->add_option(name, *links, help)->type_name("LINK")->expected(1)->take_all();
 }
 
 void refuse_idle_options(const RobotOptions& options, const std::string& input) {
   if (is_robot_file(input)) return;
-  if (!options.visual && options.packages.empty() && options.skipped.empty()) return;
-  throw CLI::ValidationError(options.visual             ? "--visual"
-                             : options.packages.empty() ? "--skip"
-                                                        : "--package",
-                             "has no effect: '" + input + "' is not a robot (.urdf, .xml)");
+  const char* const given = options.visual              ? "--visual"
+                            : !options.packages.empty() ? "--package"
+                            : !options.skipped.empty()  ? "--skip"
+                            : !options.repaired.empty() ? "--repair-link"
+                                                        : nullptr;
+  if (given == nullptr) return;
+  throw CLI::ValidationError(given,
+                             "has no effect: '" + input + "' is not a robot (.urdf, .xml, .sdf)");
 }
 
 bool is_robot_file(const std::string& path) {
@@ -89,7 +94,7 @@ bool is_robot_file(const std::string& path) {
   if (ending == ".xacro")
     throw Error(path + ": is a macro file, not a URDF; expand it: xacro " + path +
                 " -o robot.urdf");
-  return ending == ".urdf" || ending == ".xml" || ending == ".mjcf";
+  return ending == ".urdf" || ending == ".xml" || ending == ".mjcf" || ending == ".sdf";
 }
 
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,

@@ -34,14 +34,14 @@ void add_setting_options(CLI::App* command, SettingOptions& options,
 /// To be called once all are parsed. Throws (exit code 2) if they do not go together.
 void complete_settings(SettingOptions& options);
 
-/// Adds --package, --visual and --skip.
+/// Adds --package, --visual, --skip and --repair-link.
 void add_robot_options(CLI::App* command, RobotOptions& options);
 
 /// Throws (exit code 2) where options of a robot are given with what is none.
 void refuse_idle_options(const RobotOptions& options, const std::string& input);
 
-/// It ends in .urdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which is to
-/// be expanded.
+/// It ends in .urdf or .sdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which
+/// is to be expanded.
 bool is_robot_file(const std::string& path);
 
 /// An argument or option that names a file to read, required unless the caller says otherwise; ""

@@ -185,6 +185,12 @@ std::vector<LinkSpheres> SphereRobot::spheres() const {
   return out;
 }
 
+std::vector<LinkSpheres> SphereRobot::covers() const {
+  std::vector<LinkSpheres> out = spheres();
+  for (std::size_t i = 0; i < out.size(); ++i) out[i].spheres = links[i].cover.spheres;
+  return out;
+}
+
 SphereWriter sphere_writer(const std::string& output) {
   const std::string ending = ending_of(output);
   if (ending == ".json")

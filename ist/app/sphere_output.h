@@ -39,6 +39,7 @@ struct SphereRobot {
   }
   bool is_robot() const { return !robot.file.bytes.empty(); }
   std::vector<LinkSpheres> spheres() const;  ///< as files hold them
+  std::vector<LinkSpheres> covers() const;   ///< the same, with spheres that contain capsules
 };
 
 /// The file's text, by its ending. Throws Error.

@@ -3,11 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <map>
 #include <memory>
-#include <tuple>
 
 #include <ist/bake.h>
 #include <ist/cover_spheres.h>
@@ -18,6 +18,7 @@
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "app/progress_line.h"
+#include "app/refine_covers.h"
 #include "app/sphere_output.h"
 #include "library/exported_spheres.h"
 #include "library/link_solids.h"
@@ -91,7 +92,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   out.name = out.robot.name;
   for (const auto& [name, count] : options.counts) require_link(out.robot, name);
   const PackagePaths paths = package_paths(options.input, options.robot);
-  LinkMeshes meshes(options.input, options.closing.settings.mesh);
+  LinkMeshes meshes(options.input, options.closing.settings.mesh, options.robot.repaired);
   out.left_out = links_seen_only(out.robot, options.robot);
   warn_of_left_out(out.left_out, options.input);
   for (const RobotLink& link : out.robot.links) {
@@ -116,7 +117,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
     }
     // What cannot be closed is enclosed, if that is asked for.
     const auto otherwise = [&](const std::string& why) -> std::optional<ClosedMesh> {
-      if (!options.closing.settings.mesh.repair) return std::nullopt;
+      if (!meshes.repairs({link.name})) return std::nullopt;
       spdlog::warn("{}; a bounding capsule stands for link {}", why, link.name);
       one.bounding_capsule = true;
       const ClosedMesh open = {one.read, {}, link.name, {}};
@@ -242,89 +243,6 @@ WantedPose wanted_pose(const RobotModel& robot, const SpheresOptions& options) {
   return wanted;
 }
 
-std::vector<CoverSphere> with_given(const SphereLink& link, std::vector<CoverSphere> spheres) {
-  spheres.insert(spheres.begin(), link.given.begin(), link.given.end());
-  return spheres;
-}
-
-/// What the mesh that was covered lacks of the one that was read.
-void cover_what_was_read(SphereLink& link) {
-  extend_cover(link.read, link.cover);
-  if (!link.bounding_capsule) return;
-  SphereProtrusion& p = link.cover.protrusion;  // known of the capsule alone
-  p.largest = p.mean = p.p95 = p.volume_ratio = std::numeric_limits<double>::quiet_NaN();
-}
-
-/// Covers the links again whose spheres call most free poses colliding, with more spheres, until
-/// few are.
-void refine(SphereRobot& input, const SpheresOptions& options, SelfCollisionStudy& study,
-            const ProgressCallback& progress) {
-  constexpr double kEnough = 0.1, kWorse = 0.5, kMore = 1.6;
-  constexpr std::size_t kMostOfALink = 32;  // on average
-  constexpr int kRounds = 8;
-  const auto links_of = [&] {
-    std::vector<LinkSpheres> links = input.spheres();
-    for (std::size_t i = 0; i < links.size(); ++i) links[i].spheres = input.links[i].cover.spheres;
-    return links;
-  };
-  input.self = study.of(links_of(), options.kind == Kind::cover || options.kind == Kind::capsules);
-  if (!options.refined()) return;
-  std::size_t count = 0;
-  std::map<std::string, std::size_t> counts;
-  for (const SphereLink& link : input.links)
-    count += counts[link.name] = link.cover.spheres.size() - link.given.size();
-  const std::size_t most = std::max(count, kMostOfALink * input.links.size());
-  double least = input.self.false_share();
-  std::pair best(input.links, input.self);
-  for (int round = 0; round < kRounds && input.self.false_share() > kEnough; ++round) {
-    // Of two links the one whose spheres protrude more is to blame more.
-    std::map<std::string, double> protrusions, faults;
-    for (const SphereLink& link : input.links)
-      protrusions[link.name] = link.has_mesh ? link.cover.protrusion.largest : 0;
-    double worst = 0;
-    for (const LinkPair& pair : input.self.pairs) {
-      const double both = protrusions[pair.a] + protrusions[pair.b];
-      for (const std::string& link : {pair.a, pair.b})
-        if (both > 0)
-          worst = std::max(
-              worst, faults[link] += static_cast<double>(pair.falsely) * protrusions[link] / both);
-    }
-    std::vector<ClosedMesh> meshes;
-    std::vector<SphereLink*> links;
-    SphereCoverSettings settings = options.cover;
-    std::size_t next = 0;
-    for (SphereLink& link : input.links) {
-      const ClosedMesh* const mesh = link.has_mesh ? &input.meshes[next++] : nullptr;
-      if (mesh == nullptr || options.counts.contains(link.name) || link.bounding_capsule ||
-          !(faults[link.name] > kWorse * worst))
-        continue;
-      const std::size_t own = counts[link.name];
-      const auto more = static_cast<std::size_t>(std::ceil(kMore * static_cast<double>(own)));
-      settings.counts.push_back(std::min(more, kMostCoverSpheres));
-      counts[link.name] = settings.counts.back();
-      count += settings.counts.back() - own;
-      meshes.push_back(*mesh);
-      links.push_back(&link);
-    }
-    if (links.empty() || count > most) break;
-    std::vector<SphereCover> covers = cover_with_spheres(meshes, settings, progress);
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      covers[i].seconds += links[i]->cover.seconds;
-      covers[i].protrusion.largest += links[i]->slack;
-      links[i]->proof = prove_cover(meshes[i], covers[i].spheres);
-      covers[i].spheres = with_given(*links[i], std::move(covers[i].spheres));
-      links[i]->cover = std::move(covers[i]);
-      cover_what_was_read(*links[i]);
-    }
-    input.self = study.of(links_of(), true);
-    if (input.self.false_share() < least) {
-      least = input.self.false_share();
-      best = {input.links, input.self};
-    }
-  }
-  if (input.self.false_share() > least) std::tie(input.links, input.self) = std::move(best);
-}
-
 void compare_links(SphereRobot& input, const SpheresOptions& options,
                    const ProgressCallback& progress) {
   LinkSolids solids;
@@ -345,7 +263,9 @@ void compare_links(SphereRobot& input, const SpheresOptions& options,
         return solids.overlap(a, b, b_in_a);
       },
       wanted_pose(input.robot, options));
-  refine(input, options, study, progress);
+  input.self =
+      study.of(input.covers(), options.kind == Kind::cover || options.kind == Kind::capsules);
+  if (options.refined()) refine_covers(input, study, options.cover, options.counts, progress);
   if (constexpr double kMany = 0.1; input.self.false_share() > kMany)
     spdlog::warn(
         "{}: the spheres call {:.0f} % of the free poses colliding: they are too coarse for "
@@ -392,8 +312,7 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
       link.cover.protrusion.largest += link.slack;
       ++next;
     }
-    link.cover.spheres = with_given(link, std::move(link.cover.spheres));
-    if (options.kind == Kind::cover) cover_what_was_read(link);
+    complete_cover(link, options.kind == Kind::cover);
     if (options.kind == Kind::cover && !link.proof.covered)
       throw Error(
           fmt::format("{}: link {}: cannot prove that the spheres contain it near ({:g}, {:g}, "
@@ -459,7 +378,7 @@ void add_spheres(CLI::App& app) {
   CLI::App* const command = app.add_subcommand(
       "spheres", "Write few spheres that provably contain each link of a robot, or a mesh");
   add_input(command, "INPUT", options->input,
-            "A robot (.urdf, or .xml of MuJoCo) or a mesh (OBJ, STL, PLY, …)");
+            "A robot (.urdf, .sdf, or .xml of MuJoCo) or a mesh (OBJ, STL, PLY, …)");
   add_output(command, options->output,
              "The file to write: .urdf (spheres as collisions), .yml (cuRobo), .xrdf, .srdf "
              "(MoveIt), .glb (links and spheres, for viewers) or .json",
@@ -555,7 +474,7 @@ void add_spheres(CLI::App& app) {
     if (!is_robot_file(options->input) && !(options->pose.empty() && options->srdf.empty()))
       throw CLI::ValidationError(
           options->pose.empty() ? "--srdf" : "--pose",
-          "has no effect: '" + options->input + "' is not a robot (.urdf, .xml)");
+          "has no effect: '" + options->input + "' is not a robot (.urdf, .xml, .sdf)");
     run_spheres(*options);
   });
 }

@@ -21,6 +21,8 @@ std::string field_spec_of(const Shape& shape) {
                        box->half_extents.z());
   if (const auto* cylinder = std::get_if<LinkCylinder>(&shape))
     return fmt::format("cylinder:{:.17g},{:.17g}", cylinder->radius, cylinder->half_height);
+  if (const auto* capsule = std::get_if<LinkCapsule>(&shape))
+    return fmt::format("capsule:{:.17g},{:.17g}", capsule->radius, capsule->half_height);
   return fmt::format("ball:{:.17g}", std::get<LinkBall>(shape).radius);
 }
 
@@ -38,7 +40,8 @@ bool equal(const PlacedShape& a, const PlacedShape& b) {
 
 RobotModel read_robot_for(const RobotOptions& options, const std::string& input) {
   RobotModel robot = read_robot(input);
-  for (const std::string& name : options.skipped) require_link(robot, name);
+  for (const auto* names : {&options.skipped, &options.repaired})
+    for (const std::string& name : *names) require_link(robot, name);
   bool any = false;
   for (RobotLink& link : robot.links) {
     if (std::count(options.skipped.begin(), options.skipped.end(), link.name) != 0) {

@@ -17,7 +17,8 @@ namespace ist {
 struct RobotOptions {
   std::map<std::string, std::string> packages;  ///< folders by package
   bool visual = false;
-  std::vector<std::string> skipped;  ///< links that are left out
+  std::vector<std::string> skipped;   ///< links that are left out
+  std::vector<std::string> repaired;  ///< links that are repaired, though the others are not
 
   LinkShapes shapes() const { return visual ? LinkShapes::visual : LinkShapes::collision; }
 };

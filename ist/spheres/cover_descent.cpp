@@ -266,7 +266,8 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
     for (const Vector3d& p : points) {
       if (!seen.insert(cell_key(p, 0.2 * level)).second) continue;
       const ClosestPoint foot = solid_.closest_point(p);
-      sampled_.rays.push_back({foot.point, (p - foot.point) / foot.distance, foot.distance});
+      sampled_.rays.push_back({foot.point, (p - foot.point) / foot.distance, foot.distance,
+                               sampled_.share_at(foot.point)});
     }
   }
   return std::max(0.0, *std::max_element(further.begin(), further.end()));

@@ -275,8 +275,10 @@ std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, double cell) 
   return some;
 }
 
-SampledSolid sampled_for(const MeshSolid& solid, std::size_t count) {
-  return sample_solid(solid, std::clamp<std::size_t>(kTargetsABall * count, 1000, 60000));
+SampledSolid sampled_for(const MeshSolid& solid, std::size_t count,
+                         std::vector<TightPlace> tight = {}) {
+  return sample_solid(solid, std::clamp<std::size_t>(kTargetsABall * count, 1000, 60000),
+                      std::move(tight));
 }
 
 /// The lowest level at which a greedy choice of balls around the medial axis is enough.
@@ -350,7 +352,7 @@ std::size_t CoverSearch::greedy_count(double level) const {
 }
 
 std::vector<CoverSphere> CoverSearch::with_count(std::size_t count) const {
-  SampledSolid sampled = sampled_for(solid_, count);
+  SampledSolid sampled = sampled_for(solid_, count, tight_);
   look_(0.1);
   LevelCover start = greedy_cover(solid_, sampled, count);
   std::vector<CoverSphere> best;
@@ -368,7 +370,9 @@ std::vector<CoverSphere> CoverSearch::with_count(std::size_t count) const {
     if (start.level == before && pass > 0) break;
     LookedCover looked = CoverDescent(solid_, sampled).improve(std::move(start), kRounds, look);
     grow_to_cover(solid_, looked.balls, kFinest * looked.cover.level);
-    const double largest = largest_protrusion(solid_, looked.balls, 1.01 * looked.cover.level);
+    const double largest = tight_.empty()
+                               ? largest_protrusion(solid_, looked.balls, 1.01 * looked.cover.level)
+                               : looked.cover.level;
     start = std::move(looked.cover);
     if (largest < least) {
       least = largest;

@@ -21,8 +21,10 @@ class [[gnu::visibility("hidden")]] CoverSearch {
  public:
   /// `look`: called now and then, from any thread, with the share [0, 1] that is done at least;
   /// what it throws ends the search.
-  CoverSearch(const MeshSolid& solid, std::uint64_t seed, std::function<void(double)> look)
-      : solid_(solid), seed_(seed), look_(std::move(look)) {}
+  /// `tight`: unit frame.
+  CoverSearch(const MeshSolid& solid, std::uint64_t seed, std::function<void(double)> look,
+              std::vector<TightPlace> tight = {})
+      : solid_(solid), seed_(seed), look_(std::move(look)), tight_(std::move(tight)) {}
 
   /// `count` balls, or fewer where fewer do as well.
   std::vector<CoverSphere> with_count(std::size_t count) const;
@@ -34,6 +36,7 @@ class [[gnu::visibility("hidden")]] CoverSearch {
   const MeshSolid& solid_;
   const std::uint64_t seed_;
   const std::function<void(double)> look_;
+  const std::vector<TightPlace> tight_;
 };
 
 /// A choice of `count` of the candidates that together hold all targets that any holds, if one is

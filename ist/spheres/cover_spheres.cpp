@@ -29,8 +29,9 @@ namespace {
 /// Equal meshes of which as many spheres are asked for, and their covers by count.
 struct CoverPart {
   const ClosedMesh* mesh;
-  std::size_t count;   ///< 0: a share of the total
-  std::size_t copies;  ///< meshes
+  std::size_t count;                     ///< 0: a share of the total
+  std::size_t copies;                    ///< meshes
+  const std::vector<TightPlace>* tight;  ///< null: none
   std::map<std::size_t, SphereCover> tried = {};
 };
 
@@ -48,12 +49,14 @@ std::vector<std::size_t> parts_of(std::span<const ClosedMesh> meshes,
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     std::size_t count = settings.counts.empty() ? 0 : settings.counts[i];
     if (count == 0 && settings.total == 0) count = settings.count;
+    const auto* const tight =
+        settings.tight.empty() || settings.tight[i].empty() ? nullptr : &settings.tight[i];
     const auto found = std::find_if(parts.begin(), parts.end(), [&](const CoverPart& part) {
-      return part.count == count && equal(*part.mesh, meshes[i]);
+      return part.count == count && part.tight == tight && equal(*part.mesh, meshes[i]);
     });
     part_of.push_back(static_cast<std::size_t>(found - parts.begin()));
     if (found == parts.end())
-      parts.push_back({&meshes[i], count, 1});
+      parts.push_back({&meshes[i], count, 1, tight});
     else
       ++found->copies;
   }
@@ -177,8 +180,18 @@ void check(const SphereCoverSettings& settings, std::size_t meshes) {
                   std::to_string(kMostCoverSpheres));
   if (!(settings.max_protrusion >= 0) || !std::isfinite(settings.max_protrusion))
     throw Error("cover: the largest protrusion must be finite and 0 or more");
-  if (settings.total > 0 && settings.max_protrusion > 0)
-    throw Error("cover: total and max_protrusion exclude each other");
+  if ((settings.total > 0) + (settings.max_protrusion > 0) + !settings.tight.empty() > 1)
+    throw Error("cover: total, max_protrusion and tight exclude each other");
+  if (!settings.tight.empty() && settings.tight.size() != meshes)
+    throw Error("cover: " + std::to_string(settings.tight.size()) + " lists of tight places for " +
+                std::to_string(meshes) + " meshes");
+  for (const auto& places : settings.tight)
+    for (const TightPlace& one : places)
+      if (!one.centre.allFinite() || !(one.radius > 0) || !std::isfinite(one.radius) ||
+          !(one.share > 0) || !(one.share <= 1))
+        throw Error(
+            "cover: a tight place needs a finite centre, a finite radius above 0 and a "
+            "share above 0 and at most 1");
 }
 
 SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& balls) {
@@ -223,15 +236,24 @@ SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
   return best;
 }
 
-SphereCover cover_one(const ClosedMesh& mesh, const SphereCoverSettings& settings, Watch& watch) {
+SphereCover cover_one(const CoverPart& part, const SphereCoverSettings& settings, Watch& watch) {
   const auto start = std::chrono::steady_clock::now();
-  const MeshSolid solid(mesh);
+  const MeshSolid solid(*part.mesh);
+  std::vector<TightPlace> tight;
+  if (part.tight != nullptr) tight = *part.tight;
+  for (TightPlace& one : tight) {
+    one.centre = solid.closest_point(solid.frame().to_unit(one.centre)).point;
+    one.radius /= solid.frame().scale();
+  }
   std::atomic<double> done = 0;
-  const CoverSearch search(solid, settings.seed, [&](double share) {
-    const double before = done.load();
-    if (share > before) done = share;  // one thread at a time gets further
-    watch.look(before, std::max(before, share));
-  });
+  const CoverSearch search(
+      solid, settings.seed,
+      [&](double share) {
+        const double before = done.load();
+        if (share > before) done = share;  // one thread at a time gets further
+        watch.look(before, std::max(before, share));
+      },
+      std::move(tight));
   SphereCover cover = settings.max_protrusion > 0
                           ? fewest(solid, search, settings)
                           : finished(solid, search.with_count(settings.count));
@@ -252,7 +274,7 @@ void try_counts(std::vector<CoverPart>& parts, const std::vector<std::size_t>& c
           if (parts[i].tried.contains(own.count))
             watch.look(0, 1);
           else
-            parts[i].tried[own.count] = cover_one(*parts[i].mesh, own, watch);
+            parts[i].tried[own.count] = cover_one(parts[i], own, watch);
         }
       },
       tbb::simple_partitioner());

@@ -24,29 +24,39 @@ double depth_in(const MeshSolid& solid, const Vector3d& point) {
 }
 
 OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level)
-    : solid_(&solid), level_(level), spacing_(sampled.spacing) {
-  std::vector<Vector3d> points, normals;
+    : solid_(&solid), level_(level), spacing_(sampled.spacing), least_(level) {
+  std::vector<Vector3d> points, normals, tight;
   Eigen::AlignedBox3d box;
   for (const OutwardRay& ray : sampled.rays) {
-    if (ray.reach < level) continue;
-    points.push_back(ray.foot + level * ray.direction);
+    const double here = level * ray.share;
+    if (ray.reach < here) continue;
+    points.push_back(ray.foot + here * ray.direction);
+    if (ray.share < 1) tight.push_back(points.back());
+    least_ = std::min(least_, here);
     normals.push_back(ray.direction);
     box.extend(points.back());
   }
   largest_ = points.empty() ? kLargest : std::min(kLargest, 0.51 * box.sizes().minCoeff() + 1e-3);
   points_ = PointGrid(points);
+  tight_ = PointGrid(tight);
   for (std::uint32_t i = 0; i < points_.size(); ++i) normals_.push_back(normals[points_.index(i)]);
 }
 
 double OffsetSurface::radius(const Vector3d& centre, double depth) const {
+  // By so much a point beside the nearest place is further than that.
+  const auto coarse = [&](double seen) { return spacing_ * spacing_ / (2 * seen); };
+  const auto kept = [&](double radius) {
+    const PointGrid::Nearest near = tight_.nearest(centre, radius, radius);
+    if (near.place == UINT32_MAX) return radius;
+    const double seen = std::sqrt(double{near.distance2});
+    return std::min(radius, std::max({0.0, least_ + depth, seen - coarse(seen)}));
+  };
   const double sure = std::max(0.0, level_ + depth);
   const PointGrid::Nearest near = points_.nearest(centre, sure + 0.2 * level_, kLargest);
-  if (near.place == UINT32_MAX) return std::max(sure, kLargest);
-  if ((points_.point(near.place) - centre).dot(normals_[near.place]) < 0) return sure;
+  if (near.place == UINT32_MAX) return kept(std::max(sure, kLargest));
+  if ((points_.point(near.place) - centre).dot(normals_[near.place]) < 0) return kept(sure);
   const double seen = std::sqrt(double{near.distance2});
-  // By so much a point beside the nearest place is further than that.
-  const double coarse = spacing_ * spacing_ / (2 * seen);
-  return std::max(sure, seen - coarse);
+  return kept(std::max(sure, seen - coarse(seen)));
 }
 
 double OffsetSurface::sure_radius(const Vector3d& centre) const {

@@ -12,8 +12,8 @@ namespace ist {
 /// [unit frame] How deep a point lies in the solid, below 0 outside; to float rounding.
 double depth_in(const MeshSolid& solid, const Eigen::Vector3d& point);
 
-/// The places at one distance from a solid, `level`, by points. A ball within them protrudes by no
-/// more than `level`, as far as the points tell.
+/// The places at one distance from a solid, `level`, by points; a share of it where the solid is
+/// tight. A ball within them protrudes by no more, as far as the points tell.
 class [[gnu::visibility("hidden")]] OffsetSurface {
  public:
   OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level);
@@ -41,9 +41,10 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
  private:
   const MeshSolid* solid_;
   double level_, spacing_;
-  double largest_;  ///< no ball inside is larger
-  PointGrid points_;
-  std::vector<Eigen::Vector3d> normals_;  ///< by the grid's places
+  double least_;                          ///< level of all places
+  double largest_;                        ///< no ball inside is larger
+  PointGrid points_, tight_;              ///< all; those at less than the level
+  std::vector<Eigen::Vector3d> normals_;  ///< by the places of points_
 };
 
 }  // namespace ist

@@ -176,7 +176,17 @@ std::vector<Vector3d> points_inside(const MeshSolid& solid, double spacing) {
 
 }  // namespace
 
-SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets) {
+double SampledSolid::share_at(const Vector3d& foot) const {
+  double share = 1;
+  for (const TightPlace& one : tight) {
+    const double away = std::sqrt((foot - one.centre).squaredNorm()) / one.radius;
+    share = std::min(share, one.share + (1 - one.share) * std::max(0.0, away - 1));
+  }
+  return share;
+}
+
+SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets,
+                          std::vector<TightPlace> tight) {
   const MeshView& mesh = solid.view();
   const std::vector<Face> faces = faces_of(mesh);
   double area = 0;
@@ -204,6 +214,8 @@ SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets) {
   fine.insert(fine.end(), coarse.begin(), coarse.end());
   fine.insert(fine.end(), edges.fans.begin(), edges.fans.end());
   out.rays = rays_of(solid, fine);
+  out.tight = std::move(tight);
+  for (OutwardRay& ray : out.rays) ray.share = out.share_at(ray.foot);
   for (const Sample& s : coarse) out.targets.push_back(s.point);
   out.targets.insert(out.targets.end(), edges.points.begin(), edges.points.end());
   const std::vector<Vector3d> inside = points_inside(solid, 2 * out.spacing);

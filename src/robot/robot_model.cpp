@@ -13,6 +13,7 @@
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
 #include "robot/read_mjcf.h"
+#include "robot/read_sdf.h"
 
 namespace ist {
 namespace {
@@ -42,7 +43,9 @@ class RobotReader {
 
   void read() {
     if (xml_[0].name != "robot")
-      xml_.fail(0, "is not a robot: a URDF begins with <robot name=\"…\">, an MJCF with <mujoco>");
+      xml_.fail(0,
+                "is not a robot: a URDF begins with <robot name=\"…\">, an MJCF with "
+                "<mujoco>, an SDF with <sdf>");
     robot_.name = decoded(xml_.attribute(0, "name"));
     for (std::uint32_t e = xml_[0].first_child; e != kNoElement; e = xml_[e].next_sibling) {
       if (xml_[e].name == "link") read_link(e);
@@ -285,7 +288,9 @@ class RobotReader {
 }  // namespace
 
 RobotModel read_robot(SourceFile file) {
-  if (XmlDocument(file)[0].name == "mujoco") return read_mjcf(std::move(file));
+  const std::string root(XmlDocument(file)[0].name);
+  if (root == "mujoco") return read_mjcf(std::move(file));
+  if (root == "sdf") return read_sdf(std::move(file));
   RobotModel robot;
   robot.file = std::move(file);
   RobotReader(robot).read();

@@ -84,7 +84,7 @@ struct RobotJoint {
 /// Links and joints in the order of the file; its bytes are kept.
 struct RobotModel {
   SourceFile file;
-  bool is_urdf = true;  ///< else of MuJoCo
+  bool is_urdf = true;  ///< else an MJCF or SDF
   std::string name;
   std::vector<RobotLink> links;
   std::vector<RobotJoint> joints;
@@ -94,10 +94,11 @@ struct RobotModel {
   std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
 };
 
-/// Reads a URDF, or an MJCF as read_mjcf() does. Strict where a mistake would move or lose a shape:
-/// numbers must be finite, lengths above 0, joints must make one tree of the links. A visual shape
-/// that is wrong becomes a LinkFault. What is neither a link's shape nor a joint is not looked at.
-/// Document types are refused, and with them entities. Throws Error (file, line, what, way out).
+/// Reads a URDF, or an MJCF or SDF as read_mjcf() and read_sdf() do. Strict where a mistake would
+/// move or lose a shape: numbers must be finite, lengths above 0, joints must make one tree of the
+/// links. A visual shape that is wrong becomes a LinkFault. What is neither a link's shape nor a
+/// joint is not looked at. Document types are refused, and with them entities. Throws Error (file,
+/// line, what, way out).
 RobotModel read_robot(const std::string& path);
 
 /// The same of a file already in memory.

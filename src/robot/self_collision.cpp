@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
 #include <random>
 
 namespace ist {
@@ -40,6 +41,25 @@ bool overlap(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
       if (meet(p, q, centre)) return true;
   }
   return false;
+}
+
+/// Where they overlap most, if they do.
+std::optional<FalseMeeting> meeting(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
+  std::optional<FalseMeeting> where;
+  double most = 0;
+  for (const CoverSphere& q : b.spheres) {
+    const Vector3d centre = b_in_a * q.centre;
+    for (const CoverSphere& p : a.spheres) {
+      const Vector3d way = centre - p.centre;
+      const double apart = std::sqrt(way.squaredNorm());
+      const double depth = p.radius + q.radius - apart;
+      if (!(depth > most) || apart == 0) continue;
+      most = depth;
+      const Vector3d middle = p.centre + (p.radius - depth / 2) / apart * way;
+      where = FalseMeeting{0, 0, middle, b_in_a.inverse() * middle};
+    }
+  }
+  return where;
 }
 
 std::vector<Body> bodies_of(std::span<const LinkSpheres> links) {
@@ -241,6 +261,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
   out.samples = half_;
   out.locked = locked_;
   out.pairs.resize(pairs_.size());
+  std::vector<std::vector<FalseMeeting>> meetings(pairs_.size());
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
     Pair& pair = pairs_[i];
     LinkPair& told = out.pairs[i];
@@ -251,12 +272,18 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       return;
     }
     std::size_t solids = 0, spheres = 0;
+    const bool opens = std::all_of(pair.free.begin(), pair.free.end(), [&](std::size_t j) {
+      return locked_.contains(j);
+    });                                          // or closes: no concern of a planner
     told.tried = pair.free.empty() ? 1 : half_;  // one that cannot move is what it is
     for (std::size_t k = 0; k < told.tried; ++k) {
       bool by_spheres = false, by_solids = false;
       look(pair, k, by_spheres, by_solids);
       solids += by_solids ? 1 : 0;
       spheres += by_spheres ? 1 : 0;
+      if (!by_spheres || by_solids || opens) continue;
+      if (auto one = meeting(bodies[pair.a], bodies[pair.b], pair.b_in_a(robot_, samples_[k])))
+        meetings[i].push_back({pair.a, pair.b, one->in_a, one->in_b});
     }
     const bool always = solids == told.tried;
     // A pair whose spheres rarely overlap costs little: it is compared rather than trusted.
@@ -267,7 +294,10 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
     };
     if ((never || always) && (pair.free.empty() || holds(pair, always, apart, told.tried)))
       told.ignored = always ? "Always" : "Never";
+    if (!told.ignored.empty()) meetings[i].clear();
   });
+  for (const auto& some : meetings)
+    out.meetings.insert(out.meetings.end(), some.begin(), some.end());
   choose_pose(bodies, cover, out);
   std::vector<std::uint8_t> calls(half_), truths(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {

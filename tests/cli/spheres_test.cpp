@@ -303,7 +303,86 @@ TEST_F(RobotCommands, AllOpenLinksAreReportedAtOnce) {
                   .exit_code,
               0);
   }
+  // One of them is repaired, the other still a fault.
+  const Outcome one = ist({"spheres", "two.urdf", "-o", "o.json", "--repair-link", "first"});
+  EXPECT_EQ(one.exit_code, 1);
+  EXPECT_EQ(one.err.find("error: two.urdf: link first"), std::string::npos) << one.err;
+  EXPECT_NE(one.err.find("error: two.urdf: link second"), std::string::npos) << one.err;
+  const Outcome both = ist({"spheres", "two.urdf", "-o", "o.json", "--repair-link", "first",
+                            "--repair-link", "second", "--count", "2"});
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  expect_error({"spheres", "two.urdf", "-o", "o.json", "--repair-link", "frst"}, 1,
+               "did you mean 'first'");
+  expect_error({"spheres", "cube.obj", "-o", "o.json", "--repair-link", "a"}, 2, "is not a robot");
   expect_error({"spheres", "r.urdf.xacro", "-o", "o.json"}, 1, "xacro r.urdf.xacro -o");
+}
+
+/// An arm that turns close above its base: spheres that are as coarse there as elsewhere call every
+/// pose colliding.
+TEST_F(RobotCommands, SpheresAreFineWhereLinksPassClose) {
+  write("near.urdf",
+        "<robot name='near'><link name='base'><collision><geometry><box size='0.6 0.4 0.2'/>"
+        "</geometry></collision></link><link name='mid'><collision><geometry><sphere "
+        "radius='0.02'/></geometry></collision></link><link name='arm'><collision><origin xyz='0.4 "
+        "0 0'/><geometry><box size='1 0.2 0.2'/></geometry></collision></link>"
+        "<joint name='j' type='revolute'><parent link='base'/><child link='mid'/><origin xyz='0 0 "
+        "0.33'/><axis xyz='0 0 1'/><limit lower='-3' upper='3'/></joint>"
+        "<joint name='k' type='revolute'><parent link='mid'/><child link='arm'/><axis xyz='0 1 0'/>"
+        "<limit lower='-0.9' upper='0.4'/></joint></robot>");
+  const auto made = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"spheres", "near.urdf", "-o", "n.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = ist(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return Json::parse(read("n.json"));
+  };
+  const auto share = [](const Json& self) {
+    return self["false"].get<double>() /
+           (self["samples"].get<double>() - self["colliding"].get<double>());
+  };
+  EXPECT_GT(share(made({"--count", "8"})["self_collision"]), 0.5);
+  const Json fine = made({});
+  EXPECT_LT(share(fine["self_collision"]), 0.2);
+  EXPECT_EQ(fine["self_collision"]["missed"], 0);
+  std::size_t count = 0;
+  for (const Json& link : fine["links"]) {
+    count += link["spheres"].size();
+    EXPECT_TRUE(link["covered"].get<bool>());
+  }
+  EXPECT_LE(count, 96u);
+}
+
+TEST_F(RobotCommands, AnSdfIsRead) {
+  write(
+      "r.sdf",
+      "<sdf version='1.9'><model name='m'><link name='a'><collision name='c'><geometry><mesh><uri>"
+      "cube.obj</uri></mesh></geometry></collision></link></model></sdf>");
+  const Outcome outcome = ist({"spheres", "r.sdf", "-o", "o.json", "--count", "4"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(Json::parse(read("o.json"))["links"]["a"]["covered"].get<bool>());
+  expect_error({"spheres", "r.sdf", "-o", "o.yml"}, 1, "needs the robot as a URDF");
+  EXPECT_EQ(ist({"bake", "r.sdf", "-o", "baked", "--spheres", "20"}).exit_code, 0);
+}
+
+TEST_F(RobotCommands, ABakeNamesEachPrimitiveAsAField) {
+  const auto link = [](const std::string& shape) {
+    return "<collision><geometry>" + shape + "</geometry></collision>";
+  };
+  write("p.urdf", "<robot name='p'><link name='a'>" + link("<mesh filename='cube.obj'/>") +
+                      link("<box size='2 4 6'/>") + link("<cylinder radius='1' length='4'/>") +
+                      link("<capsule radius='1' length='3'/>") + link("<sphere radius='0.5'/>") +
+                      "</link></robot>");
+  const Outcome outcome = ist({"bake", "p.urdf", "-o", "p", "--spheres", "20"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Json shapes = Json::parse(read("p/p.json"))["links"]["a"];
+  ASSERT_EQ(shapes.size(), 5u);
+  const std::vector<std::string> fields = {"box:1,2,3", "cylinder:1,2", "capsule:1,1.5",
+                                           "ball:0.5"};
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    EXPECT_EQ(shapes[i + 1]["field"], fields[i]);
+    const Outcome asked = ist({"query", fields[i], "p/a.ist", "--pose", "1,0,0,0,0,0,0"});
+    EXPECT_EQ(asked.exit_code, 0) << asked.err;
+  }
 }
 
 TEST_F(RobotCommands, WarningsOfAKindAreOneLine) {

@@ -267,6 +267,48 @@ TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
   }
 }
 
+/// [u] The largest distance, of points of spheres with x above `from`, from the box.
+double protrusion_above(double from, const SphereCover& cover, const Eigen::AlignedBox3d& box) {
+  double most = 0;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  for (const CoverSphere& s : cover.spheres)
+    for (int i = 0; i < 2000; ++i) {
+      const Vector3d x =
+          s.centre +
+          s.radius * Vector3d(normal(random), normal(random), normal(random)).normalized();
+      if (x.x() > from) most = std::max(most, box.exteriorDistance(x));
+    }
+  return most;
+}
+
+TEST(CoverSpheres, ProtrudeLessWherePlacesAreTight) {
+  const Eigen::AlignedBox3d box(Vector3d(0, 0, 0), Vector3d(4, 0.5, 0.4));
+  const ClosedMesh mesh = close_mesh(box_mesh(box.min(), box.max()), "bar");
+  SphereCoverSettings settings;
+  settings.count = 40;
+  const double even = cover_with_spheres(mesh, settings).protrusion.largest;
+  settings.tight = {{{Vector3d(4, 0.25, 0.2), 0.4, 0.3}}};
+  const SphereCover cover = cover_with_spheres(mesh, settings);
+  EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
+  EXPECT_LE(cover.spheres.size(), 40u);
+  EXPECT_LT(protrusion_above(3.7, cover, box), 0.7 * even);
+  EXPECT_LT(cover.protrusion.largest, 1.7 * even);
+  // Equal meshes of which one has tight places are not covered alike.
+  settings.tight.push_back({});
+  const std::vector<ClosedMesh> both = {mesh, mesh};
+  const std::vector<SphereCover> covers = cover_with_spheres(both, settings);
+  EXPECT_LT(covers[1].protrusion.largest, 1.01 * even);
+  EXPECT_GT(protrusion_above(3.7, covers[1], box), 0.7 * even);
+  settings.tight.pop_back();
+  EXPECT_THROW(cover_with_spheres(both, settings), Error);
+  settings.tight[0][0].share = 0;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+  settings.tight[0][0].share = 0.5;
+  settings.max_protrusion = 1;
+  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
+}
+
 double away(const Vector3d& x, const CoverCapsule& capsule) {
   const Vector3d along = capsule.end - capsule.begin, d = x - capsule.begin;
   const double t = along.isZero() ? 0 : std::clamp(d.dot(along) / along.squaredNorm(), 0.0, 1.0);

@@ -186,6 +186,28 @@ TEST(SelfCollision, IgnoresNeighboursAndPairsWhoseSolidsNeverOrAlwaysOverlap) {
   EXPECT_TRUE(ignored_of(study(fat.robot, fat.spheres, 0.9)).contains("ac Always"));
 }
 
+/// Where spheres overlap though the solids do not, in both links' frames.
+TEST(SelfCollision, FalseMeetingsAreWhereSpheresOverlap) {
+  const Chain thin = chain(0.2);
+  const SelfCollision self = study(thin.robot, thin.spheres, 0.15);
+  ASSERT_FALSE(self.meetings.empty());
+  const auto depth = [&](std::size_t link, const Vector3d& x) {
+    double most = -1;
+    for (const CoverSphere& s : thin.spheres[link].spheres)
+      most = std::max(most, s.radius - (x - s.centre).norm());
+    return most;
+  };
+  for (const FalseMeeting& one : self.meetings) {
+    EXPECT_NE(one.a, one.b);
+    // Both spheres hold the place, as deep; the solids, 0.05 below, would touch at that depth.
+    EXPECT_NEAR(depth(one.a, one.in_a), depth(one.b, one.in_b), 1e-9);
+    EXPECT_GE(depth(one.a, one.in_a), 0);
+    EXPECT_LE(depth(one.a, one.in_a), 0.05 + 1e-9);
+  }
+  // Spheres that are the solids meet falsely nowhere.
+  EXPECT_TRUE(study(thin.robot, thin.spheres, 0.2).meetings.empty());
+}
+
 TEST(SelfCollision, NoPairIsIgnoredThatOverlapsInAFewPoses) {
   // The ends meet only where all three joints are folded almost wholly.
   const Chain rare = chain(0.4, "<limit lower='-3.14' upper='3.14'/>");

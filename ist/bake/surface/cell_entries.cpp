@@ -165,26 +165,44 @@ void for_cells_of(const BrickGrid& grid, const SurfaceBlock& block, std::uint32_
   });
 }
 
+/// A triangle meets a cell for each step of the grid along the longest edge of its box.
+std::size_t least_entries(const BrickGrid& grid, const std::vector<SurfaceBlock>& blocks) {
+  std::size_t count = 0;
+  for (const SurfaceBlock& block : blocks)
+    for (std::uint32_t lane = 0; lane < block.triangles; ++lane) {
+      const LaneCorners t = corners_of(block, lane);
+      const CellRange range = range_of(grid, t);
+      std::uint32_t longest = 0;
+      for (int k = 0; k < 3; ++k) longest = std::max(longest, range.end[k] - range.begin[k]);
+      count += longest;
+    }
+  return count;
+}
+
 }  // namespace
 
 std::optional<EntryCounts> count_entries(const BrickGrid& grid,
                                          const std::vector<SurfaceBlock>& blocks,
                                          std::size_t most) {
+  if (least_entries(grid, blocks) > most) return std::nullopt;
   const auto places = static_cast<std::size_t>(grid.brick_places());
   std::vector<std::uint64_t> cells(places);
   std::vector<std::uint32_t> entries(places);
-  std::vector<std::size_t> of_block(blocks.size());
+  std::atomic<std::size_t> all = 0;
   constexpr auto kRelaxed = std::memory_order_relaxed;
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-    for (std::uint32_t lane = 0; lane < blocks[b].triangles && of_block[b] <= most; ++lane)
+    for (std::uint32_t lane = 0; lane < blocks[b].triangles && all.load(kRelaxed) <= most; ++lane) {
+      std::size_t own = 0;
       for_cells_of(grid, blocks[b], lane, [&](std::uint64_t cell) {
         std::atomic_ref(cells[cell / 64]).fetch_or(std::uint64_t{1} << cell % 64, kRelaxed);
         std::atomic_ref(entries[cell / 64]).fetch_add(1, kRelaxed);
-        ++of_block[b];
+        ++own;
       });
+      all.fetch_add(own, kRelaxed);
+    }
   });
   EntryCounts counts;
-  for (const std::size_t some : of_block) counts.entries += some;
+  counts.entries = all;
   if (counts.entries > most) return std::nullopt;
   for (std::size_t i = 0; i < places; ++i) {
     counts.cells += static_cast<std::size_t>(std::popcount(cells[i]));
@@ -198,18 +216,22 @@ std::optional<EntryCounts> count_entries(const BrickGrid& grid,
 std::optional<std::vector<CellEntry>> find_entries(const BrickGrid& grid,
                                                    const std::vector<SurfaceBlock>& blocks,
                                                    std::size_t most) {
+  if (least_entries(grid, blocks) > most) return std::nullopt;
   std::vector<std::vector<CellEntry>> of_block(blocks.size());
+  std::atomic<std::size_t> all = 0;
   std::vector<std::uint32_t> place(static_cast<std::size_t>(grid.brick_places()) + 1);
   constexpr auto kRelaxed = std::memory_order_relaxed;
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
-    for (std::uint32_t lane = 0; lane < blocks[b].triangles && of_block[b].size() <= most; ++lane)
+    for (std::uint32_t lane = 0; lane < blocks[b].triangles && all.load(kRelaxed) <= most; ++lane) {
+      const std::size_t before = of_block[b].size();
       for_cells_of(grid, blocks[b], lane, [&](std::uint64_t cell) {
         of_block[b].push_back({cell, static_cast<std::uint32_t>(kWidth * b + lane)});
         std::atomic_ref(place[cell / 64 + 1]).fetch_add(1, kRelaxed);
       });
+      all.fetch_add(of_block[b].size() - before, kRelaxed);
+    }
   });
-  std::size_t count = 0;
-  for (const auto& some : of_block) count += some.size();
+  const std::size_t count = all;
   if (count > most) return std::nullopt;
   std::partial_sum(place.begin(), place.end(), place.begin());
   std::vector<CellEntry> entries(count);

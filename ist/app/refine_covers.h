@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+
+#include <ist/cover_spheres.h>
+#include <ist/progress.h>
+
+#include "app/sphere_output.h"
+
+namespace ist::app {
+
+/// Adds to a link's cover the spheres of its description, and, of a link that was repaired, what
+/// holds the mesh as it was read (`read`).
+void complete_cover(SphereLink& link, bool read);
+
+/// Covers links again whose spheres overlap others' though the solids do not: with more spheres,
+/// that protrude less there. It ends where at most a tenth of the free poses are called colliding,
+/// or with 32 spheres a link on average. The best of all rounds is kept.
+///
+/// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
+void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const SphereCoverSettings& cover,
+                   const std::map<std::string, std::size_t>& fixed,
+                   const ProgressCallback& progress);
+
+}  // namespace ist::app
