@@ -169,7 +169,8 @@ void add_class(py::module_& module) {
 }  // namespace
 
 void Penetrations::write(std::size_t i, const Row& row, const Penetration& answer) const {
-  const bool touches = answer.volume_max != 0 || answer.touching;  // else all is zero but the counts
+  const bool touches =
+      answer.volume_max != 0 || answer.touching;  // else all is zero but the counts
   for_each_member(
       [&]<class T, std::size_t kEach>(const Column<T, kEach>& column, const auto& value) {
         if (touches || std::is_integral_v<T>) column.write(i, value);
