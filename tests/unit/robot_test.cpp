@@ -57,7 +57,7 @@ TEST(RobotModel, SaysWhatIsWrongAndWhere) {
     EXPECT_NE(model_error_of(text).find(message), std::string::npos) << model_error_of(text);
   };
   expect("<robot name='r'></robot>", "contains no <link>");
-  expect("<sdf/>", "is not a robot");
+  expect("<scene/>", "is not a robot");
   expect("<robot><link name='a'>", "line 1: <link>: the file ends early");
   expect("<!DOCTYPE r [<!ENTITY a 'b'>]><robot/>", "entities are refused");
   expect("<robot><link/></robot>", "has no name");
