@@ -77,7 +77,7 @@ TEST(ContactPatchesTest, SumToTheWhole) {
       if (i % 4 == 1) settings.max_visits = 1 + 3 * static_cast<std::uint32_t>(i);
       const PlacedTree pa{a.view(), random_pose(random, 0.1 * i), 1.0};
       const PlacedTree pb{b.view(), random_pose(random, 0.2 * i), i % 3 == 0 ? 0.01 : 3.0};
-      for (const std::size_t most : {0u, 1u, 2u, 5u, 64u}) {
+      for (const std::size_t most : {1u, 2u, 5u, 64u}) {
         SCOPED_TRACE(::testing::Message() << n << " spheres, pose " << i << ", " << most);
         expect_patches(pa, pb, settings, most, i % 5 == 4 ? small : workspace);
         expect_patches(pb, pa, settings, most, i % 5 == 4 ? small : workspace);
