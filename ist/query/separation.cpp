@@ -80,13 +80,12 @@ class GapDescent {
  private:
   /// Of all that counts; in double.
   double root_gap() const {
+    const auto root_a = a_.root(), root_b = b_.root();
     double moved[3];
-    a_side_.x_from_y->apply(b_.root().centre, moved);
-    const double* const c = a_.root().centre;
-    const double between =
-        (Eigen::Vector3d(moved[0], moved[1], moved[2]) - Eigen::Vector3d(c[0], c[1], c[2])).norm();
-    return between - (cover_ > 0 ? a_.root().reach() + scale_ * b_.root().reach()
-                                 : a_.root().r + scale_ * b_.root().r);
+    a_side_.x_from_y->apply(root_b.centre, moved);
+    const double between = (vector(moved) - vector(root_a.centre)).norm();
+    return between -
+           (cover_ > 0 ? root_a.reach() + scale_ * root_b.reach() : root_a.r + scale_ * root_b.r);
   }
 
   bool wanted(double gap, double cover) const {
