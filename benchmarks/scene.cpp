@@ -31,23 +31,38 @@ using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
 
-/// Balls of diameter 1 in a cube: `still` of them on a lattice, the others anywhere.
+/// Balls of diameter 1 in a cube, of which the first `still` do not move.
 struct Bodies {
   std::vector<Pose> poses;
   std::size_t still;
+  bool on_lattice;
   double side;
   std::mt19937_64 random{7};
 
-  Bodies(std::size_t count, std::size_t still_ones, double meeting) : still(still_ones) {
+  /// `meeting`: share of them that meets another; 0: they lie on a lattice, flush with each other.
+  Bodies(std::size_t count, std::size_t still_ones, double meeting)
+      : still(still_ones), on_lattice(meeting == 0) {
     // Two boxes of side 1 meet where their middles are within 1 along each axis: 8 u³.
-    side = std::cbrt(8.0 * static_cast<double>(count) / meeting);
+    side = std::cbrt((on_lattice ? 1.0 : 8 / meeting) * static_cast<double>(count));
+    if (on_lattice) {
+      const auto row = static_cast<std::size_t>(std::ceil(side));
+      for (std::size_t i = 0; i < count; ++i)
+        poses.push_back({{1, 0, 0, 0},
+                         {static_cast<double>(i % row), static_cast<double>(i / row % row),
+                          static_cast<double>(i / row / row)}});
+      return;
+    }
     std::uniform_real_distribution<double> uniform(0, side);
     poses.resize(count);
     for (Pose& pose : poses)
       for (double& x : pose.t) x = uniform(random);
   }
-  /// Every body from `first` on goes on a little, within the cube.
+  /// Bodies first … last go on a little, within the cube; on a lattice all by the same, upwards.
   void move(std::size_t first, std::size_t last) {
+    if (on_lattice) {
+      for (std::size_t i = first; i < last; ++i) poses[i].t[2] += 0.125;
+      return;
+    }
     std::uniform_real_distribution<double> uniform(-0.1, 0.1);
     for (std::size_t i = first; i < last; ++i)
       for (double& x : poses[i].t) x = std::clamp(x + uniform(random), 0.0, side);
@@ -67,11 +82,11 @@ struct OfIst final : Peer {
       : asset(of),
         scale(1 / (ist::bounds(of.view()).upper - ist::bounds(of.view()).lower).maxCoeff()) {}
   void add(const Bodies& bodies) override {
-    scene =
-        std::make_unique<ist::Scene>(ist::SceneSettings{.max_bodies = bodies.poses.size(),
-                                                        .max_pairs = 2 * bodies.poses.size() + 1000,
-                                                        .patches_per_pair = 1,
-                                                        .workspace_capacity = 4096});
+    scene = std::make_unique<ist::Scene>(
+        ist::SceneSettings{.max_bodies = bodies.poses.size(),
+                           .max_pairs = 16 * bodies.poses.size() + 1000,
+                           .patches_per_pair = 1,
+                           .workspace_capacity = 4096});
     ist::SceneRule rule;
     rule.answer = ist::SceneAnswer::boxes;
     rule.penetration.measure = ist::Measure::exact;
@@ -190,22 +205,24 @@ int main(int argc, char** argv) {
   report.page("Broad phases");
   report.remark(
       "Balls of diameter 1, each moved by up to 0.1 along each axis in a step; one body in ten has "
-      "a "
-      "box that meets another's. One thread, thread CPU time, median of the steps. Bullet's pairs "
+      "a box that meets another's. In the block all are flush, and it is lifted by an eighth. One "
+      "thread, thread CPU time, median of the steps. Bullet's pairs "
       "are those of its wider boxes.");
   const ist::Asset ball =
       ist::bake_surface(ist::close_mesh(ist::make_sample("sphere"), "sphere"), {});
   struct Case {
     const char* name;
     std::size_t bodies, still, moved;
+    double meeting = 0.1;
   };
   const std::size_t many = report.quick() ? 20'000 : 1'000'000;
   const Case cases[] = {{"all of 1,000 move", 1'000, 0, 1'000},
                         {"all of 10,000 move", 10'000, 0, 10'000},
+                        {"1,000 in a block, flush, all move", 1'000, 0, 1'000, 0},
                         {"one of 10,000 moves", 10'000, 0, 1},
                         {"100 move among those that stand still", many + 100, many, 100}};
   for (const Case& one : cases) {
-    const Bodies bodies(one.bodies, one.still, 0.1);
+    const Bodies bodies(one.bodies, one.still, one.meeting);
     const int steps = report.quick() ? 5 : 51;
     OfIst ist_scene(ball);
     OfFcl fcl_manager;

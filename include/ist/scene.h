@@ -36,7 +36,7 @@ struct SceneBody {
   /// The caller's number, unique in its scene: bodies are named by it, and pairs are in its order.
   std::uint32_t number = 0;
   PlacedSolid solid;
-  bool moves = true;          ///< two bodies that do not move are not asked
+  bool moves = true;          ///< two bodies that do not move are not asked, nor are two fields
   std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
   std::uint32_t layers = 1;   ///< bits
   std::uint32_t meets = ~0u;  ///< bits: layers of bodies that it meets; both must agree

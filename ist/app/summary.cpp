@@ -24,6 +24,7 @@
 #include "app/interrupt.h"
 #include "app/options.h"
 #include "library/text.h"
+#include "mesh/import/xml_document.h"
 
 namespace ist::app {
 namespace {
@@ -82,21 +83,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kSide = 96;  ///< [pixels] of a picture, a multiple of 4
-
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 std::string base64(const std::string& bytes) {
   constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -164,15 +150,15 @@ std::string row(const JobResult& r) {
   const auto number = [&](double value, double unit = 1) {
     return done ? fmt::format("{:.4g}", unit * value) : std::string();
   };
-  std::string remarks = escaped(r.message);
+  std::string remarks = xml_text(r.message);
   for (const std::string& warning : r.warnings)
-    remarks += (remarks.empty() ? "" : "<br>") + escaped(warning);
+    remarks += (remarks.empty() ? "" : "<br>") + xml_text(warning);
   std::string out = fmt::format("<tr class={}><td>{}<td>{}<td>{}", name_of(r.status), image(r),
-                                escaped(r.name), name_of(r.status));
+                                xml_text(r.name), name_of(r.status));
   out += fmt::format(
       "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}", done ? grouped(r.spheres) : "",
       number(r.coverage, 100), number(r.volume), number(r.protrusion),
-      done && r.has_surface ? number(r.surface_error) : "", done ? escaped(r.mesh_state) : "",
+      done && r.has_surface ? number(r.surface_error) : "", done ? xml_text(r.mesh_state) : "",
       r.error ? fmt::format("{:.2g}", 100 * *r.error) : "",
       r.confidence ? fmt::format("{:.2f}", *r.confidence) : "", fmt::format("{:.2f}", r.seconds));
   return out + fmt::format("<td class=t>{}</tr>\n", remarks);
@@ -206,7 +192,7 @@ document.querySelector('input').oninput = event => rows.forEach(row => {
 std::string links_of_pages(const std::vector<std::string>& files, std::size_t page) {
   std::string out;
   for (std::size_t i = 0; i < files.size() && files.size() > 1; ++i) {
-    const std::string name = escaped(std::filesystem::path(files[i]).filename().string());
+    const std::string name = xml_text(std::filesystem::path(files[i]).filename().string());
     out += i == page ? fmt::format("<b>{}</b> ", i + 1)
                      : fmt::format("<a href=\"{}\">{}</a> ", name, i + 1);
   }
@@ -225,7 +211,7 @@ std::string summary_page(const Summary& summary, std::span<const JobResult* cons
       "th{{position:sticky;top:0;background:#fff;cursor:pointer}}"
       ".failed,.not_baked{{background:#fdd}}</style>\n<h1>{0}</h1>\n"
       "<p>{1} assets: {2}\n{3}<p><input placeholder=\"filter this page\">\n",
-      escaped(summary.manifest), grouped(summary.results.size()), counts_in_words(summary), pages);
+      xml_text(summary.manifest), grouped(summary.results.size()), counts_in_words(summary), pages);
   out += "<table><thead><tr><th><th class=t>name<th class=t>status";
   for (const char* const head :
        {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "surface error [u]", "mesh",

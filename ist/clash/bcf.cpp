@@ -7,6 +7,7 @@
 
 #include "clash/report.h"
 #include "library/text.h"
+#include "mesh/import/xml_document.h"
 
 namespace ist {
 namespace {
@@ -22,18 +23,6 @@ std::string guid(const std::string& words) {
   const std::uint64_t high = hash(words, 0xcbf29ce484222325u), low = hash(words, ~high);
   return fmt::format("{:08x}-{:04x}-8{:03x}-{:04x}-{:012x}", high >> 32, high >> 16 & 0xffff,
                      high & 0xfff, (low >> 48 & 0x3fff) | 0x8000, low & 0xffffffffffff);
-}
-
-std::string xml(std::string_view text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '&'                              ? "&amp;"
-           : c == '<'                            ? "&lt;"
-           : c == '>'                            ? "&gt;"
-           : c == '"'                            ? "&quot;"
-           : static_cast<unsigned char>(c) < ' ' ? "?"
-                                                 : std::string(1, c);
-  return out;
 }
 
 /// A zip archive whose files are stored as they are (APPNOTE 6.3, 4.3).
@@ -100,7 +89,7 @@ std::string component(const std::string& name) {
   return fmt::format(
       "<Component{}><OriginatingSystem>ist</OriginatingSystem><AuthoringToolId>{}"
       "</AuthoringToolId></Component>",
-      ifc ? fmt::format(" IfcGuid=\"{}\"", name) : "", xml(name));
+      ifc ? fmt::format(" IfcGuid=\"{}\"", name) : "", xml_text(name));
 }
 
 std::string vector(const char* element, const Eigen::Vector3d& v) {
@@ -121,15 +110,15 @@ std::string clashes_bcf(const ClashReport& report, const std::string& date) {
     if (!report.is_clash(c)) continue;
     const auto [a, b] = report.names_of(c);
     const std::string topic = guid(a + '\0' + b), view = guid(a + '\0' + b + "/view");
-    zip.add(
-        topic + "/markup.bcf",
-        fmt::format("{}<Markup><Topic Guid=\"{}\" TopicType=\"Clash\" TopicStatus=\"Open\">"
-                    "<Title>{} overlaps {}</Title><CreationDate>{}</CreationDate>"
-                    "<CreationAuthor>ist</CreationAuthor><Description>volume {:.6g}, depth "
-                    "{:.6g}, at {}{}{}</Description></Topic><Viewpoints Guid=\"{}\">"
-                    "<Viewpoint>viewpoint.bcfv</Viewpoint></Viewpoints></Markup>\n",
-                    kXml, topic, xml(a), xml(b), date, c.volume, c.depth, short_vector(c.centroid),
-                    c.pose.empty() ? "" : ", pose ", xml(c.pose), view));
+    zip.add(topic + "/markup.bcf",
+            fmt::format("{}<Markup><Topic Guid=\"{}\" TopicType=\"Clash\" TopicStatus=\"Open\">"
+                        "<Title>{} overlaps {}</Title><CreationDate>{}</CreationDate>"
+                        "<CreationAuthor>ist</CreationAuthor><Description>volume {:.6g}, depth "
+                        "{:.6g}, at {}{}{}</Description></Topic><Viewpoints Guid=\"{}\">"
+                        "<Viewpoint>viewpoint.bcfv</Viewpoint></Viewpoints></Markup>\n",
+                        kXml, topic, xml_text(a), xml_text(b), date, c.volume, c.depth,
+                        short_vector(c.centroid), c.pose.empty() ? "" : ", pose ", xml_text(c.pose),
+                        view));
     // From where all of a cube around the overlap is seen.
     const double away = 8 * std::max(std::cbrt(c.volume_max), c.depth);
     const Eigen::Vector3d look = Eigen::Vector3d(-1, 1, -1).normalized();

@@ -10,11 +10,10 @@ constexpr double kWorn = 1.5;
 
 }  // namespace
 
-BoxTree::BoxTree(std::size_t most) {
+void BoxTree::take_room(std::size_t most) {
   for (auto* const list : {&nodes_, &other_nodes_}) list->reserve(2 * most);
-  node_of_.reserve(most);
-  free_.reserve(2 * most);
-  order_.reserve(most);
+  for (auto* const list : {&free_, &order_}) list->reserve(2 * most);
+  if (node_of_.size() < most) node_of_.resize(most, kNone);
   // Two nodes leave at most three of a level waiting; in the worst case the hierarchy is a chain.
   stack_.reserve(6 * most + 64);
 }
@@ -39,8 +38,7 @@ void BoxTree::fit_above(std::uint32_t node) noexcept {
   }
 }
 
-void BoxTree::add(std::uint32_t body, const SceneBox& box) {
-  if (node_of_.size() <= body) node_of_.resize(body + 1, kNone);
+void BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
   const std::uint32_t leaf = take_node();
   node_of_[body] = leaf;
   nodes_[leaf].box = box;

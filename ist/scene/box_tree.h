@@ -39,13 +39,13 @@ class BoxTree {
  public:
   static constexpr std::uint32_t kNone = ~0u;
 
-  /// Takes all the memory that it will ever need.
-  explicit BoxTree(std::size_t most);
+  /// Memory for `most` bodies, whose numbers are lower.
+  explicit BoxTree(std::size_t most) { take_room(most); }
+  void take_room(std::size_t most);
 
   std::uint32_t size() const noexcept { return leaves_; }
-  /// Many that are added in a row are cheaper to settle() at once. `body`: any number; memory is
-  /// taken for all up to it.
-  void add(std::uint32_t body, const SceneBox& box);
+  /// Many that are added in a row are cheaper to settle() at once.
+  void add(std::uint32_t body, const SceneBox& box) noexcept;
   void remove(std::uint32_t body) noexcept;
   /// Sets the box of a body and those above it.
   void move(std::uint32_t body, const SceneBox& box) noexcept;

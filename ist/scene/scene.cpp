@@ -1,7 +1,6 @@
 #include <ist/scene.h>
 
 #include <ist/error.h>
-#include <ist/mass_properties.h>
 
 #include <algorithm>
 #include <array>
@@ -14,24 +13,14 @@
 
 #include "query/base/batch.h"
 #include "query/base/relative_pose.h"
+#include "scene/body_box.h"
 #include "scene/box_tree.h"
 
 namespace ist {
 
-/// A box in a body's own frame.
-struct TurnedBox {
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero(), half = Eigen::Vector3d::Zero();
-};
-
 namespace {
 
 constexpr std::uint32_t kNone = BoxTree::kNone;
-
-/// A float that is lower, by more than what doubles round.
-float float_below(double x) noexcept {
-  const auto nearest = static_cast<float>(x);
-  return nearest - std::abs(nearest) * 1.2e-7f - 1e-37f;
-}
 
 std::uint64_t key_of(std::uint32_t a, std::uint32_t b) noexcept {
   return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
@@ -40,95 +29,12 @@ ScenePairName name_of(std::uint64_t key) noexcept {
   return {static_cast<std::uint32_t>(key >> 32), static_cast<std::uint32_t>(key)};
 }
 
-/// Empty where it has no end.
-std::optional<TurnedBox> own_box(const Field& field) noexcept {
-  const auto around = [](double x, double y, double z) {
-    return TurnedBox{Eigen::Vector3d::Zero(), {x, y, z}};
-  };
-  if (const auto* box = std::get_if<BoxField>(&field))
-    return TurnedBox{{0, 0, 0}, box->half_extents};
-  if (const auto* ball = std::get_if<BallField>(&field))
-    return around(ball->radius, ball->radius, ball->radius);
-  if (const auto* capsule = std::get_if<CapsuleField>(&field))
-    return around(capsule->radius, capsule->radius, capsule->radius + capsule->half_height);
-  if (const auto* cylinder = std::get_if<CylinderField>(&field))
-    return around(cylinder->radius, cylinder->radius, cylinder->half_height);
-  if (const auto* grid = std::get_if<DistanceGridField>(&field)) {
-    const Eigen::Vector3d half =
-        grid->spacing / 2 *
-        Eigen::Vector3d(grid->size[0] - 1.0, grid->size[1] - 1.0, grid->size[2] - 1.0);
-    return TurnedBox{grid->origin + half, half};
-  }
-  if (const auto* mesh = std::get_if<MeshField>(&field)) {
-    const Bounds own = bounds(mesh->tree);
-    return TurnedBox{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 struct Scene::Impl {
-  /// Where a body stands among the others.
-  enum class Place : std::uint8_t {
-    free,     ///< it is none
-    tree,     ///< its box is in a hierarchy
-    endless,  ///< it has no box
-    refused,  ///< its pose or scale is not usable
-  };
-  struct Placement {
-    Place place = Place::refused;
-    SceneBox box = {};
-  };
-
-  /// What of a solid does not change with its pose.
-  struct Kept {
-    std::optional<TurnedBox> box;  ///< in its own frame, scaled
-    double scale = 1;
-    double sticks_out = 0;  ///< [u] matched spheres
-    bool empty = false;
-  };
-  static Kept kept_of(const PlacedSolid& solid) noexcept {
-    Kept out;
-    if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
-      const Bounds b = bounds(tree->tree);
-      out = {TurnedBox{(b.lower + b.upper) / 2, (b.upper - b.lower) / 2}, tree->scale,
-             tree->scale * tree->tree.protrusion(), tree->tree.empty()};
-    } else {
-      const auto& field = std::get<PlacedField>(solid.placed);
-      out = {own_box(field.field), field.scale};
-    }
-    if (out.box) {
-      out.box->middle *= out.scale;
-      out.box->half *= out.scale;
-    }
-    return out;
-  }
-
-  /// In the world, `wider`.
-  static Placement place_of(const Kept& kept, const Pose& pose, double wider) noexcept {
-    const auto rotation = usable_rotation(pose, kept.scale);
-    if (!rotation || kept.empty) return {};
-    if (!kept.box) return {Place::endless};
-    const Eigen::Matrix3d turn = rotation->toRotationMatrix();
-    const Eigen::Vector3d middle = turn * kept.box->middle + vector(pose.t);
-    const Eigen::Vector3d half =
-        turn.cwiseAbs() * kept.box->half + Eigen::Vector3d::Constant(wider);
-    const double farthest = (middle.cwiseAbs() + half).maxCoeff();
-    constexpr double kMost = 1e37;  // boxes are of floats
-    if (!std::isfinite(farthest) || farthest > kMost) return {};
-    Placement out{Place::tree};
-    for (int k = 0; k < 3; ++k) {
-      const auto i = static_cast<std::size_t>(k);
-      out.box.low[i] = float_below(middle[k] - half[k]);
-      out.box.high[i] = -float_below(-(middle[k] + half[k]));
-    }
-    return out;
-  }
-
   struct Body {
     SceneBody given;
-    Kept kept;
+    BodyBox kept;
     SceneBox box;
     Place place = Place::free;
     bool moved = false;  ///< or added, since the last step
@@ -147,12 +53,8 @@ struct Scene::Impl {
   explicit Impl(const SceneSettings& given)
       : settings(given), still(given.max_bodies), moving(given.max_bodies) {
     bodies.reserve(given.max_bodies);
-    free_bodies.reserve(given.max_bodies);
-    moved.reserve(given.max_bodies);
-    endless.reserve(given.max_bodies);
-    refused.reserve(given.max_bodies);
-    refused_bodies.reserve(given.max_bodies);
     index_of.reserve(given.max_bodies);
+    take_room(given.max_bodies);
     for (auto* const list : {&now, &before, &fresh}) list->reserve(given.max_pairs);
     pairs.reserve(given.max_pairs);
     penetrations.reserve(given.max_pairs);
@@ -162,6 +64,14 @@ struct Scene::Impl {
     workspaces.reserve(given.workers);
     for (std::size_t i = 0; i < given.workers; ++i)
       workspaces.emplace_back(given.workspace_capacity);
+  }
+
+  /// For as many bodies, also those that were removed since the last step.
+  void take_room(std::size_t most) {
+    for (auto* const list : {&free_bodies, &moved, &endless, &refused, &refused_bodies})
+      list->reserve(most);
+    still.take_room(most);
+    moving.take_room(most);
   }
 
   SceneRule& rule_of(const Body& a, const Body& b) noexcept {
@@ -197,8 +107,7 @@ struct Scene::Impl {
     note_moved(body);
     const Pose& pose = std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
                                   body.given.solid.placed);
-    const auto [place, box] =
-        place_of(body.kept, pose, margin + (by_spheres ? body.kept.sticks_out : 0));
+    const auto [place, box] = body.kept.placed(pose, margin, by_spheres);
     body.box = box;
     if (place == Place::tree && body.place == Place::tree) {
       if (at_once)
@@ -467,14 +376,12 @@ void Scene::add(const SceneBody& body) {
     // Those of bodies that were removed since the last step are not free yet.
     at = static_cast<std::uint32_t>(all.bodies.size());
     all.bodies.emplace_back();
-    for (auto* const list :
-         {&all.moved, &all.endless, &all.refused, &all.refused_bodies, &all.free_bodies})
-      list->reserve(all.bodies.size());
+    all.take_room(all.bodies.size());
   }
   all.index_of.emplace(body.number, at);
   all.bodies[at] = {};
   all.bodies[at].given = body;
-  all.bodies[at].kept = Impl::kept_of(body.solid);
+  all.bodies[at].kept = BodyBox(body.solid);
   all.place(all.bodies[at], false);
 }
 
@@ -618,12 +525,7 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
 
 std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                           std::span<std::uint32_t> numbers) const noexcept {
-  SceneBox box;
-  for (int k = 0; k < 3; ++k) {
-    const auto i = static_cast<std::size_t>(k);
-    box.low[i] = float_below(lower[k]);
-    box.high[i] = -float_below(-upper[k]);
-  }
+  const SceneBox box = box_around(lower, upper);
   std::size_t count = 0;
   const auto visit = [&](std::uint32_t i) {
     if (count < numbers.size()) numbers[count] = impl_->bodies[i].given.number;

@@ -80,6 +80,8 @@ class _Object:
         transform = np.eye(4) if transform is None else np.asanyarray(transform, dtype=np.float64)
         if transform.shape != (4, 4):
             raise ValueError("transform must be (4,4)!")
+        if not np.isfinite(transform).all():
+            raise ValueError(f"transform of {self.name}: must be finite")
         self.pose = ist.poses(transform)
         self.transform = transform
         box = self.asset.bounds()
@@ -352,8 +354,9 @@ def _nearest(pairs, with_data):
     begin, count = 0, _FIRST
     while best > 0 and begin < len(order) and pairs.gap[order[begin]] < best:
         chosen = order[begin:begin + count]
+        chosen = chosen[pairs.gap[chosen] < best]
         limit = {"max_distance": best} if best < np.inf else {}
-        gaps = pairs.ask(ist.separation, chosen[pairs.gap[chosen] < best], **limit)
+        gaps = pairs.ask(ist.separation, chosen, **limit)
         _refuse_unanswered(pairs, gaps.status)
         k = int(gaps.distance.argmin())
         if gaps.distance[k] < best:

@@ -198,7 +198,9 @@ void add_scenes(py::module_& module) {
            py::arg("scale") = 1.0, py::arg("number") = py::none(), py::arg("moves") = true,
            py::arg("group") = 0, py::arg("layers") = 1, py::arg("meets") = ~0u,
            "Adds an Asset or a Field at a pose; None: at the origin. Returns its number: `number`, "
-           "or the first that is above all others. Two bodies that do not move are not asked. "
+           "or the first that is above all others. Two bodies that do not move are not asked, nor "
+           "are two "
+           "Fields. "
            "group: selects the rule of a pair. layers, meets: bits; each of a pair must be on a "
            "layer that the other meets.")
       .def(

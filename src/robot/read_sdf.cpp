@@ -154,7 +154,7 @@ class SdfReader {
       const std::uint32_t shape = geometry == kNoTag ? kNoTag : xml_[geometry].first_child;
       if (shape == kNoTag) xml_.fail(e, "has no <geometry> with a shape. Add one");
       const std::string_view kind = xml_[shape].name;
-      if (kind == "plane" || kind == "heightmap" || kind == "empty") continue;
+      if (kind == "empty") continue;
       PlacedShape placed;
       const auto& bytes = robot_.file.bytes;
       placed.line = 1 + static_cast<std::size_t>(std::count(

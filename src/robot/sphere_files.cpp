@@ -8,6 +8,7 @@
 #include <map>
 #include <string_view>
 
+#include "mesh/import/xml_document.h"
 #include "robot/kinematics.h"
 #include "robot/self_collision.h"
 
@@ -30,17 +31,6 @@ std::string real(double x) {
 
 std::string vector(const Eigen::Vector3d& v, const char* between) {
   return number(v.x()) + between + number(v.y()) + between + number(v.z());
-}
-
-std::string xml_text(std::string_view text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '&'   ? "&amp;"
-           : c == '<' ? "&lt;"
-           : c == '>' ? "&gt;"
-           : c == '"' ? "&quot;"
-                      : std::string(1, c);
-  return out;
 }
 
 /// A name as a YAML key: plain where that can be no other value, else in quotes.

@@ -104,6 +104,8 @@ def test_mistakes_are_told():
             call()
     with pytest.raises(ValueError, match="transform must be"):
         m.add_object("a", Box(), np.eye(3))
+    with pytest.raises(ValueError, match="transform of a: must be finite"):
+        m.add_object("a", Box(), np.full((4, 4), np.nan))
 
 
 def test_the_face_of_a_contact():

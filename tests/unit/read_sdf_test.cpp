@@ -36,7 +36,7 @@ std::string solid(const std::string& shape, const std::string& pose = "") {
 TEST(Sdf, LinksJointsAndShapes) {
   const RobotModel robot = sdf(
       "<link name='a'><pose>0 0 1 0 0 0</pose>" + solid("<box><size>1 2 3</size></box>") +
-      solid("<plane><normal>0 0 1</normal></plane>") +
+      solid("<empty/>") +
       "</link>"
       "<link name='b'><pose degrees='true'>1 0 1 0 0 90</pose>" +
       solid("<mesh><uri>model://m/b.stl</uri><scale>2 2 -1</scale></mesh>",
@@ -86,6 +86,7 @@ TEST(Sdf, MistakesAreToldWithTheirLines) {
     EXPECT_NE(sdf_error(inside).find(message), std::string::npos) << sdf_error(inside);
   };
   const std::string two = "<link name='a'/><link name='b'/>";
+  expect("<link name='a'>" + solid("<plane/>") + "</link>", "<plane>: is not read. Use mesh, box");
   const auto joint = [](const std::string& inside) {
     return "<joint name='j' type='revolute'><parent>a</parent><child>b</child>" + inside +
            "</joint>";

@@ -89,33 +89,42 @@ WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const Relativ
   const AssetHeader& asset_a = a.tree.header();
   const AssetHeader& asset_b = b.tree.header();
   const double scale3 = pose.a_from_b.scale * pose.a_from_b.scale * pose.a_from_b.scale;
-  const double needed_a = spheres_needed(asset_a, error_);
-  const double needed_b = spheres_needed(asset_b, error_);
   for (std::size_t i = 0; i < size_; ++i) {
     const TreeHeader& tree_a = matched_tree(asset_a, chain[i].a);
     const TreeHeader& tree_b = matched_tree(asset_b, chain[i].b);
-    const double from_a = needed_a * solid_volume(asset_a, tree_a);
-    const double from_b = needed_b * solid_volume(asset_b, tree_b) * scale3;
-    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.surface);
-    double& from = from_[i];
-    from = method.lenses     ? std::sqrt((from_a * from_a + from_b * from_b) / 2)
-           : method.b_probes ? from_b
-                             : from_a;
-    if (i > 0) from *= 1 + kDeep * from / std::min(asset_a.volume, asset_b.volume * scale3);
     const std::uint32_t coarser_a = std::min(chain[i].a + 1, asset_a.detail_count);
     const std::uint32_t coarser_b = std::min(chain[i].b + 1, asset_b.detail_count);
     const TreeHeader& wide_a = matched_tree(asset_a, coarser_a);
     const TreeHeader& wide_b = matched_tree(asset_b, coarser_b);
     coarser_[i] = detail_pair(coarser_a, LevelCost::of(wide_a), coarser_b, LevelCost::of(wide_b),
                               pose.a_from_b.scale);
-    const auto blur = [&](const TreeHeader& of_a, const TreeHeader& of_b) {
-      const double blur_a = of_a.mean_radius, blur_b = of_b.mean_radius * pose.a_from_b.scale;
-      return method.lenses     ? std::sqrt(blur_a * blur_a + blur_b * blur_b)
-             : method.b_probes ? blur_b
-                               : blur_a;
+    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.surface);
+    const auto both = [&](double of_a, double of_b) {
+      return method.lenses     ? std::sqrt((of_a * of_a + of_b * of_b) / 2)
+             : method.b_probes ? of_b
+                               : of_a;
     };
-    wider_[i] = blur(wide_a, wide_b) / blur(tree_a, tree_b) - 1;
-    if (!(wider_[i] >= kLeastWider)) from = std::numeric_limits<double>::infinity();
+    wider_[i] = both(wide_a.mean_radius, wide_b.mean_radius * pose.a_from_b.scale) /
+                    both(tree_a.mean_radius, tree_b.mean_radius * pose.a_from_b.scale) -
+                1;
+    // The overlap from which on two levels are predicted to err by less.
+    const auto overlap_for = [&](const TreeHeader& of_a, const TreeHeader& of_b, double error) {
+      const double overlap =
+          both(spheres_needed(asset_a, error) * solid_volume(asset_a, of_a),
+               spheres_needed(asset_b, error) * solid_volume(asset_b, of_b) * scale3);
+      return i == 0 ? overlap
+                    : overlap *
+                          (1 + kDeep * overlap / std::min(asset_a.volume, asset_b.volume * scale3));
+    };
+    double& from = from_[i];
+    from = overlap_for(tree_a, tree_b, error_);
+    if (wider_[i] >= kLeastWider) {
+      // What the coarser one does not confirm is answered twice. It does in half of the poses and
+      // more from where its median error is small enough for that.
+      from = std::max(from, overlap_for(wide_a, wide_b, kMostOverMedian * wider_[i] * error_));
+    } else {
+      from = std::numeric_limits<double>::infinity();
+    }
     if (!exact) continue;
     const double compared = kCompared * from;
     const double crossing = crossings(asset_a, std::min(1.0, compared / asset_a.volume)) +

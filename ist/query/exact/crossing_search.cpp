@@ -9,8 +9,8 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
-#include "query/exact/flat_areas-inl.h"
 #include "query/exact/nearest_points.h"
+#include "query/exact/pair_signs-inl.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/plane_sides-inl.h"
 #include "query/exact/points-inl.h"
@@ -19,10 +19,10 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 /// Finds the triangles that cross in pairs of blocks.
-class TriangleSearch {
+class TriangleSearch : PairSigns {
  public:
   TriangleSearch(const CrossingSearch& search, ExactScratch& scratch)
-      : search_(search),
+      : PairSigns(search),
         a_(*search.a),
         b_(*search.b),
         scratch_(scratch),
@@ -391,114 +391,6 @@ class TriangleSearch {
     take(1, b_, triangle_b, vertices_b);
   }
 
-  static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
-    const D d;
-    return {hn::Load(d, pairs.corner[side][c][0] + l), hn::Load(d, pairs.corner[side][c][1] + l),
-            hn::Load(d, pairs.corner[side][c][2] + l)};
-  }
-
-  static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
-  static std::uint32_t alike(const std::uint32_t (&bits)[3]) {
-    return each(bits) | ~(bits[0] | bits[1] | bits[2]);
-  }
-
-  /// Heights of eight pairs, and what their signs say: a bit each.
-  struct alignas(64) Heights {
-    double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-    double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
-    std::uint32_t positive[2][3] = {};  ///< with B moved aside
-    std::uint32_t certain[2][3] = {};   ///< in double
-    std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
-
-    /// Pairs that a plane keeps apart.
-    std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
-      return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
-    }
-  };
-
-  /// `kAsks`: whether it matters what is settled.
-  template <bool kAsks>
-  HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
-                               Heights& out) const {
-    const D d;
-    const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
-    const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
-    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
-                        hn::Set(d, search_.aside.z)};
-    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3];
-      HWY_UNROLL(2)
-      for (int s = 0; s < 2; ++s) HWY_UNROLL(3)
-      for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      HWY_UNROLL(2)
-      for (int side = 0; side < 2; ++side) {
-        const Vec3(&plane)[3] = corner[1 - side];
-        const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
-        const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
-                bz = u.y * v.x;
-        const Vec3 normal = {ax - bx, ay - by, az - bz};
-        const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
-                           hn::Abs(az) + hn::Abs(bz)};
-        const V along = dot(aside, normal), shift = side == 1 ? along : hn::Neg(along);
-        const V shift_error = filter * absolute_dot(aside, size);
-        hn::Store(hn::Abs(along), d, out.shift[side] + l);
-        const V longest = kAsks ? hn::Max(largest(u), largest(v)) + room : room;
-        HWY_UNROLL(3)
-        for (int c = 0; c < 3; ++c) {
-          const Vec3 r = corner[side][c] - plane[0];
-          const V value = dot(r, normal), error = filter * absolute_dot(r, size);
-          const V moved = value + shift, away = hn::Abs(moved), sure = error + shift_error;
-          hn::Store(value, d, out.value[side][c] + l);
-          // Where moving aside decides, the plane may lie on the other side of the corner.
-          const V height = hn::Abs(value);
-          hn::Store(error + hn::IfThenElseZero(height <= hn::Abs(shift), height), d,
-                    out.error[side][c] + l);
-          out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
-          out.certain[side][c] |= mask_bits(d, away > sure) << l;
-          if constexpr (kAsks) {
-            // What the room moves: six products of three numbers.
-            const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
-            out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
-          }
-        }
-      }
-    }
-  }
-
-  struct ExactCorners {
-    exact::Point of[2][3];
-
-    ExactCorners(const TrianglePairs& pairs, std::uint32_t n) {
-      for (int s = 0; s < 2; ++s)
-        for (int c = 0; c < 3; ++c)
-          of[s][c] = {pairs.corner[s][c][0][n], pairs.corner[s][c][1][n], pairs.corner[s][c][2][n]};
-    }
-  };
-
-  static void put(std::uint32_t& bits, std::uint32_t n, bool bit) {
-    bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
-  }
-
-  /// Of pair n, where doubles leave a sign unclear.
-  HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
-                                         Heights& out) const {
-    const ExactCorners corners(pairs, n);
-    for (int s = 1; s >= 0; --s) {
-      for (int c = 0; c < 3; ++c) {
-        if (out.certain[s][c] >> n & 1) continue;
-        const exact::Determinant height =
-            s == 1 ? exact::height_over_a(corners.of[0], corners.of[1][c], search_.aside)
-                   : exact::height_over_b(corners.of[1], corners.of[0][c], search_.aside);
-        out.value[s][c][n] = height.value;
-        out.error[s][c][n] =
-            height.error + (height.value * height.sign < 0 ? std::abs(height.value) : 0);
-        put(out.positive[s][c], n, height.sign > 0);
-        put(out.certain[s][c], n, true);
-      }
-      if ((out.apart(out.certain) >> n & 1) != 0) return;
-    }
-  }
-
   void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     // Others of their blocks may have marked them meanwhile.
@@ -528,122 +420,6 @@ class TriangleSearch {
       note_near(pairs, asks & all & apart & ~heights.apart(heights.settled));
     }
     if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
-  }
-
-  /// Pairs that are further apart than `reach` across or along the plane of one of them.
-  HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
-                                           double reach) const {
-    const D d;
-    std::uint32_t out = 0;
-    const V least = hn::Set(d, reach * reach * (1 + 1e-6));
-    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3];
-      for (int s = 0; s < 2; ++s)
-        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      for (int s = 0; s < 2; ++s) {
-        const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
-        const auto height = [&](int k) { return dot(normal, corner[1 - s][k] - corner[s][0]); };
-        const V low = min3(height(0), height(1), height(2)),
-                high = max3(height(0), height(1), height(2)), off = hn::Max(low, hn::Neg(high));
-        out |= mask_bits(d, off * hn::Abs(off) > least * dot(normal, normal)) << l;
-        for (int k = 0; k < 3; ++k) {
-          const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
-          const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
-                             dot(out_of, corner[1 - s][2] - p));
-          out |= mask_bits(d, gap * hn::Abs(gap) > least * dot(out_of, out_of)) << l;
-        }
-      }
-    }
-    return out;
-  }
-
-  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal.
-  static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
-                                      double (&along)[3][8]) {
-    const D d;
-    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3];
-      for (int s = 0; s < 2; ++s)
-        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const Vec3 normal = cross(corner[0][1] - corner[0][0], corner[0][2] - corner[0][0]);
-      const V length = hn::Sqrt(dot(normal, normal));
-      const V factor = common_area(corner[0], corner[1], normal);
-      hn::Store(factor * length, d, area + l);
-      hn::Store(factor * normal.x, d, along[0] + l);
-      hn::Store(factor * normal.y, d, along[1] + l);
-      hn::Store(factor * normal.z, d, along[2] + l);
-    }
-  }
-
-  /// Which way round A's edges go about B's: a bit a pair.
-  struct WaysRound {
-    std::uint32_t positive[3][3] = {};  ///< [A's edge][B's edge]
-    std::uint32_t certain[3][3] = {}, settled[3][3] = {};
-
-    /// Pairs of which an edge, that goes through the other's plane (`parts`: A's, B's), may go
-    /// through the triangle as far as `known` tells.
-    void may_pierce(const std::uint32_t (&parts)[2][3], const std::uint32_t (&known)[3][3],
-                    std::uint32_t (&out)[2][3]) const {
-      for (int k = 0; k < 3; ++k)
-        for (int s = 0; s < 2; ++s) {
-          std::uint32_t plus = 0, minus = 0;
-          for (int j = 0; j < 3; ++j) {
-            const int a = s == 0 ? k : j, b = s == 0 ? j : k;
-            plus |= known[a][b] & positive[a][b];
-            minus |= known[a][b] & ~positive[a][b];
-          }
-          out[s][k] = parts[s][k] & ~(plus & minus);
-        }
-    }
-    /// Whether all signs that matter are known.
-    std::uint32_t decided(const std::uint32_t (&parts)[2][3],
-                          const std::uint32_t (&known)[3][3]) const {
-      std::uint32_t asked[2][3], out = ~0u;
-      may_pierce(parts, known, asked);
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) out &= ~(asked[0][i] | asked[1][j]) | known[i][j];
-      return out;
-    }
-  };
-
-  template <bool kAsks>
-  HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
-                                  WaysRound& out) const {
-    const D d;
-    const V room = hn::Set(d, double{search_.room});
-    const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
-    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
-                        hn::Set(d, search_.aside.z)};
-    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3], edge_b[3];
-      HWY_UNROLL(2)
-      for (int s = 0; s < 2; ++s) HWY_UNROLL(3)
-      for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      V size_b[3];
-      HWY_UNROLL(3)
-      for (int j = 0; j < 3; ++j) {
-        edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
-        size_b[j] = largest(edge_b[j]) + room;
-      }
-      HWY_UNROLL(3)
-      for (int i = 0; i < 3; ++i) {
-        const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
-        const V size_a = largest(edge_a) + room, error_a = filter * size_a;
-        HWY_UNROLL(3)
-        for (int j = 0; j < 3; ++j) {
-          // Moved aside: the ninth rounding.
-          const Vec3 r = (corner[1][j] - corner[0][i]) + aside;
-          const V value = dot(r, cross(edge_a, edge_b[j])), away = hn::Abs(value);
-          const V size = largest(r), error = error_a * size_b[j] * size;
-          out.positive[i][j] |= mask_bits(d, value > hn::Zero(d)) << l;
-          out.certain[i][j] |= mask_bits(d, away > error) << l;
-          if constexpr (kAsks) {
-            const V moved = six_rooms * (size_a * size_b[j] + size * (size_a + size_b[j]));
-            out.settled[i][j] |= mask_bits(d, away > error + moved) << l;
-          }
-        }
-      }
-    }
   }
 
   /// Tests by edges the pairs that planes left.
@@ -677,22 +453,6 @@ class TriangleSearch {
     found_.consistent &= once == twice && more == 0;
     found_.settled |= (twice & settled) != 0;
     if (twice != 0) add_crossings(pairs, heights, pierced, twice);
-  }
-
-  HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
-                                       const std::uint32_t (&parts)[2][3], std::uint32_t n,
-                                       WaysRound& out) const {
-    const ExactCorners corners(pairs, n);
-    const exact::Point(&a)[3] = corners.of[0], (&b)[3] = corners.of[1];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        if (((parts[0][i] | parts[1][j]) >> n & 1) == 0 || (out.certain[i][j] >> n & 1) != 0)
-          continue;
-        const int sign =
-            exact::way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], search_.aside).sign;
-        put(out.positive[i][j], n, sign > 0);
-        put(out.certain[i][j], n, true);
-      }
   }
 
   /// Those whose blocks are not both marked as near.
@@ -826,7 +586,6 @@ class TriangleSearch {
     put(Crossings::kEdge, 3 * s + k + (turned ? 0 : 8));
   }
 
-  const CrossingSearch& search_;
   const MeshTree& a_;
   const MeshTree& b_;
   ExactScratch& scratch_;

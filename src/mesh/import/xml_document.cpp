@@ -10,6 +10,20 @@ constexpr std::size_t kDeepest = 1000, kMostAttributes = 256;
 
 }  // namespace
 
+std::string xml_text(std::string_view text) {
+  std::string out;
+  for (const char c : text) {
+    const bool control = static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\t';
+    out += c == '&'   ? "&amp;"
+           : c == '<' ? "&lt;"
+           : c == '>' ? "&gt;"
+           : c == '"' ? "&quot;"
+           : control  ? "?"
+                      : std::string(1, c);
+  }
+  return out;
+}
+
 XmlDocument::XmlDocument(const SourceFile& file) : file_(file), bytes_(file.bytes) {
   if (bytes_.find('\0') != std::string_view::npos)
     ist::fail(file_, "contains binary data or is not UTF-8, so it cannot be read as XML");

@@ -11,6 +11,10 @@
 
 namespace ist {
 
+/// As text or an attribute of an XML or HTML file. Control characters, which XML has not, become
+/// '?'.
+std::string xml_text(std::string_view text);
+
 /// The elements of an XML file, in the order they begin. Strict, and without what hostile files are
 /// made of: no document types (so no entities), no encoding but UTF-8, a bounded depth. Nothing
 /// here recurses, and memory is a small multiple of the file. Entities in attributes stay as they
