@@ -312,19 +312,29 @@ TEST_F(WantedErrors, PredictionsOfTheBakeDecide) {
     EXPECT_GT(from, before) << times;
     before = from;
   }
-  // Where it predicts the very error that is wanted, so much overlap is needed.
+  // A level answers alone where the next coarser one's median error, a third of the predicted one,
+  // is small enough to confirm it: by the middles of the classes, between which 1/error is linear.
   const Asset asset = predicting(ring(), 1);
   const PlacedTree a{asset.view(), {}, 1};
-  const WantedError levels = wanted(a, a, 3 * 5e-3, false);
+  const double error = 3 * 5e-3;
+  const WantedError levels = wanted(a, a, error, false);
   double from = 1e-12;
   while (levels.shares(from).levels[0].weight < 1 - 1e-9 && from < 1e3) from *= 1.001;
-  EXPECT_NEAR(from / asset.view().header().volume, std::sqrt(1e-3 * 1e-2), 0.02 * 3.2e-3);
+  const AssetHeader& header = asset.view().header();
+  const TreeHeader &own = matched_tree(header, 0), &coarser = matched_tree(header, 1);
+  const double confirmed = 3 * error * (coarser.mean_radius / own.mean_radius - 1);
+  const double low = std::sqrt(1e-4 * 1e-3), high = std::sqrt(1e-3 * 1e-2);
+  const double part = (1 / confirmed - 1 / (3 * 3e-2)) / (1 / error - 1 / (3 * 3e-2));
+  const double spheres = (low + (high - low) * part) * own.volume_sum / solid_volume(header, own);
+  EXPECT_GT(part, 0);
+  EXPECT_LT(part, 1);
+  EXPECT_NEAR(from / (spheres * solid_volume(header, coarser)), 1, 0.02);
 }
 
 TEST_F(WantedErrors, PatchesSumToTheBlend) {
   ContactPatch patches[6];
   int blends = 0, exact_ones = 0;
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 320; ++i) {
     const PlacedTree a = ring_at_rest(), b = blob_at(i, i % 3 == 2 ? 0.12 : 1);
     const PenetrationSettings settings{.relative_error = i % 4 == 3 ? 1e-5 : kErrors[i % 4]};
     const Penetration whole = penetration(a, b, settings, workspace_);
