@@ -68,7 +68,7 @@ BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
   box_->half *= scale_;
 }
 
-Placement BodyBox::placed(const Pose& pose, double margin, bool by_spheres) const noexcept {
+PlacedBox BodyBox::placed(const Pose& pose, double margin, bool by_spheres) const noexcept {
   const auto rotation = usable_rotation(pose, scale_);
   if (!rotation || empty_) return {};
   if (!box_) return {Place::endless};

@@ -16,7 +16,7 @@ enum class Place : std::uint8_t {
   endless,  ///< it has no box
   refused,  ///< its pose or scale is not usable
 };
-struct Placement {
+struct PlacedBox {
   Place place = Place::refused;
   SceneBox box = {};
 };
@@ -30,7 +30,7 @@ class BodyBox {
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
   /// In the world, `margin` wider; and by what matched spheres stick out.
-  Placement placed(const Pose& pose, double margin, bool by_spheres) const noexcept;
+  PlacedBox placed(const Pose& pose, double margin, bool by_spheres) const noexcept;
 
  private:
   struct Turned {

@@ -86,7 +86,10 @@ TEST(Sdf, MistakesAreToldWithTheirLines) {
     EXPECT_NE(sdf_error(inside).find(message), std::string::npos) << sdf_error(inside);
   };
   const std::string two = "<link name='a'/><link name='b'/>";
-  expect("<link name='a'>" + solid("<plane/>") + "</link>", "<plane>: is not read. Use mesh, box");
+  const RobotModel plane = sdf("<link name='a'>" + solid("<plane/>") + "</link>");
+  const LinkFault fault = std::get<LinkFault>(plane.links.at(0).collision.at(0).shape);
+  EXPECT_NE(fault.what.find("<plane>: is not read. Use mesh, box"), std::string::npos)
+      << fault.what;
   const auto joint = [](const std::string& inside) {
     return "<joint name='j' type='revolute'><parent>a</parent><child>b</child>" + inside +
            "</joint>";
