@@ -9,7 +9,9 @@
 #endif
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 #include "query/base/pair_place.h"
 #include "query/exact/mesh_tree.h"
@@ -59,6 +61,20 @@ inline MiddleBox box_of(const MeshTree& mesh, int level, std::uint32_t i) {
   return box;
 }
 
+/// The way that an answer is likely to go, and two axes square to it and each other.
+using WayAxes = std::array<exact::Point, 3>;
+
+inline WayAxes axes_along(const exact::Point& way) {
+  const double x = std::abs(way.x), y = std::abs(way.y), z = std::abs(way.z);
+  const exact::Point least = x <= y && x <= z ? exact::Point{1, 0, 0}
+                             : y <= z         ? exact::Point{0, 1, 0}
+                                              : exact::Point{0, 0, 1};
+  exact::Point beside = cross(way, least);
+  if (const double length = std::sqrt(dot(beside, beside)); length > 0)
+    beside = (1 / length) * beside;
+  return {way, beside, cross(way, beside)};
+}
+
 /// How boxes of one mesh are seen from the other's frame: along their own axes, along the other's,
 /// along the normals of all slabs, and along the way that the answer is likely to go.
 template <class T>
@@ -69,18 +85,24 @@ class BoxLook {
     const double inverse = 1 / map.scale;
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) axis_[k][i] = map.m[3 * i + k] * inverse;
-    turn({0, 0, 0});
   }
 
-  /// `toward`: unit, from the boxes to the other mesh; or zero.
-  void turn(const exact::Point& toward) {
-    toward_[0] = toward.x, toward_[1] = toward.y, toward_[2] = toward.z;
-    for (int k = 0; k < 3; ++k)
-      along_[k] = (toward_[0] * axis_[k][0] + toward_[1] * axis_[k][1]) + toward_[2] * axis_[k][2];
+  /// The first of the axes, of length 1, goes from the boxes to the other mesh; or all are zero.
+  void turn(const WayAxes& axes) {
+    for (int j = 0; j < 3; ++j) {
+      const exact::Point& way = axes[static_cast<std::size_t>(j)];
+      way_[j][0] = way.x, way_[j][1] = way.y, way_[j][2] = way.z;
+      for (int k = 0; k < 3; ++k)
+        along_[j][k] =
+            (way_[j][0] * axis_[k][0] + way_[j][1] * axis_[k][1]) + way_[j][2] * axis_[k][2];
+    }
   }
 
-  /// Squared distances of sixteen boxes from `one` of the other mesh, or less.
-  HWY_INLINE void measure(const BoxBlock& boxes, const MiddleBox& one, T (&squared)[kWidth]) const {
+  /// Squared distances of sixteen boxes from `one` of the other mesh, or less; bit l: box
+  /// l may be within `limit`, squared too. `ahead_gaps`: the gaps along the way, below zero where
+  /// both overlap there. Only what may be within is written.
+  HWY_INLINE std::uint32_t measure(const BoxBlock& boxes, const MiddleBox& one, double limit,
+                                   T (&squared)[kWidth], T (&ahead_gaps)[kWidth]) const {
     double middle[3], hull[3], reach[3], normal[3];
     map_.apply(one.middle, middle);
     for (int i = 0; i < 3; ++i) reach[i] = map_.scale * one.half[i] + blur_;
@@ -96,12 +118,14 @@ class BoxLook {
     const double low = map_.scale * (one.slab_low - before),
                  high = map_.scale * (one.slab_high - before);
     // How far it reaches back along the way.
-    const double turned =
-        (along_[0] * one.normal[0] + along_[1] * one.normal[1]) + along_[2] * one.normal[2];
-    double by_box = 0, by_slab = std::min(turned * low, turned * high);
+    const double(&along_way)[3] = along_[0];
+    const double turned = (along_way[0] * one.normal[0] + along_way[1] * one.normal[1]) +
+                          along_way[2] * one.normal[2];
+    double by_box = 0, by_slab = std::min(turned * low, turned * high), beside_way[2] = {};
     for (int k = 0; k < 3; ++k) {
-      by_box -= reach[k] * std::abs(along_[k]);
-      by_slab -= reach[k] * std::abs(along_[k] - turned * one.normal[k]);
+      by_box -= reach[k] * std::abs(along_way[k]);
+      by_slab -= reach[k] * std::abs(along_way[k] - turned * one.normal[k]);
+      for (int j = 0; j < 2; ++j) beside_way[j] += reach[k] * std::abs(along_[1 + j][k]);
     }
     const double nearest = std::max(by_box, by_slab) - 3 * blur_;
 
@@ -109,9 +133,14 @@ class BoxLook {
     using V = hn::Vec<decltype(d)>;
     const auto set = [&](double x) { return hn::Set(d, static_cast<T>(x)); };
     const V zero = hn::Zero(d), half_one = set(0.5);
+    constexpr double kLength = 1 - 1e-5;  // of normals, or more
+    constexpr double kRounding = sizeof(T) == sizeof(float) ? 2e-6 : 1e-14;
+    const V beyond =
+        set(std::min(limit, double{std::numeric_limits<T>::max()} / 4) * (1 + 4 * kRounding));
+    std::uint32_t within = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       V away[3], half[3], n[3];
-      V along = zero, across = zero, ahead = zero;
+      V along = zero, across = zero;
       for (int i = 0; i < 3; ++i) {
         const V x = load_as<T>(d, boxes.low[i] + l), y = load_as<T>(d, boxes.high[i] + l);
         away[i] = half_one * (x + y) - set(middle[i]);
@@ -119,24 +148,38 @@ class BoxLook {
         n[i] = load_as<T>(d, boxes.normal[i] + l);
         const V gap = hn::Max(zero, hn::Abs(away[i]) - (half[i] + set(hull[i])));
         along = along + gap * gap;
-        ahead = ahead + (set(toward_[i]) * away[i] + set(std::abs(toward_[i])) * half[i]);
       }
+      const auto times = [&](const double(&u)[3], const V(&x)[3]) {
+        return (set(u[0]) * x[0] + set(u[1]) * x[1]) + set(u[2]) * x[2];
+      };
+      const auto width_along = [&](const double(&u)[3]) {
+        return (set(std::abs(u[0])) * half[0] + set(std::abs(u[1])) * half[1]) +
+               set(std::abs(u[2])) * half[2];
+      };
+      // Beside the way, by boxes.
+      V beside = zero;
+      for (int j = 0; j < 2; ++j) {
+        const V gap = hn::Max(zero, hn::Abs(times(way_[1 + j], away)) -
+                                        (width_along(way_[1 + j]) + set(beside_way[j])));
+        beside = beside + gap * gap;
+      }
+      const V ahead = times(way_[0], away) + width_along(way_[0]);
+      const V box_ahead = hn::Max(zero, set(kLength * nearest) - set(kLength) * ahead);
+      const V by_boxes = hn::Max(along, box_ahead * box_ahead + beside);
+      if (hn::AllTrue(d, by_boxes > beyond)) continue;
       for (int k = 0; k < 3; ++k) {
-        const double* const u = axis_[k];
-        const V between = (set(u[0]) * away[0] + set(u[1]) * away[1]) + set(u[2]) * away[2];
-        const V width = (set(std::abs(u[0])) * half[0] + set(std::abs(u[1])) * half[1]) +
-                        set(std::abs(u[2])) * half[2];
-        const V gap = hn::Max(zero, hn::Abs(between) - (width + set(reach[k])));
+        const V gap =
+            hn::Max(zero, hn::Abs(times(axis_[k], away)) - (width_along(axis_[k]) + set(reach[k])));
         across = across + gap * gap;
       }
       // n is `turn` times the other normal and a rest, by which only boxes are known.
       const V turn = (n[0] * set(normal[0]) + n[1] * set(normal[1])) + n[2] * set(normal[2]);
-      const V steep = (n[0] * set(toward_[0]) + n[1] * set(toward_[1])) + n[2] * set(toward_[2]);
+      const V steep = times(way_[0], n);
       V at_middle = zero, at_box = zero, other_at_box = zero, to_box = zero, of_slab = zero;
       V rest[3];
       for (int i = 0; i < 3; ++i) {
-        const V beside = set(toward_[i]) - steep * n[i];
-        of_slab = of_slab + (beside * away[i] + hn::Abs(beside) * half[i]);
+        const V rest_of_way = set(way_[0][i]) - steep * n[i];
+        of_slab = of_slab + (rest_of_way * away[i] + hn::Abs(rest_of_way) * half[i]);
         rest[i] = n[i] - turn * set(normal[i]);
         const V other_rest = set(normal[i]) - turn * n[i];
         at_middle = at_middle + n[i] * set(middle[i]);
@@ -158,21 +201,24 @@ class BoxLook {
                                   ((to_box + hn::Min(of_low, of_high)) - other_at_box) - set(high));
       const V slab = hn::Max(zero, hn::Max(gap, other_gap) - set(3 * blur_));
       of_slab = of_slab + hn::Max(steep * slab_low, steep * slab_high);
-      const V ahead_gap = hn::Max(zero, set(nearest) - hn::Min(ahead, of_slab));
-      constexpr double kLength = 1 - 1e-5;  // of normals, or more
-      const V farthest = hn::Max(set(kLength) * slab, ahead_gap);
-      constexpr double kRounding = sizeof(T) == sizeof(float) ? 2e-6 : 1e-14;
-      hn::Store(set(1 - kRounding) * hn::Max(hn::Max(along, across), farthest * farthest), d,
-                squared + l);
+      const V signed_ahead = set(nearest) - hn::Min(ahead, of_slab);
+      hn::Store(signed_ahead, d, ahead_gaps + l);
+      const V ahead_gap = set(kLength) * hn::Max(zero, signed_ahead),
+              slab_gap = set(kLength) * slab;
+      const V least = hn::Max(hn::Max(along, across),
+                              hn::Max(slab_gap * slab_gap, ahead_gap * ahead_gap + beside));
+      hn::Store(set(1 - kRounding) * least, d, squared + l);
+      within |= mask_bits(d, least <= beyond) << l;
     }
+    return within;
   }
 
  private:
   const Similarity& map_;
   const double blur_;
-  double axis_[3][3];  ///< the other's, in their frame
-  double toward_[3];
-  double along_[3];  ///< of the other's axes
+  double axis_[3][3];        ///< the other's, in their frame
+  double way_[3][3] = {};    ///< from the boxes to the other, and two beside it
+  double along_[3][3] = {};  ///< of each of the other's axes
 };
 
 }  // namespace ist::HWY_NAMESPACE

@@ -85,18 +85,13 @@ struct BoxPair {
 /// A pair of nodes that waits to be measured, and what it is apart at least.
 struct GapPair {
   double squared;
+  float ahead;  ///< the same along the way that the answer is likely to go; below zero: overlap
   std::uint32_t a, b;
   std::uint8_t level_a, level_b;
 
-  /// In a heap: the nearest on top, of equally near ones what is furthest down the trees. No two
-  /// are equal, so that heaps of all libraries give the same order.
+  /// Whether it is less likely to hold the answer.
   bool operator<(const GapPair& other) const noexcept {
-    if (squared != other.squared) return squared > other.squared;
-    if (const int sum = level_a + level_b, others = other.level_a + other.level_b; sum != others)
-      return sum > others;
-    if (a != other.a) return a > other.a;
-    if (b != other.b) return b > other.b;
-    return level_a > other.level_a;
+    return squared != other.squared ? squared > other.squared : ahead > other.ahead;
   }
 };
 
@@ -285,7 +280,7 @@ struct ExactScratch {
         placed_b(hooked<PlacedMesh>(hooks)),
         pairs(hooked<TrianglePairs>(hooks)),
         waiting(hooked_array<BoxPair>(hooks, kMostWaiting)),
-        gaps(hooked_array<GapPair>(hooks, kMostGaps + kMostWaiting)),
+        gaps(hooked_array<GapPair>(hooks, kMostWaiting)),
         crossings(most_crossings, hooks),
         kept(most_pairs(), hooks),
         near(most_crossings, hooks),
@@ -312,9 +307,6 @@ struct ExactScratch {
 
   /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
-
-  /// Of a search for a distance, nearest first; behind them all goes depth first.
-  static constexpr std::uint32_t kMostGaps = 1u << 14;
 
   static constexpr std::uint32_t kMostParts = 1024;
   static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants

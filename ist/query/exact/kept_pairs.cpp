@@ -43,7 +43,7 @@ KeptPairs& KeptRing::of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
   KeptPairs& kept = slots_[slot];
   if (ids_[slot] != id || kept.mesh[0] != a.hash || kept.mesh[1] != b.hash ||
       kept.last.scale != pose.scale)
-    kept = {{a.hash, b.hash}, pose, HUGE_VAL, 0, kMostSteps, pose, 0, 0, 0, 0};
+    kept = {{a.hash, b.hash}, pose, HUGE_VAL, 0, kMostSteps, pose, 0, 0, 0, 0, 0};
   else
     kept.step = largest_motion(b, kept.last, pose);
   kept.last = pose;
@@ -51,10 +51,11 @@ KeptPairs& KeptRing::of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
   return kept;
 }
 
-bool KeptRing::serves(const KeptPairs& kept, const MeshTree& b, const Similarity& pose,
+bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, const Similarity& pose,
                       double room) const noexcept {
-  return kept.margin > 0 && written_ - kept.first <= mask_ &&
-         largest_motion(b, kept.found_at, pose) + std::max(0.0, room - kept.room) < kept.margin;
+  if (!(kept.margin > 0) || written_ - kept.first > mask_) return false;
+  kept.moved = largest_motion(b, kept.found_at, pose);
+  return kept.moved + std::max(0.0, room - kept.room) < kept.margin;
 }
 
 void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {

@@ -22,6 +22,7 @@ struct KeptPairs {
   Similarity found_at;      ///< B in A when the pairs were found
   double margin;            ///< A's unit frame; 0: none are kept
   double room;              ///< of the search that found them
+  double moved;             ///< since they were found; set by KeptRing::serves
   std::uint64_t first;      ///< in the ring
   std::uint32_t count;
   std::uint64_t nearest = kNone;  ///< of distances: the pair that the last query found
@@ -37,7 +38,7 @@ class KeptRing {
   KeptPairs& of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
                 const Similarity& pose) noexcept;
   /// Whether its pairs are all that a search by `room` can find at `pose`.
-  bool serves(const KeptPairs& kept, const MeshTree& b, const Similarity& pose,
+  bool serves(KeptPairs& kept, const MeshTree& b, const Similarity& pose,
               double room) const noexcept;
   /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
   /// their order. 0: keeping would not pay.

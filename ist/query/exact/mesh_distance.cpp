@@ -43,9 +43,9 @@ struct NearestTriangles {
 
 class MeshGapSearch {
   /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
-  static constexpr double kMargin = 0.7;
-  /// Pairs that are measured only to be kept: more would not pay.
-  static constexpr std::uint32_t kMostBeyond = 300;
+  static constexpr double kMargin = 1.2;
+  /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
+  static constexpr std::uint32_t kFew = 4;
 
  public:
   MeshGapSearch(const GapQuestion& asked, Budget& budget, ExactScratch& scratch)
@@ -75,13 +75,17 @@ class MeshGapSearch {
   MeshGap run() {
     KeptRing& ring = scratch_.near;
     KeptPairs* const kept = single_ ? asked_.kept : nullptr;
-    double least = 0;
-    if (kept != nullptr && kept->nearest != KeptPairs::kNone) measure(kept->nearest);
+    if (kept != nullptr && kept->nearest != KeptPairs::kNone) {
+      add(kept->nearest);
+      measure_added();
+    }
     if (kept != nullptr && ring.serves(*kept, b_, asked_.a_from_b, 0)) {
-      for (std::uint32_t n = 0; n < kept->count && !done(); ++n) {
+      for (std::uint32_t n = 0; n < kept->count && !done(); n += 2) {
+        if (std::bit_cast<double>(ring.pair(*kept, n + 1)) - kept->moved > limit_) continue;
         const std::uint64_t blocks = ring.pair(*kept, n);
         measure(static_cast<std::uint32_t>(blocks >> 32), static_cast<std::uint32_t>(blocks));
       }
+      measure_added();
     } else {
       if (kept != nullptr) {
         ring.begin(*kept, a_, b_, 0);
@@ -89,16 +93,19 @@ class MeshGapSearch {
         if (kept->margin > 0) keep_ = kept;
         limit_to(nearest_limit_);
       }
-      if (budget_.limited()) measure(0);  // what is stopped has an answer
-      least = search();
+      if (budget_.limited()) {  // what is stopped has an answer
+        add(0);
+        measure_added();
+      }
+      search();
       if (best_.pair == KeptPairs::kNone && asked_.likely < asked_.most) {
         limit_to(most_);
-        least = search();
+        search();
       }
     }
     // What ended early has not come to all that is near.
     const bool whole = !done();
-    finish(least);
+    finish();
     if (kept != nullptr) {
       kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
       if (!whole || out_.overlap || out_.farther) kept->margin = 0;
@@ -119,14 +126,22 @@ class MeshGapSearch {
     return asked.a.extent() + asked.a_from_b.scale * asked.b.extent() + shift;
   }
 
+  /// `toward`: unit, or zero: then solids are seen along the axes of A.
   void look_along(const exact::Point& toward) {
     toward_ = toward;
+    const bool known = dot(toward, toward) > 0;
+    axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    if (!known) return;
     const double(&m)[9] = asked_.b_from_a.m;
-    const auto back = [&](int i) {
-      return -scale_ * ((m[3 * i] * toward.x + m[3 * i + 1] * toward.y) + m[3 * i + 2] * toward.z);
-    };
-    const exact::Point to_a = {back(0), back(1), back(2)};
-    single_ ? single_a_.turn(toward) : double_a_.turn(toward);
+    WayAxes to_a;
+    for (std::size_t j = 0; j < 3; ++j) {
+      const exact::Point& way = axes_[j];
+      const auto back = [&](int i) {
+        return -scale_ * ((m[3 * i] * way.x + m[3 * i + 1] * way.y) + m[3 * i + 2] * way.z);
+      };
+      to_a[j] = {back(0), back(1), back(2)};
+    }
+    single_ ? single_a_.turn(axes_) : double_a_.turn(axes_);
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
 
@@ -138,30 +153,27 @@ class MeshGapSearch {
     squared_limit_ = limit_ * limit_;
   }
 
-  double search() {
+  /// Depth first, the nearest child on top: the spheres' distance, by which most is left out from
+  /// the start, is seldom far off.
+  void search() {
     size_ = 0;
-    depth_first_ = false;
-    push({0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)});
-    double least = 0;
+    push({0, 0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)}, 0);
     while (size_ > 0 && !done()) {
-      const GapPair pair = waiting_[0];
-      least = pair.squared;
-      if (least > squared_limit_) break;
-      std::pop_heap(waiting_, waiting_ + size_--);
-      // Behind a full heap all below the pair waits on a stack, and comes before the rest.
-      const std::uint32_t heap = size_;
-      depth_first_ = heap >= ExactScratch::kMostGaps;
-      visit(pair);
-      while (depth_first_ && size_ > heap && !done()) visit(waiting_[--size_]);
+      const GapPair pair = waiting_[size_ - 1];
+      if (pair.squared <= squared_limit_) {
+        out_.stopped = budget_.grant(1) == 0;
+        if (out_.stopped) break;
+      }
+      --size_;
+      if (pair.squared <= squared_limit_) visit(pair);
     }
-    return least;
+    measure_added();
   }
 
   bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
   double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
 
-  /// `least`: no pair that waits is nearer.
-  void finish(double least) {
+  void finish() {
     out_.overlap = out_.overlap || holds(false) || holds(true);
     out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
     if (out_.overlap || out_.farther) return;
@@ -169,25 +181,25 @@ class MeshGapSearch {
     out_.b = best_.on_a + best_.between;
     out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
     // From the pair that answers: which of those that are alike is the least depends on the search.
-    const double nearest =
-        out_.stopped ? std::sqrt(least) : std::sqrt(best_.squared) - best_.rounding;
+    double nearest = std::sqrt(best_.squared) - best_.rounding;
+    for (std::uint32_t i = 0; out_.stopped && i < size_; ++i)
+      nearest = std::min(nearest, std::sqrt(waiting_[i].squared));
     out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
-  void push(const GapPair& pair) {
-    waiting_[size_++] = pair;
-    if (!depth_first_) std::push_heap(waiting_, waiting_ + size_);
+  /// Below `first` nothing is moved.
+  void push(const GapPair& pair, std::uint32_t first) {
+    std::uint32_t place = size_++;
+    for (; place > first && pair < waiting_[place - 1]; --place)
+      waiting_[place] = waiting_[place - 1];
+    waiting_[place] = pair;
   }
 
-  /// By value: what waits below it takes its place on the stack.
-  void visit(const GapPair pair) {
-    if (pair.squared > squared_limit_) return;
-    out_.stopped = budget_.grant(1) == 0;
-    if (out_.stopped) return;
+  void visit(const GapPair& pair) {
     if (pair.level_a == 0 && pair.level_b == 0) {
-      least_here_ = HUGE_VAL;
       measure(pair.a, pair.b);
-      if (keep_ != nullptr && least_here_ <= squared_limit_) keep(pair.a, pair.b);
+      // A few pairs wait for more.
+      if (scratch_.pairs->count > kFew) measure_added();
     } else if (single_) {
       open(pair, single_a_, single_b_);
     } else {
@@ -217,24 +229,25 @@ class MeshGapSearch {
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t number = open_a ? pair.a : pair.b;
     const BoxBlock& boxes = mesh.level[level].boxes[number];
-    alignas(64) T squared[kWidth];
-    if (open_a)
-      at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), squared);
-    else
-      at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), squared);
+    alignas(64) T squared[kWidth], ahead[kWidth];
     const double unit = open_a ? 1 : asked_.a_from_b.scale * asked_.a_from_b.scale;
-    const std::uint32_t used = std::min(kWidth, mesh.level[level - 1].count - kWidth * number);
+    const double limit = squared_limit_ / unit;
+    std::uint32_t left =
+        open_a ? at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), limit, squared, ahead)
+               : at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), limit, squared, ahead);
+    left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
-    for (std::uint32_t l = 0; l < used; ++l) {
+    for (; left != 0; left &= left - 1) {
+      const auto l = static_cast<std::uint32_t>(std::countr_zero(left));
       const double gap = unit * double{squared[l]};
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
+      child.ahead = static_cast<float>(open_a ? ahead[l] : scale_ * ahead[l]);
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
-      push(child);
+      push(child, first);
     }
-    if (depth_first_) std::sort(waiting_ + first, waiting_ + size_);
   }
 
   const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
@@ -257,17 +270,18 @@ class MeshGapSearch {
     if (!single_) {
       for (std::uint32_t left = all_a; left != 0; left &= left - 1)
         take(static_cast<std::uint32_t>(std::countr_zero(left)), all_b);
-      measure_added();
       return;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
-    TriangleCulls culls(a, b, toward_, static_cast<float>(blur_));
+    const TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
+    float least = HUGE_VALF;
     for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
-      take(i, culls.lanes(i, limit_) & all_b);
+      take(i, culls.lanes(i, nearest_limit_, least) & all_b);
     }
-    measure_added();
+    if (keep_ != nullptr && double{least} <= squared_limit_)
+      keep(std::uint64_t{number_a} << 32 | number_b, (1 - 1e-6) * std::sqrt(double{least}));
   }
 
   /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
@@ -291,11 +305,9 @@ class MeshGapSearch {
            distance - 0.5 * best_.rounding;
   }
 
-  /// Two triangles.
-  void measure(std::uint64_t pair) {
+  void add(std::uint64_t pair) {
     const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
     add(a, vertices(false, a / kWidth), b, vertices(true, b / kWidth));
-    measure_added();
   }
 
   void add(std::uint32_t triangle_a, const PlacedVertices& vertices_a, std::uint32_t triangle_b,
@@ -328,14 +340,10 @@ class MeshGapSearch {
       out_.overlap = crosses(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
     if (out_.overlap) return;
     const double before = best_.least;
-    std::uint32_t beyond = 0;
     for (std::uint32_t n = 0; n < count; ++n) {
       const std::uint64_t name = std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
       best_.take(gaps, n, name);
-      least_here_ = std::min(least_here_, gaps.squared[n]);
-      beyond += gaps.squared[n] > before && gaps.squared[n] <= squared_limit_;
     }
-    if (keep_ != nullptr && (beyond_ += beyond) > kMostBeyond) give_up();
     if (!(best_.least < before)) return;
     const double distance = std::sqrt(best_.least);
     limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kAlike) * distance));
@@ -348,17 +356,17 @@ class MeshGapSearch {
     }
   }
 
-  /// Two blocks, which the next steps look at again.
-  void keep(std::uint32_t number_a, std::uint32_t number_b) {
-    if (keep_->count < scratch_.near.most())
-      scratch_.near.add(*keep_, std::uint64_t{number_a} << 32 | number_b);
-    else
-      give_up();
-  }
-  void give_up() {
-    KeptRing::give_up(*keep_);
-    keep_ = nullptr;
-    limit_to(nearest_limit_);
+  /// Two blocks, no nearer than `least`, which the next steps look at again.
+  void keep(std::uint64_t blocks, double least) {
+    KeptRing& ring = scratch_.near;
+    if (keep_->count + 2 > ring.most()) {
+      KeptRing::give_up(*keep_);
+      keep_ = nullptr;
+      limit_to(nearest_limit_);
+      return;
+    }
+    ring.add(*keep_, blocks);
+    ring.add(*keep_, std::bit_cast<std::uint64_t>(least));
   }
 
   using Corners = std::array<exact::Point, 3>;
@@ -389,9 +397,8 @@ class MeshGapSearch {
   const MeshTree& b_;
   Budget& budget_;
   ExactScratch& scratch_;
-  GapPair* const waiting_;  ///< a heap
+  GapPair* const waiting_;  ///< a stack
   std::uint32_t size_ = 0;
-  bool depth_first_ = false;
   const double scale_, reach_;
   const bool single_;                   ///< boxes are measured in floats
   const double slack_;                  ///< what distances of triangles are off by, by rounding
@@ -400,9 +407,8 @@ class MeshGapSearch {
   BoxLook<double> double_a_, double_b_;
   double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
   NearestTriangles best_;
-  double least_here_ = HUGE_VAL;  ///< squared, of two blocks
-  std::uint32_t beyond_ = 0;      ///< pairs that were measured only to be kept
   exact::Point toward_, level_ = {0, 0, 0};
+  WayAxes axes_;
   KeptPairs* keep_ = nullptr;
   MeshGap out_;
 };

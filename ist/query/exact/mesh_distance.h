@@ -34,9 +34,9 @@ struct MeshGap {
   std::uint32_t tests = 0;      ///< pairs of triangles measured
 };
 
-/// Branch and bound over both trees of boxes, always the nearest pair that waits. A visit opens one
-/// node, or measures two blocks. Of pairs of triangles that are as near, to rounding, the one of
-/// the lowest numbers answers, so that neither the order of the search nor what is kept under
+/// Branch and bound over both trees of boxes, depth first, the nearest child first. A visit opens
+/// one node, or measures two blocks. Of pairs of triangles that are as near, to rounding, the one
+/// of the lowest numbers answers, so that neither the order of the search nor what is kept under
 /// `pair_id` decides. Allocates, locks and throws nothing; the same answer on every instruction
 /// set.
 MeshGap mesh_gap(const GapQuestion& question, Budget& budget, ExactScratch& scratch) noexcept;

@@ -7,6 +7,7 @@
 #define IST_QUERY_TRIANGLE_GAPS_INL_H_
 #endif
 
+#include "query/exact/box_gaps-inl.h"
 #include "query/exact/exact_scratch.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/points-inl.h"
@@ -17,64 +18,36 @@ namespace ist::HWY_NAMESPACE {
 /// Which triangles of two blocks are within a limit, or may be: in floats, which are off by `blur`.
 class TriangleCulls {
  public:
-  TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const exact::Point& toward,
-                float blur)
+  TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const WayAxes& axes, float blur)
       : a_(a), b_(b), blur_(blur) {
-    const float w[3] = {static_cast<float>(toward.x), static_cast<float>(toward.y),
-                        static_cast<float>(toward.z)};
-    const F d;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      hn::Vec<F> most = hn::Set(d, -HUGE_VALF), least = hn::Set(d, HUGE_VALF);
-      for (int c = 0; c < 3; ++c) {
-        most = hn::Max(most, along(w, a, c, l));
-        least = hn::Min(least, along(w, b, c, l));
-      }
-      hn::Store(most, d, a_ahead_ + l);
-      hn::Store(least, d, b_ahead_ + l);
+    for (std::size_t k = 0; k < 3; ++k) {
+      of_a_[k] = along(axes[k], a);
+      of_b_[k] = along(axes[k], b);
+      low_b_[k] = lowest(of_b_[k].low) - blur;
+      high_b_[k] = highest(of_b_[k].high) + blur;
     }
-    first_b_ = lowest(b_ahead_) - blur;
   }
 
   /// Of A's triangles those that may be within of one of B's.
   std::uint32_t rows(double limit) const {
-    const F d;
-    const auto most = hn::Set(d, rounded_up(limit)), zero = hn::Zero(d);
-    std::uint32_t bits = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      hn::Vec<F> squared = zero;
-      for (int k = 0; k < 3; ++k) {
-        const auto gap =
-            hn::Max(hn::Max(zero, hn::Load(d, a_.low[k] + l) - hn::Set(d, b_.all_high[k])),
-                    hn::Set(d, b_.all_low[k]) - hn::Load(d, a_.high[k] + l));
-        squared = squared + square(gap);
-      }
-      bits |= mask_bits(d, hn::And(squared <= most * most,
-                                   hn::Set(d, first_b_) - hn::Load(d, a_ahead_ + l) <= most))
-              << l;
-    }
-    return bits;
+    float least = 0;
+    return near(of_a_, low_b_, high_b_, limit, 0, kWidth, least);
   }
 
-  /// Of B's triangles those that may be within of A's triangle i: by boxes and along `toward`, then
-  /// by the planes of both.
-  std::uint32_t lanes(std::uint32_t i, double limit) const {
+  /// Of B's triangles those that may be within of A's triangle i: by their extents along three
+  /// axes, then by the planes of both. `least`, squared: no triangle is nearer by the axes.
+  std::uint32_t lanes(std::uint32_t i, double limit, float& least) const {
     const F d;
     const float far = rounded_up(limit) + blur_, size = a_.size + b_.size + far;
-    const auto most = hn::Set(d, rounded_up(limit)), zero = hn::Zero(d);
-    const auto ahead = hn::Set(d, a_ahead_[i] + blur_);
     // Heights are off by what the normal is, and coordinates are.
     const auto over_a = hn::Set(d, far * length(i) + a_.slack[i] * size);
+    float low[3], high[3];
+    for (int k = 0; k < 3; ++k)
+      low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      hn::Vec<F> squared = zero;
-      for (int k = 0; k < 3; ++k) {
-        const auto gap =
-            hn::Max(hn::Max(zero, hn::Load(d, b_.low[k] + l) - hn::Set(d, a_.high[k][i])),
-                    hn::Set(d, a_.low[k][i]) - hn::Load(d, b_.high[k] + l));
-        squared = squared + square(gap);
-      }
-      const auto near = hn::And(squared <= most * most, hn::Load(d, b_ahead_ + l) - ahead <= most);
-      if (hn::AllFalse(d, near)) continue;
+      const std::uint32_t near_here = near(of_b_, low, high, limit, l, l + hn::Lanes(d), least);
+      if (near_here == 0) continue;
       const hn::Vec<F> n[3] = {hn::Load(d, b_.normal[0] + l), hn::Load(d, b_.normal[1] + l),
                                hn::Load(d, b_.normal[2] + l)};
       hn::Vec<F> of_a[3], of_b[3];
@@ -90,29 +63,54 @@ class TriangleCulls {
       const auto length_b = hn::Sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
       const auto over_b =
           hn::Set(d, far * kLonger) * length_b + hn::Load(d, b_.slack + l) * hn::Set(d, size);
-      bits |= mask_bits(d, hn::And(near, hn::And(reaches(of_a, over_a), reaches(of_b, over_b))))
-              << l;
+      bits |= near_here & mask_bits(d, hn::And(reaches(of_a, over_a), reaches(of_b, over_b))) << l;
     }
     return bits;
   }
 
  private:
   static constexpr float kLonger = 1 + 2e-6f;  ///< than a length in floats
-  /// Of a gap, however far away an empty box is.
-  static hn::Vec<F> square(hn::Vec<F> gap) {
-    const auto x = hn::Min(gap, hn::Set(F(), 1e18f));
-    return x * x;
-  }
   /// Whether three heights are not all beyond.
   static hn::Mask<F> reaches(const hn::Vec<F> (&height)[3], hn::Vec<F> over) {
     return hn::And(hn::Min(height[0], hn::Min(height[1], height[2])) <= over,
                    hn::Max(height[0], hn::Max(height[1], height[2])) >= hn::Neg(over));
   }
-  static hn::Vec<F> along(const float (&w)[3], const PlacedTriangles& t, int c, std::size_t l) {
+  struct alignas(64) Extents {
+    float low[kWidth], high[kWidth];
+  };
+  static Extents along(const exact::Point& axis, const PlacedTriangles& t) {
     const F d;
-    return (hn::Set(d, w[0]) * hn::Load(d, t.corner[c][0] + l) +
-            hn::Set(d, w[1]) * hn::Load(d, t.corner[c][1] + l)) +
-           hn::Set(d, w[2]) * hn::Load(d, t.corner[c][2] + l);
+    const auto x = hn::Set(d, static_cast<float>(axis.x)),
+               y = hn::Set(d, static_cast<float>(axis.y)),
+               z = hn::Set(d, static_cast<float>(axis.z));
+    Extents out;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      hn::Vec<F> at[3];
+      for (int c = 0; c < 3; ++c)
+        at[c] = (x * hn::Load(d, t.corner[c][0] + l) + y * hn::Load(d, t.corner[c][1] + l)) +
+                z * hn::Load(d, t.corner[c][2] + l);
+      hn::Store(hn::Min(at[0], hn::Min(at[1], at[2])), d, out.low + l);
+      hn::Store(hn::Max(at[0], hn::Max(at[1], at[2])), d, out.high + l);
+    }
+    return out;
+  }
+  /// Of lanes [from, to) those that may be within of one box.
+  static std::uint32_t near(const Extents (&of)[3], const float (&low)[3], const float (&high)[3],
+                            double limit, std::size_t from, std::size_t to, float& least) {
+    const F d;
+    const auto most = hn::Set(d, rounded_up(limit)), zero = hn::Zero(d);
+    std::uint32_t bits = 0;
+    for (std::size_t l = from; l < to; l += hn::Lanes(d)) {
+      hn::Vec<F> squared = zero;
+      for (int k = 0; k < 3; ++k) {
+        const auto gap = hn::Max(hn::Max(zero, hn::Load(d, of[k].low + l) - hn::Set(d, high[k])),
+                                 hn::Set(d, low[k]) - hn::Load(d, of[k].high + l));
+        squared = squared + gap * gap;
+      }
+      bits |= mask_bits(d, squared <= most * most) << l;
+      least = std::min(least, hn::GetLane(hn::MinOfLanes(d, squared)));
+    }
+    return bits;
   }
   static float rounded_up(double limit) {
     return static_cast<float>(std::min(limit, 1e15) * (1 + 2e-6));
@@ -126,8 +124,8 @@ class TriangleCulls {
   const PlacedTriangles& a_;
   const PlacedTriangles& b_;
   const float blur_;
-  alignas(64) float a_ahead_[kWidth], b_ahead_[kWidth];
-  float first_b_;
+  Extents of_a_[3], of_b_[3];
+  float low_b_[3], high_b_[3];  ///< around all
 };
 
 /// The nearest points of eight pairs of triangles that do not cross.
