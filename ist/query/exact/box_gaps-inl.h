@@ -84,17 +84,23 @@ class BoxLook {
   BoxLook(const Similarity& map, double blur) : map_(map), blur_(blur) {
     const double inverse = 1 / map.scale;
     for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) axis_[k][i] = map.m[3 * i + k] * inverse;
+      for (int k = 0; k < 3; ++k) {
+        axis_[k][i] = map.m[3 * i + k] * inverse;
+        lane_axis_[k][i] = static_cast<T>(axis_[k][i]);
+        abs_axis_[k][i] = std::abs(lane_axis_[k][i]);
+      }
   }
 
   /// The first of the axes, of length 1, goes from the boxes to the other mesh; or all are zero.
   void turn(const WayAxes& axes) {
     for (int j = 0; j < 3; ++j) {
       const exact::Point& way = axes[static_cast<std::size_t>(j)];
-      way_[j][0] = way.x, way_[j][1] = way.y, way_[j][2] = way.z;
-      for (int k = 0; k < 3; ++k)
-        along_[j][k] =
-            (way_[j][0] * axis_[k][0] + way_[j][1] * axis_[k][1]) + way_[j][2] * axis_[k][2];
+      const double u[3] = {way.x, way.y, way.z};
+      for (int k = 0; k < 3; ++k) {
+        along_[j][k] = (u[0] * axis_[k][0] + u[1] * axis_[k][1]) + u[2] * axis_[k][2];
+        lane_way_[j][k] = static_cast<T>(u[k]);
+        abs_way_[j][k] = std::abs(lane_way_[j][k]);
+      }
     }
   }
 
@@ -149,36 +155,32 @@ class BoxLook {
         const V gap = hn::Max(zero, hn::Abs(away[i]) - (half[i] + set(hull[i])));
         along = along + gap * gap;
       }
-      const auto times = [&](const double(&u)[3], const V(&x)[3]) {
-        return (set(u[0]) * x[0] + set(u[1]) * x[1]) + set(u[2]) * x[2];
-      };
-      const auto width_along = [&](const double(&u)[3]) {
-        return (set(std::abs(u[0])) * half[0] + set(std::abs(u[1])) * half[1]) +
-               set(std::abs(u[2])) * half[2];
+      const auto times = [&](const T(&u)[3], const V(&x)[3]) {
+        return (hn::Set(d, u[0]) * x[0] + hn::Set(d, u[1]) * x[1]) + hn::Set(d, u[2]) * x[2];
       };
       // Beside the way, by boxes.
       V beside = zero;
       for (int j = 0; j < 2; ++j) {
-        const V gap = hn::Max(zero, hn::Abs(times(way_[1 + j], away)) -
-                                        (width_along(way_[1 + j]) + set(beside_way[j])));
+        const V gap = hn::Max(zero, hn::Abs(times(lane_way_[1 + j], away)) -
+                                        (times(abs_way_[1 + j], half) + set(beside_way[j])));
         beside = beside + gap * gap;
       }
-      const V ahead = times(way_[0], away) + width_along(way_[0]);
+      const V ahead = times(lane_way_[0], away) + times(abs_way_[0], half);
       const V box_ahead = hn::Max(zero, set(kLength * nearest) - set(kLength) * ahead);
       const V by_boxes = hn::Max(along, box_ahead * box_ahead + beside);
       if (hn::AllTrue(d, by_boxes > beyond)) continue;
       for (int k = 0; k < 3; ++k) {
-        const V gap =
-            hn::Max(zero, hn::Abs(times(axis_[k], away)) - (width_along(axis_[k]) + set(reach[k])));
+        const V gap = hn::Max(zero, hn::Abs(times(lane_axis_[k], away)) -
+                                        (times(abs_axis_[k], half) + set(reach[k])));
         across = across + gap * gap;
       }
       // n is `turn` times the other normal and a rest, by which only boxes are known.
       const V turn = (n[0] * set(normal[0]) + n[1] * set(normal[1])) + n[2] * set(normal[2]);
-      const V steep = times(way_[0], n);
+      const V steep = times(lane_way_[0], n);
       V at_middle = zero, at_box = zero, other_at_box = zero, to_box = zero, of_slab = zero;
       V rest[3];
       for (int i = 0; i < 3; ++i) {
-        const V rest_of_way = set(way_[0][i]) - steep * n[i];
+        const V rest_of_way = hn::Set(d, lane_way_[0][i]) - steep * n[i];
         of_slab = of_slab + (rest_of_way * away[i] + hn::Abs(rest_of_way) * half[i]);
         rest[i] = n[i] - turn * set(normal[i]);
         const V other_rest = set(normal[i]) - turn * n[i];
@@ -187,9 +189,7 @@ class BoxLook {
         to_box = to_box + other_rest * away[i];
       }
       for (int k = 0; k < 3; ++k)
-        at_box = at_box +
-                 set(reach[k]) * hn::Abs((set(axis_[k][0]) * rest[0] + set(axis_[k][1]) * rest[1]) +
-                                         set(axis_[k][2]) * rest[2]);
+        at_box = at_box + set(reach[k]) * hn::Abs(times(lane_axis_[k], rest));
       // Along n, from the one's middle: it, and the lane's slab.
       const V slab_low = load_as<T>(d, boxes.slab_low + l) - at_middle,
               slab_high = load_as<T>(d, boxes.slab_high + l) - at_middle;
@@ -217,8 +217,9 @@ class BoxLook {
   const Similarity& map_;
   const double blur_;
   double axis_[3][3];        ///< the other's, in their frame
-  double way_[3][3] = {};    ///< from the boxes to the other, and two beside it
-  double along_[3][3] = {};  ///< of each of the other's axes
+  double along_[3][3] = {};  ///< of each way each of the other's axes
+  // For lanes; ways go from the boxes to the other, and two beside that.
+  T lane_axis_[3][3], abs_axis_[3][3], lane_way_[3][3] = {}, abs_way_[3][3] = {};
 };
 
 }  // namespace ist::HWY_NAMESPACE

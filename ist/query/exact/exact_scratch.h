@@ -85,14 +85,9 @@ struct BoxPair {
 /// A pair of nodes that waits to be measured, and what it is apart at least.
 struct GapPair {
   double squared;
-  float ahead;  ///< the same along the way that the answer is likely to go; below zero: overlap
+  float order;  ///< the less, the likelier it holds the answer
   std::uint32_t a, b;
   std::uint8_t level_a, level_b;
-
-  /// Whether it is less likely to hold the answer.
-  bool operator<(const GapPair& other) const noexcept {
-    return squared != other.squared ? squared > other.squared : ahead > other.ahead;
-  }
 };
 
 /// A block whose triangles cross others: which of its vertices are inside the other solid.

@@ -187,10 +187,17 @@ class MeshGapSearch {
     out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
-  /// Below `first` nothing is moved.
+  /// What differs by less is as near: then the lowest number comes first, and others that are level
+  /// with it cannot answer.
+  static float coarse(double x) {
+    const auto single = static_cast<float>(std::min(x, 1e37));
+    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(single) & 0xfffff000u);
+  }
+
+  /// The least order comes on top, of like ones the first; below `first` nothing is moved.
   void push(const GapPair& pair, std::uint32_t first) {
     std::uint32_t place = size_++;
-    for (; place > first && pair < waiting_[place - 1]; --place)
+    for (; place > first && waiting_[place - 1].order <= pair.order; --place)
       waiting_[place] = waiting_[place - 1];
     waiting_[place] = pair;
   }
@@ -243,7 +250,7 @@ class MeshGapSearch {
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
-      child.ahead = static_cast<float>(open_a ? ahead[l] : scale_ * ahead[l]);
+      child.order = gap > 0 ? coarse(child.squared) : static_cast<float>(ahead[l]);
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
       push(child, first);
