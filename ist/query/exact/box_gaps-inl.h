@@ -105,10 +105,10 @@ class BoxLook {
   }
 
   /// Squared distances of sixteen boxes from `one` of the other mesh, or less; bit l: box
-  /// l may be within `limit`, squared too. `ahead_gaps`: the gaps along the way, below zero where
-  /// both overlap there. Only what may be within is written.
+  /// l may be within `limit`, squared too. `apart`: the largest gap along an axis, where both
+  /// overlap below zero. Only what may be within is written.
   HWY_INLINE std::uint32_t measure(const BoxBlock& boxes, const MiddleBox& one, double limit,
-                                   T (&squared)[kWidth], T (&ahead_gaps)[kWidth]) const {
+                                   T (&squared)[kWidth], T (&apart)[kWidth]) const {
     double middle[3], hull[3], reach[3], normal[3];
     map_.apply(one.middle, middle);
     for (int i = 0; i < 3; ++i) reach[i] = map_.scale * one.half[i] + blur_;
@@ -146,14 +146,18 @@ class BoxLook {
     std::uint32_t within = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       V away[3], half[3], n[3];
-      V along = zero, across = zero;
+      V along = zero, across = zero, largest = hn::Neg(set(1e30));
+      const auto squared_gap = [&](V gap) {
+        largest = hn::Max(largest, gap);
+        const V positive = hn::Max(zero, gap);
+        return positive * positive;
+      };
       for (int i = 0; i < 3; ++i) {
         const V x = load_as<T>(d, boxes.low[i] + l), y = load_as<T>(d, boxes.high[i] + l);
         away[i] = half_one * (x + y) - set(middle[i]);
         half[i] = half_one * (y - x);
         n[i] = load_as<T>(d, boxes.normal[i] + l);
-        const V gap = hn::Max(zero, hn::Abs(away[i]) - (half[i] + set(hull[i])));
-        along = along + gap * gap;
+        along = along + squared_gap(hn::Abs(away[i]) - (half[i] + set(hull[i])));
       }
       const auto times = [&](const T(&u)[3], const V(&x)[3]) {
         return (hn::Set(d, u[0]) * x[0] + hn::Set(d, u[1]) * x[1]) + hn::Set(d, u[2]) * x[2];
@@ -161,18 +165,16 @@ class BoxLook {
       // Beside the way, by boxes.
       V beside = zero;
       for (int j = 0; j < 2; ++j) {
-        const V gap = hn::Max(zero, hn::Abs(times(lane_way_[1 + j], away)) -
-                                        (times(abs_way_[1 + j], half) + set(beside_way[j])));
-        beside = beside + gap * gap;
+        beside = beside + squared_gap(hn::Abs(times(lane_way_[1 + j], away)) -
+                                      (times(abs_way_[1 + j], half) + set(beside_way[j])));
       }
       const V ahead = times(lane_way_[0], away) + times(abs_way_[0], half);
       const V box_ahead = hn::Max(zero, set(kLength * nearest) - set(kLength) * ahead);
       const V by_boxes = hn::Max(along, box_ahead * box_ahead + beside);
       if (hn::AllTrue(d, by_boxes > beyond)) continue;
       for (int k = 0; k < 3; ++k) {
-        const V gap = hn::Max(zero, hn::Abs(times(lane_axis_[k], away)) -
-                                        (times(abs_axis_[k], half) + set(reach[k])));
-        across = across + gap * gap;
+        across = across + squared_gap(hn::Abs(times(lane_axis_[k], away)) -
+                                      (times(abs_axis_[k], half) + set(reach[k])));
       }
       // n is `turn` times the other normal and a rest, by which only boxes are known.
       const V turn = (n[0] * set(normal[0]) + n[1] * set(normal[1])) + n[2] * set(normal[2]);
@@ -201,12 +203,11 @@ class BoxLook {
                                   ((to_box + hn::Min(of_low, of_high)) - other_at_box) - set(high));
       const V slab = hn::Max(zero, hn::Max(gap, other_gap) - set(3 * blur_));
       of_slab = of_slab + hn::Max(steep * slab_low, steep * slab_high);
-      const V signed_ahead = set(nearest) - hn::Min(ahead, of_slab);
-      hn::Store(signed_ahead, d, ahead_gaps + l);
-      const V ahead_gap = set(kLength) * hn::Max(zero, signed_ahead),
+      const V ahead_gap = squared_gap(set(kLength) * (set(nearest) - hn::Min(ahead, of_slab))),
               slab_gap = set(kLength) * slab;
-      const V least = hn::Max(hn::Max(along, across),
-                              hn::Max(slab_gap * slab_gap, ahead_gap * ahead_gap + beside));
+      hn::Store(largest, d, apart + l);
+      const V least =
+          hn::Max(hn::Max(along, across), hn::Max(slab_gap * slab_gap, ahead_gap + beside));
       hn::Store(set(1 - kRounding) * least, d, squared + l);
       within |= mask_bits(d, least <= beyond) << l;
     }

@@ -236,12 +236,12 @@ class MeshGapSearch {
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t number = open_a ? pair.a : pair.b;
     const BoxBlock& boxes = mesh.level[level].boxes[number];
-    alignas(64) T squared[kWidth], ahead[kWidth];
+    alignas(64) T squared[kWidth], apart[kWidth];
     const double unit = open_a ? 1 : asked_.a_from_b.scale * asked_.a_from_b.scale;
     const double limit = squared_limit_ / unit;
     std::uint32_t left =
-        open_a ? at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), limit, squared, ahead)
-               : at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), limit, squared, ahead);
+        open_a ? at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), limit, squared, apart)
+               : at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), limit, squared, apart);
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
     for (; left != 0; left &= left - 1) {
@@ -250,7 +250,7 @@ class MeshGapSearch {
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
-      child.order = gap > 0 ? coarse(child.squared) : static_cast<float>(ahead[l]);
+      child.order = gap > 0 ? coarse(child.squared) : static_cast<float>(apart[l]);
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
       push(child, first);
