@@ -19,34 +19,16 @@ namespace {
 using Eigen::Vector3d;
 using ist::benchmark::Report;
 
-/// Volumes [u³] of a solid's overlaps with its copies moved by `shifts` along x: columns along x,
-/// exact in their direction, on a grid so dense that its own error is far below what is measured.
-std::vector<double> overlaps_with_moved_copies(const ist::MeshSolid& solid,
+/// Volumes [u³] of a solid's overlaps with its copies moved by `shifts` along x, by their meshes.
+std::vector<double> overlaps_with_moved_copies(const ist::Asset& asset,
                                                const std::vector<double>& shifts) {
-  constexpr int kColumns = 1'000;
-  const double scale = solid.frame().scale();
-  const Vector3d low = solid.frame().to_unit(solid.bounds().min());
-  const Vector3d size = solid.bounds().sizes() / scale;
-  const double area = size.y() * size.z() / (double{kColumns} * kColumns);
-  std::vector<double> volumes(shifts.size());
-  std::vector<ist::Crossing> crossings, both;
-  for (int j = 0; j < kColumns; ++j)
-    for (int i = 0; i < kColumns; ++i) {
-      const double y = low.y() + (i + 0.5) / kColumns * size.y();
-      const double z = low.z() + (j + 0.5) / kColumns * size.z();
-      solid.line_crossings(y, z, crossings);
-      for (std::size_t s = 0; s < shifts.size(); ++s) {
-        both = crossings;
-        for (const ist::Crossing& c : crossings) both.push_back({c.x + shifts[s] / scale, c.sign});
-        std::sort(both.begin(), both.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
-        int winding = 0;  // 2: inside of both, as the samples overlap themselves nowhere
-        for (std::size_t k = 0; k + 1 < both.size(); ++k) {
-          winding += both[k].sign;
-          if (winding == 2)
-            volumes[s] += (both[k + 1].x - both[k].x) * area * scale * scale * scale;
-        }
-      }
-    }
+  ist::Workspace workspace;
+  std::vector<double> volumes;
+  for (const double shift : shifts)
+    volumes.push_back(ist::penetration({asset.view(), {}},
+                                       {asset.view(), {{1, 0, 0, 0}, {shift, 0, 0}}},
+                                       {.measure = ist::Measure::exact}, workspace)
+                          .volume);
   return volumes;
 }
 
@@ -100,7 +82,7 @@ void ask_copies(Report& report, const std::string& name, std::size_t spheres) {
   placements.push_back({"half a side apart", 0.5 * side});
   std::vector<double> shifts;
   for (const Placement& placement : placements) shifts.push_back(placement.shift);
-  const std::vector<double> exact = overlaps_with_moved_copies(baked.solid, shifts);
+  const std::vector<double> exact = overlaps_with_moved_copies(*baked.asset, shifts);
   ist::Workspace workspace;
   double worst_alike = 0, worst = 0;
   for (std::size_t k = 0; k < placements.size(); ++k) {
@@ -138,7 +120,7 @@ void ask_faces(Report& report, const std::string& name, std::size_t spheres) {
   const std::vector<double> gaps = {-0.8, -0.4, -0.2, -0.1, -0.05, 0, 0.05, 0.1, 0.2, 0.4};
   std::vector<double> shifts;
   for (const double gap : gaps) shifts.push_back(side + gap * radius);
-  const std::vector<double> exact = overlaps_with_moved_copies(baked.solid, shifts);
+  const std::vector<double> exact = overlaps_with_moved_copies(*baked.asset, shifts);
   ist::Workspace workspace;
   double worst_raw = 0, worst = 0;
   const double face = exact.front() / (0.8 * radius);  // what it takes to be one
