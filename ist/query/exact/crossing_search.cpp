@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #undef HWY_TARGET_INCLUDE
@@ -75,15 +76,19 @@ class TriangleSearch : PairSigns {
       }
       pairs.count = 0;
     };
+    std::optional<Meeting> now;
+    std::uint64_t blocks = ~std::uint64_t{0};
     visit_near(
         count, kept,
         [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b, std::uint32_t lanes) {
-          Meeting now(*this, number_a, number_b);
-          for (lanes = now.flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
+          lanes &= facing(placed_.triangles(false, number_a), i, placed_.triangles(true, number_b));
+          if (lanes == 0) return false;
+          const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
+          if (std::exchange(blocks, met) != met) now.emplace(*this, number_a, number_b);
+          for (lanes = now->flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
             const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
-            if (dot(now.normal(false, i), now.normal(true, j)) >= 0) continue;
-            put_pair(kWidth * number_a + i, *now.vertices[0], kWidth * number_b + j,
-                     *now.vertices[1]);
+            put_pair(kWidth * number_a + i, *now->vertices[0], kWidth * number_b + j,
+                     *now->vertices[1]);
             if (pairs.count == 8) add_areas();
           }
           return false;
@@ -163,6 +168,24 @@ class TriangleSearch : PairSigns {
     // Sums go over eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
+  }
+
+  /// Which of B's triangles may look straight at A's triangle i. In float: sums of a normal's
+  /// coordinates are no more than 1.8 times its length.
+  static std::uint32_t facing(const PlacedTriangles& a, std::uint32_t i, const PlacedTriangles& b) {
+    const F d;
+    const auto length_a = hn::Set(d, a.length[i]), slack_a = hn::Set(d, a.slack[i]);
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      const auto length_b = hn::Load(d, b.length + l), slack_b = hn::Load(d, b.slack + l);
+      const auto along = (hn::Set(d, a.normal[0][i]) * hn::Load(d, b.normal[0] + l) +
+                          hn::Set(d, a.normal[1][i]) * hn::Load(d, b.normal[1] + l)) +
+                         hn::Set(d, a.normal[2][i]) * hn::Load(d, b.normal[2] + l);
+      const auto off = hn::Set(d, 2.0f) * (slack_a * length_b + slack_b * length_a) +
+                       hn::Set(d, 3.0f) * slack_a * slack_b;
+      bits |= mask_bits(d, along <= off - hn::Set(d, 0.3f) * length_a * length_b) << l;
+    }
+    return bits;
   }
 
   /// Which triangles of a block reach into a slab.
@@ -326,15 +349,11 @@ class TriangleSearch : PairSigns {
     /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch.
     std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
       const PlacedPlanes& planes = planes_of(false);
-      const exact::Point n = normal(false, i);
+      const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
       const double far = all_.search_.touch * std::sqrt(dot(n, n));
       const PlaneSides off = sides_of(*vertices[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
                                       Margin::rounding, 0);
       return lanes & triangles_of(~(off.above | off.below), all_.b_.blocks[number_[1]]);
-    }
-    exact::Point normal(bool of_b, std::uint32_t t) {
-      const PlacedPlanes& planes = planes_of(of_b);
-      return {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
     }
 
    private:

@@ -243,7 +243,8 @@ class PairSigns {
     return out;
   }
 
-  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal.
+  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal; of
+  /// those that look the same way 0.
   static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
                                       double (&along)[3][8]) {
     const D d;
@@ -251,9 +252,11 @@ class PairSigns {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const Vec3 normal = cross(corner[0][1] - corner[0][0], corner[0][2] - corner[0][0]);
+      const auto normal_of = [](const Vec3(&t)[3]) { return cross(t[1] - t[0], t[2] - t[0]); };
+      const Vec3 normal = normal_of(corner[0]);
       const V length = hn::Sqrt(dot(normal, normal));
-      const V factor = common_area(corner[0], corner[1], normal);
+      const V factor = hn::IfThenElseZero(dot(normal, normal_of(corner[1])) < hn::Zero(d),
+                                          common_area(corner[0], corner[1], normal));
       hn::Store(factor * length, d, area + l);
       hn::Store(factor * normal.x, d, along[0] + l);
       hn::Store(factor * normal.y, d, along[1] + l);
