@@ -94,11 +94,11 @@ class Report {
   /// figures differ between machines.
   int write() const {
     if (out_.empty()) {
-      std::cout << json_.dump(1) << "\n";
+      std::cout << lines(json_) << "\n";
       return 0;
     }
     std::ofstream file(out_);
-    file << json_.dump(1) << "\n";
+    file << lines(json_) << "\n";
     file.close();
     if (!file) {
       std::cerr << "cannot write " << out_ << "\n";
@@ -108,6 +108,16 @@ class Report {
   }
 
  private:
+  /// A line for each row of a table.
+  static std::string lines(const Json& json, int open = 3) {
+    if (open == 0 || !json.is_structured() || json.empty()) return json.dump();
+    std::string out;
+    for (const auto& [key, value] : json.items())
+      out += (out.empty() ? "\n" : ",\n") + (json.is_object() ? Json(key).dump() + ": " : "") +
+             lines(value, open - 1);
+    return json.is_object() ? "{" + out + "\n}" : "[" + out + "\n]";
+  }
+
   static std::string compiler() {
 #ifdef __clang__
     return "clang " __clang_version__;
