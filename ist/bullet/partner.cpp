@@ -19,6 +19,7 @@
 #include <utility>
 
 #include <ist/bullet/convert.h>
+#include <ist/pose_eigen.h>
 
 namespace ist::bullet {
 
@@ -164,6 +165,21 @@ FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
   }
   if (inside.distance >= 0) return inside;
   return {-nearest, way};
+}
+
+void HullDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
+                             SupportPolygon& polygon) const {
+  for (const Face& face : faces_)
+    for (std::size_t i = 2; i < face.corners.size(); ++i)
+      polygon.add_triangle(of_b, pose * face.corners[0], pose * face.corners[i - 1],
+                           pose * face.corners[i]);
+}
+
+void MeshDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
+                             SupportPolygon& polygon) const {
+  for (const Triangle& triangle : triangles_)
+    polygon.add_triangle(of_b, pose * triangle.corner[0], pose * triangle.corner[1],
+                         pose * triangle.corner[2]);
 }
 
 void MeshDistance::gather(const btConcaveShape& shape, const btVector3& lower,
@@ -383,6 +399,27 @@ PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
     placed.field = FunctionField{mesh_sample, &near, 0};
   }
   return placed;
+}
+
+void Partner::add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const {
+  const Eigen::Isometry3d pose = to_isometry(placed.pose);
+  if (hull_ != nullptr) return hull_->add_faces(pose, of_b, polygon);
+  if (mesh_ != nullptr) {
+    const auto& near = std::get<FunctionField>(placed.field);
+    return static_cast<const MeshDistance*>(near.context)->add_faces(pose, of_b, polygon);
+  }
+  const auto* const cylinder = std::get_if<CylinderField>(&placed.field);
+  if (cylinder == nullptr) return;
+  constexpr int kSides = 32;
+  for (const double sign : {-1.0, 1.0}) {
+    const auto rim = [&](int i) -> Eigen::Vector3d {
+      const double turn = sign * 2 * std::numbers::pi * i / kSides;
+      return pose * Eigen::Vector3d(cylinder->radius * std::cos(turn),
+                                    cylinder->radius * std::sin(turn),
+                                    sign * cylinder->half_height);
+    };
+    for (int i = 2; i < kSides; ++i) polygon.add_triangle(of_b, rim(0), rim(i - 1), rim(i));
+  }
 }
 
 }  // namespace ist::bullet

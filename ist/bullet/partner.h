@@ -10,6 +10,7 @@
 
 #include <ist/bullet/shape.h>
 #include <ist/query.h>
+#include <ist/support.h>
 
 namespace ist::bullet {
 
@@ -21,6 +22,7 @@ class HullDistance {
 
   std::size_t faces() const { return faces_.size(); }
   FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
   struct Face {
@@ -41,6 +43,7 @@ class MeshDistance : public btTriangleCallback {
               double thickness);
 
   FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
   struct Triangle {
@@ -69,6 +72,10 @@ class Partner {
   /// the thread's next call.
   PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
+
+  /// Its flat faces, where SupportPolygon::add() does not know them. `placed`: by placed(), in the
+  /// same thread and not before another.
+  void add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const;
 
   const btCollisionShape& shape() const { return *shape_; }
 
