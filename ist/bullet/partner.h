@@ -53,6 +53,8 @@ class MeshDistance : public btTriangleCallback {
     double area, reach = 0;  // [u²] twice its own; [u] of a corner from the centre
   };
   void processTriangle(btVector3* corners, int part, int index) override;
+  /// Whether all triangles lie in one plane, in which they cover what is under a box.
+  bool is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) const;
 
   static constexpr std::size_t kBlock = 8;  // neighbours, as the shape's tree has them
   std::vector<Triangle> triangles_;
@@ -60,6 +62,7 @@ class MeshDistance : public btTriangleCallback {
   double thickness_ = 0;
   int up_ = -1;  // of a height field: the axis to which its front faces
   bool mirrored_ = false;
+  bool level_ = false;  // near the body: the first triangle's plane
 };
 
 /// What an asset meets that is none: a shape of Bullet's as a field in the shape's frame. The shape

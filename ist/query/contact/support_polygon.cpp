@@ -20,9 +20,11 @@ using Eigen::Vector3d;
 constexpr int kDirections = 32;
 constexpr std::uint64_t kName = std::uint64_t{1} << 63;
 
-/// Faces that are turned further from the contact's normal are no part of it: 2.6°.
-constexpr double kFacing = 0.999;
-constexpr double kTurned = 0.05;  // the sine of that, and some more
+/// Faces that are turned further from the contact's normal are no part of it: 1.1°.
+constexpr double kFacing = 0.9998;
+constexpr double kTurned = 0.021;  // the sine of that, and some more
+/// Less than this, 8°, and a face of a round surface that touches.
+constexpr double kRound = 0.99;
 constexpr double kTurnedAgainst = 1e-3;  // [rad] of two faces: not one plane
 /// Depths away from each other: faces further from the middle of a contact than this are others.
 constexpr double kNearMiddle = 2;
@@ -136,13 +138,19 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
                                   const Vector3d& r) noexcept {
   const Vector3d normal = (q - p).cross(r - p);
   const double facing = of_b ? -normal_.dot(normal) : normal_.dot(normal);
-  if (!(area_ > 0) || !flat_ || !(facing > kFacing * normal.norm())) return;
-  const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
-  if ((p - middle_).norm() > reach_ + radius) return;
+  if (!(area_ > 0) || !flat_ || !(facing > 0)) return;
+  const double square = facing * facing / normal.squaredNorm();
+  if (!(square > kRound * kRound)) return;
+  const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
+    const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
+  if ((p - middle_).squaredNorm() > (reach_ + radius) * (reach_ + radius)) return;
+  if (!(square > kFacing * kFacing)) {
+    const auto is_here = [&](const Corner& x) { return std::abs(x.z) <= near_; };
+    flat_ = std::none_of(face.begin(), face.end(), is_here);
+    return;
+  }
   if (!(std::abs((p - middle_).dot(normal)) <= near_ * facing)) return;
   Side& side = sides_[of_b];
-  // Anticlockwise about the normal.
-  const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
   const Plane plane = plane_of(face);
   if (side.count == 0) side.plane = plane;
   const double turned = std::max(std::abs(plane.slope[0] - side.plane.slope[0]),
