@@ -259,9 +259,9 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const btCollisionObject &first = *a->getCollisionObject(), &second = *b->getCollisionObject();
   const Settings settings = contacts_.settings_of(first, second);
   const btTransform &at_first = a->getWorldTransform(), &at_second = b->getWorldTransform();
-  Contact contact;
   if (typeid(*result) != typeid(btManifoldResult)) {
     // contactTest() and its like collect points through a manifold.
+    Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     if (state_->manifolds.empty()) {
       state_->manifolds.push_back(m_dispatcher->getNewManifold(&first, &second));
@@ -301,6 +301,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     state_->move_points(first, second, step);
   } else {
     const Spring spring = spring_of(state_->meeting, first, second, settings, step);
+    Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;

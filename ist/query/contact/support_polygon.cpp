@@ -209,39 +209,51 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedTree& solid) noexcept {
   const double unit = solid.scale * std::ldexp(1.0, asset.exponent);
   const Matrix3d turn = unit * pose.linear();
   const Vector3d shift = pose * (solid.scale * Vector3d(asset.centre));
-  const Vector3d normal = turn.transpose() * normal_;
+  // The normal and the middle in the mesh's frame, lengths there.
+  const Vector3d normal = turn.transpose() * normal_ / unit;
+  const Vector3d middle = turn.transpose() * (middle_ - shift) / (unit * unit);
+  const double near = near_ / unit;
   struct Waiting {
     std::uint32_t level, block;
   };
-  Waiting waiting[kWidth * kMaxLevels];
-  std::size_t count = 0;
-  waiting[count++] = {mesh.level_count - 1, 0};
-  while (count > 0 && flat_) {
-    const auto [level, block] = waiting[--count];
-    if (level == 0) {
-      const MeshBlock& from = blocks[block];
-      const auto place = [&](int k, std::uint32_t t) -> Vector3d {
-        return turn * Vector3d(vertices + 3 * std::size_t{from.vertex[from.corner[k][t]]}) + shift;
-      };
-      for (std::uint32_t t = 0; t < from.triangles; ++t)
-        add_triangle(of_b, place(0, t), place(1, t), place(2, t));
-      continue;
-    }
-    const BoxBlock& boxes = at<BoxBlock>(asset, mesh.level[level].blocks)[block];
-    const std::uint32_t below = mesh.level[level - 1].count;
-    for (std::uint32_t lane = 0; lane < kWidth && kWidth * block + lane < below; ++lane) {
-      Vector3d low, high;
-      for (int k = 0; k < 3; ++k) low[k] = boxes.low[k][lane], high[k] = boxes.high[k][lane];
-      const Vector3d half = 0.5 * (high - low);
-      const Vector3d from = turn * (0.5 * (high + low)) + shift - middle_;
-      const double away = from.norm(), radius = unit * half.norm();
-      if (away > reach_ + radius ||
-          std::abs(normal_.dot(from)) - normal.cwiseAbs().dot(half) >
-              near_ + kTurned * (away + radius))
+  const auto visit = [&](double reach) {
+    Waiting waiting[kWidth * kMaxLevels];
+    std::size_t count = 0;
+    waiting[count++] = {mesh.level_count - 1, 0};
+    while (count > 0 && flat_) {
+      const auto [level, block] = waiting[--count];
+      if (level == 0) {
+        const MeshBlock& from = blocks[block];
+        const auto place = [&](int k, std::uint32_t t) -> Vector3d {
+          return turn * Vector3d(vertices + 3 * std::size_t{from.vertex[from.corner[k][t]]}) +
+                 shift;
+        };
+        for (std::uint32_t t = 0; t < from.triangles; ++t)
+          add_triangle(of_b, place(0, t), place(1, t), place(2, t));
         continue;
-      waiting[count++] = {level - 1, kWidth * block + lane};
+      }
+      const BoxBlock& boxes = at<BoxBlock>(asset, mesh.level[level].blocks)[block];
+      const std::uint32_t below = mesh.level[level - 1].count;
+      for (std::uint32_t lane = 0; lane < kWidth && kWidth * block + lane < below; ++lane) {
+        // The sum of a vector's coordinates bounds its length.
+        double along = 0, half_along = 0, furthest = 0, apart = 0;
+        for (int k = 0; k < 3; ++k) {
+          const double low = boxes.low[k][lane], high = boxes.high[k][lane];
+          const double from = 0.5 * (high + low) - middle[k], half = 0.5 * (high - low);
+          along += normal[k] * from;
+          half_along += std::abs(normal[k]) * half;
+          furthest += std::abs(from) + half;
+          apart = std::max(apart, std::abs(from) - half);
+        }
+        if (apart > reach || std::abs(along) - half_along > near + kTurned * furthest) continue;
+        waiting[count++] = {level - 1, kWidth * block + lane};
+      }
     }
-  }
+  };
+  // Most round surfaces show in the middle that they are.
+  visit(near);
+  sides_[of_b].count = 0;
+  visit(reach_ / unit);
 }
 
 /// That of the outermost face, under the middle.
