@@ -44,9 +44,9 @@ class SupportPolygon {
 
   /// Writes the corners, those of the true hull if they fit and of as many directions as fit if
   /// not. Returns how many, or nothing if the contact is not flat or if there is no room for three:
-  /// then use the patches. Where the faces are apart, and spheres alone reach from one to the other,
-  /// the depths are negative, the gaps, and no corner has a volume or a force. Ids are those of
-  /// directions in `axes`, with the highest bit set: patches have others.
+  /// then use the patches. Where the faces are apart, and spheres alone reach from one to the
+  /// other, the depths are negative, the gaps, and no corner has a volume or a force. Ids are those
+  /// of directions in `axes`, with the highest bit set: patches have others.
   std::optional<std::size_t> corners(std::span<ContactPatch> patches) const noexcept;
 
  private:

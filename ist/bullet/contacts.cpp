@@ -411,9 +411,12 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
       double stiffness = spring.at(patch.depth) * patch.area, relaxation = spring.relaxation;
       if (patch.depth > 0) {
         const double parting = spring.parting(patch.depth, together.dot(patch.normal));
+        // As the point moves along, its speed grows with its depth: hardly any is no measure.
+        const double placed =
+            to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal);
         const double speed =
-            parting +
-            std::max(0.0, to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal));
+            parting + std::max(0.0, placed) *
+                          std::min(1.0, patch.depth / std::max(0.2 * spring.rest, 1e-300));
         stiffness *= speed / parting;
         relaxation = patch.depth / speed - spring.step;
       }

@@ -138,10 +138,10 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     return shape != nullptr ? shape->scale() * shape->tree().protrusion() : 0;
   };
   const bool by_second = radius(second_) <= radius(first_);
-  SupportPolygon polygon(contact.whole, contact.origin,
-                         to_eigen(by_second ? second : first).linear(),
-                         2 * std::min(radius(first_), radius(second_)),
-                         settings.query.measure == Measure::exact ? 0 : blur(first_) + blur(second_));
+  SupportPolygon polygon(
+      contact.whole, contact.origin, to_eigen(by_second ? second : first).linear(),
+      2 * std::min(radius(first_), radius(second_)),
+      settings.query.measure == Measure::exact ? 0 : blur(first_) + blur(second_));
   for (const bool of_second : {false, true}) {
     const PlacedSolid& solid = of_second ? b : a;
     if (polygon.add(of_second, solid)) continue;

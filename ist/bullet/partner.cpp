@@ -215,8 +215,9 @@ bool MeshDistance::is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d&
         std::abs(first.normal.dot(triangle.centre - first.centre)) > same)
       return false;
   // What each has of the rectangle under the box, clipped by its four sides.
-  const Eigen::Vector3d axes[2] = {(first.corner[1] - first.corner[0]).normalized(),
-                                   first.normal.cross(first.corner[1] - first.corner[0]).normalized()};
+  const Eigen::Vector3d axes[2] = {
+      (first.corner[1] - first.corner[0]).normalized(),
+      first.normal.cross(first.corner[1] - first.corner[0]).normalized()};
   const double reach[2] = {axes[0].cwiseAbs().dot(half), axes[1].cwiseAbs().dot(half)};
   double covered = 0;
   for (const Triangle& triangle : triangles_) {

@@ -84,15 +84,15 @@ TEST(Support, CornersOfExactContactsSumToTheWhole) {
   }
 }
 
-// What spheres blur the planes tell: a plate that is 0.01 mm deep has its four corners, its area and
-// its volume; one that is 0.01 mm above has none.
+// What spheres blur the planes tell: a plate that is 0.01 mm deep has its four corners, its area
+// and its volume; one that is 0.01 mm above has none.
 TEST(Support, SpheresTakeTheirDepthsFromTheFaces) {
   Workspace workspace;
   const PlacedSolid below(BoxField{{0.15, 0.15, 0.02}}, {});
   for (const double depth : {1e-5, 2e-4, 1e-3, -1e-5}) {
     ContactPatch patches[8];
-    const ContactPatches found =
-        contact_points(below, at_height(flat_box(), 0.03, 0, 0.04 - depth, 0.2), {}, workspace, patches);
+    const ContactPatches found = contact_points(
+        below, at_height(flat_box(), 0.03, 0, 0.04 - depth, 0.2), {}, workspace, patches);
     if (depth < 0) {
       EXPECT_EQ(found.count, 0u);
       continue;
@@ -102,7 +102,8 @@ TEST(Support, SpheresTakeTheirDepthsFromTheFaces) {
     EXPECT_NEAR(sums.area, 0.04, 1e-9);
     EXPECT_NEAR(sums.volume, 0.04 * depth, 1e-9 * depth);
     for (const ContactPatch& corner : std::span(patches, found.count))
-      EXPECT_NEAR((corner.point.head<2>() - Eigen::Vector2d(0.03, 0)).norm(), 0.1 * std::sqrt(2), 1e-9);
+      EXPECT_NEAR((corner.point.head<2>() - Eigen::Vector2d(0.03, 0)).norm(), 0.1 * std::sqrt(2),
+                  1e-9);
   }
 }
 
@@ -154,7 +155,8 @@ TEST(BulletSupport, ABoxStandsOverAnEdgeAsFarAsItsMiddle) {
   };
   const btVector3 under(0, 0, -0.1);
   for (const double over : {0.3, 0.42, 0.47}) {
-    EXPECT_TRUE(stands(std::make_unique<btBoxShape>(btVector3(0.1, 0.1, 0.1)), under, over)) << over;
+    EXPECT_TRUE(stands(std::make_unique<btBoxShape>(btVector3(0.1, 0.1, 0.1)), under, over))
+        << over;
     EXPECT_TRUE(stands(cube_of_side(kBox), under, over)) << over;
     EXPECT_TRUE(stands(cube_of_side(kBox), under, over, true)) << over;
     EXPECT_TRUE(stands(hull(), under, over)) << over;
@@ -172,9 +174,9 @@ TEST(BulletSupport, AStackThatStandsAskewDoesNotCreep) {
     std::vector<btRigidBody*> boxes;
     for (int i = 0; i < 10; ++i) {
       const btQuaternion turn({0, 0, 1}, 0.02 * (i * 5 % 7 - 3));
-      boxes.push_back(&world.add(cube_of_side(kBox), 5,
-                                 btTransform(turn, {0.002 * (i * 7 % 5 - 2), 0.002 * (i * 3 % 5 - 2),
-                                                    kBox * (i + 0.5)})));
+      boxes.push_back(&world.add(
+          cube_of_side(kBox), 5,
+          btTransform(turn, {0.002 * (i * 7 % 5 - 2), 0.002 * (i * 3 % 5 - 2), kBox * (i + 0.5)})));
     }
     const auto places = [&] {
       std::vector<btVector3> all;

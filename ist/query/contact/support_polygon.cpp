@@ -32,7 +32,8 @@ constexpr double kNearMiddle = 2;
 constexpr double kInPlane = 0.05;
 /// The area of a contact over that of its faces: else not all of it is flat.
 constexpr double kMostArea = 1.5, kMostExactArea = 1.1;
-constexpr std::size_t kMostPairs = 1 << 14;
+constexpr double kAlike = 5e-3;              // of the width of the polygon
+constexpr std::size_t kMostPairs = 1 << 14;  // of faces
 
 double cross(double u, double v, double s, double t) { return u * t - v * s; }
 
@@ -102,10 +103,10 @@ struct SupportPolygon::Hull {
 SupportPolygon::SupportPolygon(const Penetration& whole, const Vector3d& origin_b,
                                const Matrix3d& axes, double reach, double blur) noexcept
     : whole_(whole), origin_b_(origin_b), reach_(reach), blurred_(blur > 0) {
-  const PatchAxis axis =
-      PatchAxis::of(whole.volume, plain(whole.centroid), plain(Vector3d(-whole.translation_gradient)),
-                    plain(Vector3d(-whole.rotation_gradient)), plain(origin_b),
-                    std::numeric_limits<double>::infinity());
+  const PatchAxis axis = PatchAxis::of(whole.volume, plain(whole.centroid),
+                                       plain(Vector3d(-whole.translation_gradient)),
+                                       plain(Vector3d(-whole.rotation_gradient)), plain(origin_b),
+                                       std::numeric_limits<double>::infinity());
   area_ = axis.area;
   near_ = kNearMiddle * axis.depth + blur;
   twist_ = axis.twist;
@@ -142,7 +143,7 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
   const double square = facing * facing / normal.squaredNorm();
   if (!(square > kRound * kRound)) return;
   const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
-    const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
+  const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
   if ((p - middle_).squaredNorm() > (reach_ + radius) * (reach_ + radius)) return;
   if (!(square > kFacing * kFacing)) {
     const auto is_here = [&](const Corner& x) { return std::abs(x.z) <= near_; };
@@ -273,8 +274,7 @@ bool SupportPolygon::is_near(const Face& face, const Plane& plane) const {
   });
 }
 
-std::optional<std::size_t> SupportPolygon::corners(
-    std::span<ContactPatch> patches) const noexcept {
+std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patches) const noexcept {
   Plane plane[2];
   if (!flat_ || patches.size() < 3 || !choose_plane(false, plane[0]) ||
       !choose_plane(true, plane[1]) || (sides_[0].endless && sides_[1].endless))
@@ -315,10 +315,10 @@ std::optional<std::size_t> SupportPolygon::corners(
   const Vector3d normal =
       blurred_ ? Vector3d(normal_ - mean[0] * axis_[0] - mean[1] * axis_[1]).normalized() : normal_;
 
-  // Corners that hardly differ are one.
+  // Corners that hardly differ are one, or they would come and go.
   double alike = 0;
   for (int k = 0; k < kDirections / 2; ++k)
-    alike = std::max(alike, 1e-4 * (hull.most[k] + hull.most[k + kDirections / 2]));
+    alike = std::max(alike, kAlike * (hull.most[k] + hull.most[k + kDirections / 2]));
   Corner ring[kDirections];
   int name[kDirections], count = 0;
   for (int stride = 1; stride == 1 || count > static_cast<int>(patches.size()); stride *= 2) {
@@ -338,7 +338,8 @@ std::optional<std::size_t> SupportPolygon::corners(
 
   // Mean value coordinates of the middle (Floater 2003): positive, and Σ weight · corner is 0.
   double half[kDirections], length[kDirections], weight[kDirections], sum = 0;
-  for (int i = 0; i < count; ++i) length[i] = std::sqrt(ring[i].u * ring[i].u + ring[i].v * ring[i].v);
+  for (int i = 0; i < count; ++i)
+    length[i] = std::sqrt(ring[i].u * ring[i].u + ring[i].v * ring[i].v);
   for (int i = 0; i < count; ++i) {
     const int j = (i + 1) % count;
     const double sine = cross(ring[i].u, ring[i].v, ring[j].u, ring[j].v);
@@ -362,7 +363,8 @@ std::optional<std::size_t> SupportPolygon::corners(
     const double z = 0.5 * (plane[0].at(ring[i]) + plane[1].at(ring[i]));
     ContactPatch& patch = patches[static_cast<std::size_t>(i)] = {};
     patch.id = kName | static_cast<std::uint64_t>(name[i]);
-    patch.centroid = patch.point = middle_ + ring[i].u * axis_[0] + ring[i].v * axis_[1] + z * normal_;
+    patch.centroid = patch.point =
+        middle_ + ring[i].u * axis_[0] + ring[i].v * axis_[1] + z * normal_;
     patch.normal = normal;
     patch.area = weight[i];
     patch.depth = depth(ring[i]);
