@@ -259,9 +259,9 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const btCollisionObject &first = *a->getCollisionObject(), &second = *b->getCollisionObject();
   const Settings settings = contacts_.settings_of(first, second);
   const btTransform &at_first = a->getWorldTransform(), &at_second = b->getWorldTransform();
-  Contact contact;
   if (typeid(*result) != typeid(btManifoldResult)) {
     // contactTest() and its like collect points through a manifold.
+    Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     if (state_->manifolds.empty()) {
       state_->manifolds.push_back(m_dispatcher->getNewManifold(&first, &second));
@@ -301,6 +301,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     state_->move_points(first, second, step);
   } else {
     const Spring spring = spring_of(state_->meeting, first, second, settings, step);
+    Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
@@ -399,6 +400,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     const double approach =
         normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
     if (point.m_combinedRestitution > 0 && approach > spring.slow) {
+      if (patch.depth < 0) continue;  // or the gap would take from the speed
       // A damped spring would absorb the speed, so a point that bounces is rigid in this step.
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
@@ -406,15 +408,21 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
       // Bullet takes spring and damper, and makes of them the speed at which they part bodies,
       // depth · spring / (step · spring + damper), and the impulse of a unit of speed that is
       // missing. At rest, against what is placed, the force is the spring's.
-      const double parting = spring.parting(patch.depth, together.dot(patch.normal));
-      const double speed =
-          parting +
-          std::max(0.0, to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal));
-      const double stiffness = spring.at(patch.depth) * patch.area * speed / parting;
+      double stiffness = spring.at(patch.depth) * patch.area, relaxation = spring.relaxation;
+      if (patch.depth > 0) {
+        const double parting = spring.parting(patch.depth, together.dot(patch.normal));
+        // As the point moves along, its speed grows with its depth: hardly any is no measure.
+        const double placed =
+            to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal);
+        const double speed =
+            parting + std::max(0.0, placed) *
+                          std::min(1.0, patch.depth / std::max(0.2 * spring.rest, 1e-300));
+        stiffness *= speed / parting;
+        relaxation = patch.depth / speed - spring.step;
+      }
       point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
       point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
-      point.m_combinedContactDamping1 =
-          static_cast<btScalar>(stiffness * (patch.depth / speed - spring.step));
+      point.m_combinedContactDamping1 = static_cast<btScalar>(stiffness * relaxation);
     }
     set_name(point, patch.id);
     for (std::size_t k = 0; k < old_count; ++k) {

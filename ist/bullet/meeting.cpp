@@ -10,6 +10,7 @@
 
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
+#include <ist/support.h>
 #include <ist/surface.h>
 
 namespace ist::bullet {
@@ -124,6 +125,29 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.whole = found.penetration;
   contact.count = found.count;
   contact.inside = found.penetration.volume > 0 && find_way_out({a, b}, {first, second}, contact);
+  // Patches of a flat contact push alike.
+  constexpr double kAlike = 0.99;
+  double areas = 0;
+  for (const ContactPatch& patch : room.first(contact.count)) areas += patch.area;
+  if (contact.inside || !(contact.whole.translation_gradient.norm() > kAlike * areas)) return;
+
+  const auto radius = [](const Shape* shape) {
+    return shape != nullptr ? shape->reach() : std::numeric_limits<double>::infinity();
+  };
+  const auto blur = [](const Shape* shape) {
+    return shape != nullptr ? shape->scale() * shape->tree().protrusion() : 0;
+  };
+  const bool by_second = radius(second_) <= radius(first_);
+  SupportPolygon polygon(
+      contact.whole, contact.origin, to_eigen(by_second ? second : first).linear(),
+      2 * std::min(radius(first_), radius(second_)),
+      settings.query.measure == Measure::exact ? 0 : blur(first_) + blur(second_));
+  for (const bool of_second : {false, true}) {
+    const PlacedSolid& solid = of_second ? b : a;
+    if (polygon.add(of_second, solid)) continue;
+    if (partner_) partner_->add_faces(std::get<PlacedField>(solid.placed), of_second, polygon);
+  }
+  contact.count = polygon.corners(room).value_or(contact.count);
 }
 
 bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& contact) const {

@@ -13,12 +13,14 @@
 #include <LinearMath/btConvexHullComputer.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
 
 #include <ist/bullet/convert.h>
+#include <ist/pose_eigen.h>
 
 namespace ist::bullet {
 
@@ -166,6 +168,21 @@ FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
   return {-nearest, way};
 }
 
+void HullDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
+                             SupportPolygon& polygon) const {
+  for (const Face& face : faces_)
+    for (std::size_t i = 2; i < face.corners.size(); ++i)
+      polygon.add_triangle(of_b, pose * face.corners[0], pose * face.corners[i - 1],
+                           pose * face.corners[i]);
+}
+
+void MeshDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
+                             SupportPolygon& polygon) const {
+  for (const Triangle& triangle : triangles_)
+    polygon.add_triangle(of_b, pose * triangle.corner[0], pose * triangle.corner[1],
+                         pose * triangle.corner[2]);
+}
+
 void MeshDistance::gather(const btConcaveShape& shape, const btVector3& lower,
                           const btVector3& upper, double thickness) {
   triangles_.clear();
@@ -185,6 +202,50 @@ void MeshDistance::gather(const btConcaveShape& shape, const btVector3& lower,
   const auto grown = static_cast<btScalar>(thickness);
   shape.processAllTriangles(this, lower - btVector3(grown, grown, grown),
                             upper + btVector3(grown, grown, grown));
+  level_ = is_level(to_eigen(lower), to_eigen(upper));
+}
+
+bool MeshDistance::is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) const {
+  if (triangles_.empty()) return false;
+  const Triangle& first = triangles_[0];
+  const Eigen::Vector3d middle = 0.5 * (lower + upper), half = 0.5 * (upper - lower);
+  const double same = 1e-12 * (half.norm() + middle.norm() + first.centre.norm());
+  for (const Triangle& triangle : triangles_)
+    if ((triangle.normal - first.normal).squaredNorm() > 1e-24 ||
+        std::abs(first.normal.dot(triangle.centre - first.centre)) > same)
+      return false;
+  // What each has of the rectangle under the box, clipped by its four sides.
+  const Eigen::Vector3d axes[2] = {
+      (first.corner[1] - first.corner[0]).normalized(),
+      first.normal.cross(first.corner[1] - first.corner[0]).normalized()};
+  const double reach[2] = {axes[0].cwiseAbs().dot(half), axes[1].cwiseAbs().dot(half)};
+  double covered = 0;
+  for (const Triangle& triangle : triangles_) {
+    std::array<Eigen::Vector2d, 8> corners, clipped;
+    std::size_t count = 3;
+    for (std::size_t k = 0; k < 3; ++k)
+      for (int i = 0; i < 2; ++i) corners[k][i] = axes[i].dot(triangle.corner[k] - middle);
+    for (int side = 0; side < 4; ++side) {
+      const auto inside = [&](const Eigen::Vector2d& x) {
+        return reach[side / 2] - (side % 2 == 0 ? x[side / 2] : -x[side / 2]);
+      };
+      std::size_t kept = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        const Eigen::Vector2d &x = corners[k], &y = corners[(k + 1) % count];
+        const double at_x = inside(x), at_y = inside(y);
+        if (at_x >= 0) clipped[kept++] = x;
+        if ((at_x >= 0) != (at_y >= 0)) clipped[kept++] = x + at_x / (at_x - at_y) * (y - x);
+      }
+      corners = clipped;
+      count = kept;
+    }
+    for (std::size_t k = 2; k < count; ++k) {
+      const Eigen::Vector2d x = corners[k - 1] - corners[0], y = corners[k] - corners[0];
+      covered += 0.5 * (x[0] * y[1] - x[1] * y[0]);
+    }
+  }
+  const double all = 4 * reach[0] * reach[1];
+  return std::abs(covered - all) < 1e-9 * all;
 }
 
 void MeshDistance::processTriangle(btVector3* corners, int, int) {
@@ -236,6 +297,12 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
   if (boxes_.empty()) return {-1e100, Eigen::Vector3d::Zero()};
+  if (level_) {
+    const Eigen::Vector3d& up = triangles_[0].normal;
+    const double depth = up.dot(triangles_[0].centre - x);
+    if (depth < thickness_ - depth) return {depth, -up};
+    return {thickness_ - depth, up};
+  }
   // The triangles of the nearest box say first how near is near.
   const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
     const auto& corner = triangle.corner;
@@ -383,6 +450,27 @@ PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
     placed.field = FunctionField{mesh_sample, &near, 0};
   }
   return placed;
+}
+
+void Partner::add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const {
+  const Eigen::Isometry3d pose = to_isometry(placed.pose);
+  if (hull_ != nullptr) return hull_->add_faces(pose, of_b, polygon);
+  if (mesh_ != nullptr) {
+    const auto& near = std::get<FunctionField>(placed.field);
+    return static_cast<const MeshDistance*>(near.context)->add_faces(pose, of_b, polygon);
+  }
+  const auto* const cylinder = std::get_if<CylinderField>(&placed.field);
+  if (cylinder == nullptr) return;
+  constexpr int kSides = 32;
+  for (const double sign : {-1.0, 1.0}) {
+    const auto rim = [&](int i) -> Eigen::Vector3d {
+      const double turn = sign * 2 * std::numbers::pi * i / kSides;
+      return pose * Eigen::Vector3d(cylinder->radius * std::cos(turn),
+                                    cylinder->radius * std::sin(turn),
+                                    sign * cylinder->half_height);
+    };
+    for (int i = 2; i < kSides; ++i) polygon.add_triangle(of_b, rim(0), rim(i - 1), rim(i));
+  }
 }
 
 }  // namespace ist::bullet

@@ -10,6 +10,7 @@
 
 #include <ist/bullet/shape.h>
 #include <ist/query.h>
+#include <ist/support.h>
 
 namespace ist::bullet {
 
@@ -21,6 +22,7 @@ class HullDistance {
 
   std::size_t faces() const { return faces_.size(); }
   FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
   struct Face {
@@ -41,6 +43,7 @@ class MeshDistance : public btTriangleCallback {
               double thickness);
 
   FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
   struct Triangle {
@@ -50,6 +53,8 @@ class MeshDistance : public btTriangleCallback {
     double area, reach = 0;  // [u²] twice its own; [u] of a corner from the centre
   };
   void processTriangle(btVector3* corners, int part, int index) override;
+  /// Whether all triangles lie in one plane, in which they cover what is under a box.
+  bool is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) const;
 
   static constexpr std::size_t kBlock = 8;  // neighbours, as the shape's tree has them
   std::vector<Triangle> triangles_;
@@ -57,6 +62,7 @@ class MeshDistance : public btTriangleCallback {
   double thickness_ = 0;
   int up_ = -1;  // of a height field: the axis to which its front faces
   bool mirrored_ = false;
+  bool level_ = false;  // near the body: the first triangle's plane
 };
 
 /// What an asset meets that is none: a shape of Bullet's as a field in the shape's frame. The shape
@@ -69,6 +75,10 @@ class Partner {
   /// the thread's next call.
   PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
+
+  /// Its flat faces, where SupportPolygon::add() does not know them. `placed`: by placed(), in the
+  /// same thread and not before another.
+  void add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const;
 
   const btCollisionShape& shape() const { return *shape_; }
 

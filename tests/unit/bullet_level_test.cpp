@@ -97,6 +97,15 @@ TEST(BulletLevel, AnOpenMeshIsASlab) {
   }
   near.gather(shape, {-0.1f, -0.1f, -0.25f}, {0.1f, 0.1f, -0.2f}, 0.3);  // a box under it
   EXPECT_NEAR(near.at({0, 0, -0.22}).distance, 0.08, 1e-6);
+  // The mesh covers all that is under this box: one plane tells the distances.
+  near.gather(shape, {-0.4, -0.4, -0.5}, {0.4, 0.4, 0.5}, 0.3);
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d x(0.25 * draw(random), 0.25 * draw(random), 0.3 * draw(random));
+    const double depth = -x.z(), expected = std::min(depth, 0.3 - depth);
+    const FieldSample told = near.at(x);
+    ASSERT_NEAR(told.distance, expected, 1e-12) << x.transpose();
+    EXPECT_NEAR(told.gradient.z(), depth < 0.15 ? -1 : 1, 1e-12);
+  }
 }
 
 struct Level {

@@ -66,7 +66,7 @@ struct Settings {
   /// by more than this share of the depth at which the lighter body rests. Until then their patches
   /// move along: the motion changes their depths, and their areas stay. A new contact may be found
   /// late by this motion. 0: queried in every step.
-  double follow = 0.05;
+  double follow = 0.02;
 };
 
 /// A contact of two objects: forces and normals push the second.
