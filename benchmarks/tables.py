@@ -40,7 +40,7 @@ def section(report):
 def write_page(reports, folder):
     """`reports`: of one benchmark, of this machine and that."""
     name = reports[0]["benchmark"]
-    text = f"# {reports[0]['page']}\n\nMade by `benchmarks/run.sh {name}`; do not edit.\n\n"
+    text = f"# {reports[0]['page']}\n\nMade by `{reports[0].get('made_by', f'benchmarks/run.sh {name}')}`; do not edit.\n\n"
     parts = [section(report).partition("\n")[2] for report in reports]
     (folder / f"{name}.md").write_text(text + "\n\n---\n".join(parts))
 

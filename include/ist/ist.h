@@ -60,6 +60,10 @@ enum {
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
   IST_NOT_BAKED = -16,   /* ist_bake() (ist_bake.h): its message says why */
+  /* Scenes (ist_scene.h). */
+  IST_SCENE_FULL = -17,   /* as many bodies as ist_scene_settings_t::max_bodies */
+  IST_NUMBER_TAKEN = -18, /* a body of this number is in the scene */
+  IST_NO_BODY = -19,      /* a number that no body of the scene has */
   /* Bytes that are not an asset. */
   IST_TOO_SHORT = -8,      /* fewer than their header says */
   IST_MISALIGNED = -9,     /* not on a 64-byte boundary */
@@ -409,7 +413,7 @@ typedef struct ist_penetration_t {
    * as wide as its rounding and the part that a limit left out. It does not bound the true
    * volume. */
   double volume_min, volume_max;
-  double centroid[3];             /* [u] of the overlap, world */
+  double centroid[3]; /* [u] of the overlap, or of the faces in which they touch, world */
   double translation_gradient[3]; /* [u²] dV/d(translation of B), world */
   double rotation_gradient[3];    /* [u³/rad] dV/d(rotation vector of B about B's origin), world */
   double contact_area;      /* [u²] IST_EXACT, touching: of the faces that lie on each other */

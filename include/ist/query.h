@@ -135,7 +135,8 @@ struct Penetration {
   /// volume.
   double volume_min = 0;
   double volume_max = 0;
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [u] of the overlap, world; zero if none
+  /// [u] Of the overlap, world. Where solids touch in faces: of these. Zero if there is neither.
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this,
   /// and A by the opposite. <ist/response.h> has pressures that grow with depth.
   Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();

@@ -5,11 +5,13 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <ist/api.h>
 #include <ist/overlap.h>
 #include <ist/query.h>
 #include <ist/surface.h>
+#include <ist/time_of_impact.h>
 
 namespace IST_API ist {
 
@@ -20,6 +22,7 @@ enum class SceneAnswer : std::uint32_t {
   overlap = 2,      ///< overlap(), within the margin: yes, no or unknown
   penetration = 3,  ///< penetration(), and separation() where a margin is set
   patches = 4,      ///< contact_patches(), likewise
+  impact = 5,       ///< time_of_impact() over their motions; boxes hold the ways of bodies
 };
 
 /// How bodies of two groups are asked.
@@ -29,6 +32,7 @@ struct SceneRule {
   PenetrationSettings penetration;
   /// [u] ≥ 0: bodies that come as near are told too, with their separation.
   double margin = 0;
+  ImpactSettings impact = {};  ///< SceneAnswer::impact
 };
 
 /// A solid in a scene.
@@ -40,6 +44,7 @@ struct SceneBody {
   std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
   std::uint32_t layers = 1;   ///< bits
   std::uint32_t meets = ~0u;  ///< bits: layers of bodies that it meets; both must agree
+  Motion motion = {};         ///< from its pose on, for SceneAnswer::impact
 };
 inline constexpr std::uint32_t kSceneGroups = 8;
 
@@ -47,7 +52,8 @@ inline constexpr std::uint32_t kSceneGroups = 8;
 enum class SceneEvent : std::uint32_t { begins = 0, stays = 1 };
 
 /// Two bodies that meet: their volume is positive, or they touch, or they come within the margin,
-/// or it is unknown. Answers that failed are here too: their status says why.
+/// or it is unknown; with SceneAnswer::impact, unless they stay clear. Answers that failed are here
+/// too: their status says why.
 struct ScenePair {
   std::uint32_t a = 0, b = 0;  ///< numbers, a < b; A of the query is `a`
   SceneEvent event = SceneEvent::begins;
@@ -73,7 +79,7 @@ struct SceneStep {
   std::span<const ScenePair> pairs;      ///< that meet, by (a, b)
   std::span<const ScenePairName> ended;  ///< met in the step before, by (a, b)
   std::span<const std::uint32_t>
-      refused;                ///< left out: pose or scale not usable, or beyond 1e37 [u]
+      refused;                ///< left out: pose, scale or motion not usable, or beyond 1e37 [u]
   std::size_t boxes_met = 0;  ///< pairs of bodies whose boxes meet
   /// Not all pairs had room (SceneSettings::max_pairs): nothing was asked, `pairs` is empty, and no
   /// pair ended.
@@ -113,11 +119,17 @@ class Scene {
   /// Returns how many there are.
   std::size_t set_poses(std::span<const std::uint32_t> numbers,
                         std::span<const Pose> poses) noexcept;
+  /// As set_poses(), of motions.
+  std::size_t set_motions(std::span<const std::uint32_t> numbers,
+                          std::span<const Motion> motions) noexcept;
   std::size_t size() const noexcept;
+  const SceneSettings& settings() const noexcept;
+  std::vector<std::uint32_t> numbers() const;  ///< of all bodies, the lowest first
   std::optional<SceneBody> body(std::uint32_t number) const;
 
   /// The rule for bodies of two groups, whichever is which. Asks all pairs again. Throws Error for
-  /// groups that are too large, or a margin that is negative or NaN.
+  /// groups that are too large, a margin that is negative or NaN, or a duration that is not above
+  /// 0.
   void set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule);
   /// Bodies that are joined: as long as both are there they do not meet. Throws std::bad_alloc.
   void exclude(std::uint32_t a, std::uint32_t b);
@@ -133,7 +145,16 @@ class Scene {
   /// overlap the separation is zero.
   Penetration penetration(const ScenePair& pair) const noexcept;
   Separation separation(const ScenePair& pair) const noexcept;
+  TimeOfImpact impact(const ScenePair& pair) const noexcept;
   std::span<const ContactPatch> patches(const ScenePair& pair) const noexcept;
+
+  /// What decides the next step: bodies, rules, exclusions and the pairs that met, with the content
+  /// hashes of assets. Of a filter it holds what it refuses now. Throws Error for a FunctionField.
+  std::vector<std::byte> record() const;
+  /// The scene that was recorded, of which the next step has the same bits. Throws Error where the
+  /// record is none or an asset is missing, naming its hash, whatever the bytes.
+  static Scene replay(std::span<const std::byte> record, std::span<const TreeView> assets,
+                      std::size_t workers = 1);
 
   /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.
   /// Bodies that rays do not support (<ist/surface.h>) and those that are refused are passed.

@@ -1,9 +1,11 @@
 #include <fmt/format.h>
+#include <minizip/zip.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 #include "clash/report.h"
 #include "library/text.h"
@@ -25,59 +27,47 @@ std::string guid(const std::string& words) {
                      high & 0xfff, (low >> 48 & 0x3fff) | 0x8000, low & 0xffffffffffff);
 }
 
-/// A zip archive whose files are stored as they are (APPNOTE 6.3, 4.3).
+/// A zip archive in memory. The same bytes for the same files.
 class Zip {
  public:
-  void add(const std::string& name, const std::string& content) {
-    const std::size_t at = bytes_.size();
-    std::string common;
-    number(common, 0x08000014, 4);  // version 2.0; names are UTF-8
-    number(common, 0, 2);           // stored
-    number(common, 0x210000, 4);    // 1980-01-01
-    number(common, crc(content), 4);
-    number(common, content.size(), 4);
-    number(common, content.size(), 4);
-    number(common, name.size(), 2);
-    number(common, 0, 2);  // nothing extra
-    number(bytes_, 0x04034b50, 4);
-    bytes_ += common + name + content;
-    number(directory_, 0x02014b50, 4);
-    number(directory_, 20, 2);
-    directory_ += common;
-    number(directory_, 0, 2 + 2 + 2 + 4);  // no comment, disk 0, no attributes
-    number(directory_, at, 4);
-    directory_ += name;
-    ++files_;
+  Zip() {
+    zlib_filefunc64_def memory = {};
+    memory.opaque = this;
+    memory.zopen64_file = [](void* self, const void*, int) { return self; };
+    memory.zwrite_file = [](void* self, void*, const void* bytes, uLong size) {
+      Zip& zip = *static_cast<Zip*>(self);
+      if (zip.bytes_.size() < zip.at_ + size) zip.bytes_.resize(zip.at_ + size);
+      std::copy_n(static_cast<const char*>(bytes), size, zip.bytes_.data() + zip.at_);
+      zip.at_ += size;
+      return size;
+    };
+    memory.ztell64_file = [](void* self, void*) -> ZPOS64_T {
+      return static_cast<Zip*>(self)->at_;
+    };
+    memory.zseek64_file = [](void* self, void*, ZPOS64_T to, int) -> long {  // always to a place
+      static_cast<Zip*>(self)->at_ = to;
+      return 0;
+    };
+    memory.zclose_file = memory.zerror_file = [](void*, void*) { return 0; };
+    zip_ = zipOpen2_64("", APPEND_STATUS_CREATE, nullptr, &memory);
   }
-
-  std::string finish() const {
-    std::string end;
-    number(end, 0x06054b50, 4);
-    number(end, 0, 4);
-    number(end, files_, 2);
-    number(end, files_, 2);
-    number(end, directory_.size(), 4);
-    number(end, bytes_.size(), 4);
-    number(end, 0, 2);
-    return bytes_ + directory_ + end;
+  void add(const std::string& name, const std::string& content) {
+    zip_fileinfo info = {};
+    info.dosDate = 0x210000;  // 1980-01-01
+    zipOpenNewFileInZip(zip_, name.c_str(), &info, nullptr, 0, nullptr, 0, nullptr, Z_DEFLATED,
+                        Z_DEFAULT_COMPRESSION);
+    zipWriteInFileInZip(zip_, content.data(), static_cast<unsigned>(content.size()));
+    zipCloseFileInZip(zip_);
+  }
+  std::string finish() {
+    zipClose(zip_, nullptr);
+    return std::move(bytes_);
   }
 
  private:
-  static void number(std::string& out, std::uint64_t value, int bytes) {
-    for (int i = 0; i < bytes; ++i) out += static_cast<char>(i < 8 ? value >> (8 * i) & 0xff : 0);
-  }
-
-  static std::uint32_t crc(const std::string& content) {
-    std::uint32_t sum = ~0u;
-    for (const char c : content) {
-      sum ^= static_cast<unsigned char>(c);
-      for (int bit = 0; bit < 8; ++bit) sum = sum >> 1 ^ ((sum & 1) != 0 ? 0xedb88320u : 0);
-    }
-    return ~sum;
-  }
-
-  std::string bytes_, directory_;
-  std::size_t files_ = 0;
+  zipFile zip_ = nullptr;
+  std::string bytes_;
+  std::size_t at_ = 0;
 };
 
 /// An IFC's element, where its part is named after its 22 letters; else by the part's name.

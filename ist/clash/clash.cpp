@@ -5,18 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <fstream>
 #include <map>
-#include <numeric>
+#include <mutex>
+#include <optional>
 #include <tuple>
 #include <utility>
 
-#include <ist/asset_layout.h>
 #include <ist/error.h>
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
+#include <ist/scene.h>
 #include <ist/surface.h>
 
+#include "clash/world_mesh.h"
 #include "mesh/import/source_file.h"
 #include "stage/thread_arena.h"
 
@@ -26,6 +29,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kPatches = 512;
+constexpr double kFlush = 1e-7;  ///< faces that are as near, of the smaller part's diameter
 
 struct Scratch {
   Workspace workspace;
@@ -34,53 +38,71 @@ struct Scratch {
 
 /// A part as pairs see it.
 struct Placed {
-  const ClashPart* part = nullptr;
-  Eigen::AlignedBox3d box;
-  double touch = 0;  ///< [u] its share of what counts as touching
-  double volume = 0, diameter = 0;
-};
+  Placed(const ClashPart& given, const ClashSettings& settings) : part(given) {
+    const PlacedTree& solid = part.solid;
+    if (!solid.tree.has_mesh()) throw Error(part.name + ": its asset keeps no mesh");
+    const Bounds world = bounds(solid), own = bounds(solid.tree);
+    if (!world.lower.allFinite() || !world.upper.allFinite())
+      throw Error(part.name +
+                  ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, "
+                  "the scale above 0");
+    const auto reach = [](const Bounds& b) {
+      return std::max(b.lower.cwiseAbs().maxCoeff(), b.upper.cwiseAbs().maxCoeff());
+    };
+    const double largest = std::max(reach(world), solid.scale * reach(own));
+    // Coordinates, and poses of as many digits, are each off by up to this.
+    touch = settings.touch_within >= 0
+                ? settings.touch_within / 2
+                : 4 * part.rounding * largest + part.slack + solid.scale * solid.tree.mesh_error();
+    margin = touch + settings.clearance / 2 + 4 * kFloat64 * largest;
+    box = {world.lower.array() - margin, world.upper.array() + margin};
+    volume = solid.tree.volume() * solid.scale * solid.scale * solid.scale;
+    diameter = 2 * world.radius;
+  }
+  /// Made when it is asked for first. `all`: a box around the assembly.
+  const WorldMesh& mesh(const Eigen::AlignedBox3d& all) const {
+    std::call_once(once_, [&] { mesh_.emplace(part.solid, all.center(), all.diagonal().norm()); });
+    return *mesh_;
+  }
 
-Placed placed(const ClashPart& part, const ClashSettings& settings) {
-  const PlacedTree& solid = part.solid;
-  if (!solid.tree.has_mesh()) throw Error(part.name + ": its asset keeps no mesh");
-  const Bounds world = bounds(solid), own = bounds(solid.tree);
-  if (!world.lower.allFinite() || !world.upper.allFinite())
-    throw Error(part.name +
-                ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, the "
-                "scale above 0");
-  const auto reach = [](const Bounds& b) {
-    return std::max(b.lower.cwiseAbs().maxCoeff(), b.upper.cwiseAbs().maxCoeff());
-  };
-  const double largest = std::max(reach(world), solid.scale * reach(own));
-  Placed out{&part, {world.lower, world.upper}, settings.touch_within / 2};
-  // Coordinates, and poses of as many digits, are each off by up to this.
-  if (settings.touch_within < 0)
-    out.touch = 4 * part.rounding * largest + part.slack + solid.scale * solid.tree.mesh_error();
-  const double margin = out.touch + settings.clearance / 2 + 4 * kFloat64 * largest;
-  out.box.min().array() -= margin;
-  out.box.max().array() += margin;
-  out.volume = solid.tree.volume() * solid.scale * solid.scale * solid.scale;
-  out.diameter = 2 * world.radius;
-  return out;
+  const ClashPart& part;
+  Eigen::AlignedBox3d box;
+  double margin = 0;  ///< [u] by which the box is wider
+  double touch = 0;   ///< [u] its share of what counts as touching
+  double volume = 0, diameter = 0;
+
+ private:
+  mutable std::once_flag once_;
+  mutable std::optional<WorldMesh> mesh_;
+};
+using PlacedParts = std::deque<Placed>;
+
+PenetrationSettings exactly() {
+  PenetrationSettings exact;
+  exact.measure = Measure::exact;
+  return exact;
 }
 
 /// Pairs whose boxes meet, sorted.
-std::vector<std::pair<std::size_t, std::size_t>> candidates(const std::vector<Placed>& parts,
+std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& parts,
                                                             const PairFilter& ignored) {
-  std::vector<std::size_t> order(parts.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](std::size_t i, std::size_t j) {
-    return parts[i].box.min().x() < parts[j].box.min().x();
-  });
+  double margin = 0;
+  for (const Placed& part : parts) margin = std::max(margin, part.margin);
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  for (std::size_t i = 0; i < order.size(); ++i)
-    for (std::size_t j = i + 1; j < order.size(); ++j) {
-      const auto [a, b] = std::minmax(order[i], order[j]);
-      if (parts[order[j]].box.min().x() > parts[order[i]].box.max().x()) break;
-      if (parts[a].box.intersects(parts[b].box) && !(ignored && ignored(a, b)))
-        pairs.emplace_back(a, b);
-    }
-  std::sort(pairs.begin(), pairs.end());
+  SceneSettings settings;
+  settings.max_bodies = std::max<std::size_t>(parts.size(), 1);
+  settings.workspace_capacity = 1;
+  for (bool complete = false; !complete; settings.max_pairs *= 8) {
+    Scene scene(settings);
+    scene.set_rule(0, 0, {SceneAnswer::boxes, exactly(), 2 * margin});
+    for (std::uint32_t i = 0; i < parts.size(); ++i)
+      scene.add({.number = i, .solid = parts[i].part.solid});
+    const SceneStep step = scene.step();
+    complete = !step.pairs_exceeded;
+    for (const ScenePair& pair : step.pairs)
+      if (parts[pair.a].box.intersects(parts[pair.b].box) && !(ignored && ignored(pair.a, pair.b)))
+        pairs.emplace_back(pair.a, pair.b);
+  }
   return pairs;
 }
 
@@ -102,9 +124,11 @@ struct Sums {
 
 class PairQuery {
  public:
-  PairQuery(const Placed& a, const Placed& b, const ClashSettings& settings, Scratch& scratch)
+  PairQuery(const Placed& a, const Placed& b, const Eigen::AlignedBox3d& all,
+            const ClashSettings& settings, Scratch& scratch)
       : a_(a),
         b_(b),
+        all_(all),
         touch_(settings.touch_within < 0 ? a.touch + b.touch : settings.touch_within),
         clearance_(settings.clearance),
         scratch_(scratch) {}
@@ -112,7 +136,7 @@ class PairQuery {
   /// False: there is nothing to list.
   bool ask(Clash& out) {
     Penetration found;
-    const Sums whole = patches(b_.part->solid, found, &out.depth);
+    const Sums whole = patches(b_.part.solid, found, &out.depth);
     out.status = found.status;
     out.volume = found.volume;
     out.volume_min = found.volume_min;
@@ -132,23 +156,17 @@ class PairQuery {
       return true;
     }
     out.kind = ClashKind::overlapping;
-    if (whole.has_way_out()) way_out(out, whole);
+    if (whole.has_way_out() && may_be_flush()) way_out(out, whole);
     const double most = std::max(a_.volume, b_.volume);
     out.duplicate = most - out.volume <= (1e-9 + 20 * touch_ / std::cbrt(most)) * most;
     return true;
   }
 
  private:
-  static PenetrationSettings exactly() {
-    PenetrationSettings exact;
-    exact.measure = Measure::exact;
-    return exact;
-  }
-
   /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
   Sums patches(const PlacedTree& solid_b, Penetration& found, double* depth = nullptr) {
     const ContactPatches all =
-        contact_patches(a_.part->solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
+        contact_patches(a_.part.solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
     found = all.penetration;
     std::map<std::uint64_t, Sums> parts;
     Sums whole;
@@ -170,14 +188,19 @@ class PairQuery {
 
   /// The overlap once B has moved.
   Penetration aside(const Vector3d& by) {
-    return penetration(a_.part->solid, moved(by), exactly(), scratch_.workspace);
+    return penetration(a_.part.solid, moved(by), exactly(), scratch_.workspace);
+  }
+
+  bool may_be_flush() const {
+    return have_common_plane(a_.mesh(all_), b_.mesh(all_), all_.diagonal().norm(),
+                             kFlush * std::min(a_.diameter, b_.diameter));
   }
 
   /// Where sides are flush the volume falls whichever way B goes across them: the mean of two
   /// places a little aside leaves that out.
   void way_out(Clash& out, const Sums& whole) {
     const Vector3d by =
-        std::min(1e-7 * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
+        std::min(kFlush * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
     Vector3d force = -aside(-by).translation_gradient;
     if ((force - whole.force).norm() > 1e-4 * whole.force.norm())
       force = (force - aside(by).translation_gradient) / 2;
@@ -187,7 +210,7 @@ class PairQuery {
   }
 
   PlacedTree moved(const Vector3d& by) const {
-    PlacedTree solid = b_.part->solid;
+    PlacedTree solid = b_.part.solid;
     for (int k = 0; k < 3; ++k) solid.pose.t[k] += by[k];
     return solid;
   }
@@ -197,18 +220,10 @@ class PairQuery {
     const Eigen::AlignedBox3d both = a_.box.intersection(b_.box);
     double deepest = 0;
     for (const auto& [of, in] : {std::pair(&a_, &b_), std::pair(&b_, &a_)}) {
-      const PlacedTree& solid = of->part->solid;
-      const AssetHeader& asset = solid.tree.header();
-      const char* const bytes = reinterpret_cast<const char*>(&asset);
-      const auto& mesh = *reinterpret_cast<const MeshHeader*>(bytes + asset.mesh);
-      const auto* const vertices = reinterpret_cast<const double*>(bytes + mesh.vertices);
-      const Eigen::Isometry3d place = to_isometry(solid.pose);
-      const double size = std::ldexp(1.0, asset.exponent);
-      for (std::uint32_t v = 0; v < mesh.vertex_count && deepest <= touch_; ++v) {
-        const Vector3d own = size * Vector3d(vertices + 3 * v) + Vector3d(asset.centre);
-        const Vector3d world = place * Vector3d(solid.scale * own);
+      for (const Vector3d& world : of->mesh(all_).vertices) {
+        if (deepest > touch_) return deepest;
         if (both.contains(world))
-          deepest = std::max(deepest, -closest_point(in->part->solid, world).distance);
+          deepest = std::max(deepest, -closest_point(in->part.solid, world).distance);
       }
     }
     return deepest;
@@ -217,18 +232,17 @@ class PairQuery {
   Separation distance(double limit) {
     SeparationSettings settings;
     settings.max_distance = limit;
-    return separation(a_.part->solid, b_.part->solid, settings, scratch_.workspace);
+    return separation(a_.part.solid, b_.part.solid, settings, scratch_.workspace);
   }
 
   /// The solids touch exactly.
   bool touches(const Penetration& found, Clash& out) {
+    out.kind = ClashKind::touching;
     out.direction = found.contact_normal;
-    if (out.direction.isZero(0)) {
-      const Separation nearest = distance(0);
-      out.centroid = (nearest.point_a + nearest.point_b) / 2;
-    }
-    measure_contact(out, std::max(touch_, 1e-7 * std::min(a_.diameter, b_.diameter)));
     out.contact_area = found.contact_area;
+    if (out.contact_area > 0) return true;
+    const Separation nearest = distance(0);
+    out.centroid = (nearest.point_a + nearest.point_b) / 2;
     return true;
   }
 
@@ -255,12 +269,13 @@ class PairQuery {
       found = aside(-by * out.direction);
       out.contact_area = std::max(0.0, -found.translation_gradient.dot(out.direction));
     } else if (out.volume > 0) {
-      out.contact_area = patches(b_.part->solid, found).area;
+      out.contact_area = patches(b_.part.solid, found).area;
     }
     if (found.volume > 0) out.centroid = found.centroid;
   }
 
   const Placed &a_, &b_;
+  const Eigen::AlignedBox3d& all_;
   const double touch_, clearance_;
   Scratch& scratch_;
   std::size_t parts_ = 0;  ///< connected ones that patches() found
@@ -281,8 +296,9 @@ double rounding_of_file(const std::string& path) {
 
 std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,
                                 const PairFilter& ignored) {
-  std::vector<Placed> all;
-  for (const ClashPart& part : parts) all.push_back(placed(part, settings));
+  PlacedParts all;
+  Eigen::AlignedBox3d bounds;
+  for (const ClashPart& part : parts) bounds.extend(all.emplace_back(part, settings).box);
   const auto pairs = candidates(all, ignored);
   std::vector<Clash> answers(pairs.size());
   std::vector<char> listed(pairs.size());
@@ -290,7 +306,7 @@ std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSet
   thread_arena(settings.threads).execute([&] {
     for_each_index(0, pairs.size(), 1, [&](std::size_t i) {
       std::tie(answers[i].a, answers[i].b) = pairs[i];
-      listed[i] = PairQuery(all[answers[i].a], all[answers[i].b], settings, scratch.local())
+      listed[i] = PairQuery(all[answers[i].a], all[answers[i].b], bounds, settings, scratch.local())
                       .ask(answers[i]);
     });
   });

@@ -55,6 +55,8 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const P
   for (double* const volume : {&answer.volume, &answer.volume_min, &answer.volume_max})
     *volume = std::min(*volume, most);
   if (answer.volume > 0) answer.centroid = sums.centroid;
+  if (found.contact.area > 0)
+    answer.centroid = pose.to_world(1 / found.contact.area * vector(found.contact.moment));
   answer.translation_gradient = sums.force;
   answer.rotation_gradient = sums.torque;
   answer.touching = found.contact.touching;

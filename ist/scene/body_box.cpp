@@ -52,11 +52,13 @@ std::optional<BodyBox::Turned> BodyBox::of(const Field& field) noexcept {
 }
 
 BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
+  double error = 0;  // of the surface
   if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
     const Bounds own = bounds(tree->tree);
     box_ = Turned{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
     scale_ = tree->scale;
     sticks_out_ = tree->scale * tree->tree.protrusion();
+    error = tree->scale * tree->tree.surface_error();
     empty_ = tree->tree.empty();
   } else {
     const auto& field = std::get<PlacedField>(solid.placed);
@@ -66,20 +68,40 @@ BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
   if (!box_) return;
   box_->middle *= scale_;
   box_->half *= scale_;
+  // As time_of_impact() has it: of the smaller solid, or of the errors of both.
+  tolerance_ = std::max(1e-3 * box_->half.norm(), 10 * error);
 }
 
-PlacedBox BodyBox::placed(const Pose& pose, double margin, bool by_spheres) const noexcept {
+PlacedBox BodyBox::placed(const Pose& pose, const BoxWidths& widths,
+                          const Motion& motion) const noexcept {
   const auto rotation = usable_rotation(pose, scale_);
   if (!rotation || empty_) return {};
   if (!box_) return {Place::endless};
   const Eigen::Matrix3d turn = rotation->toRotationMatrix();
   const Eigen::Vector3d middle = turn * box_->middle + vector(pose.t);
-  const double wider = margin + (by_spheres ? sticks_out_ : 0);
+  const double wider =
+      widths.margin + (widths.by_spheres ? sticks_out_ : 0) + (widths.by_size ? tolerance_ : 0);
   const Eigen::Vector3d half = turn.cwiseAbs() * box_->half + Eigen::Vector3d::Constant(wider);
-  const double farthest = (middle.cwiseAbs() + half).maxCoeff();
+  Eigen::Vector3d low = middle - half, high = middle + half;
+  if (widths.duration > 0) {
+    if (!motion.velocity.allFinite() || !motion.angular_velocity.allFinite() ||
+        !motion.about.allFinite() || !low.allFinite())
+      return {};
+    // A point that turns about another goes no further than the arc, nor than twice its distance.
+    const Eigen::Vector3d far = (box_->middle - scale_ * motion.about).cwiseAbs() + box_->half;
+    const double angle = motion.angular_velocity.norm() * widths.duration;
+    const double turned = (1 + 1e-12) * std::min(angle, 2.0) * far.norm();
+    const Eigen::Vector3d way = motion.velocity * widths.duration;
+    for (int k = 0; k < 3; ++k) {
+      low[k] += std::min(way[k], 0.0) - turned;
+      high[k] += std::max(way[k], 0.0) + turned;
+    }
+  }
   constexpr double kMost = 1e37;  // boxes are of floats
-  if (!std::isfinite(farthest) || farthest > kMost) return {};
-  return {Place::tree, box_around(middle - half, middle + half)};
+  if (!low.allFinite() || !high.allFinite() ||
+      std::max(low.cwiseAbs().maxCoeff(), high.cwiseAbs().maxCoeff()) > kMost)
+    return {};
+  return {Place::tree, box_around(low, high)};
 }
 
 }  // namespace ist

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 #include "scene/box_tree.h"
 
@@ -21,6 +22,14 @@ struct PlacedBox {
   SceneBox box = {};
 };
 
+/// By how much boxes are wider than solids.
+struct BoxWidths {
+  double margin = 0;        ///< [u]
+  double duration = 0;      ///< [T] of motions that they hold
+  bool by_spheres = false;  ///< by what matched spheres stick out
+  bool by_size = false;     ///< by the tolerance of impacts for which none is asked
+};
+
 SceneBox box_around(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) noexcept;
 
 /// What of a solid's box does not change with its pose.
@@ -29,8 +38,8 @@ class BodyBox {
   BodyBox() = default;
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
-  /// In the world, `margin` wider; and by what matched spheres stick out.
-  PlacedBox placed(const Pose& pose, double margin, bool by_spheres) const noexcept;
+  /// In the world.
+  PlacedBox placed(const Pose& pose, const BoxWidths& widths, const Motion& motion) const noexcept;
 
  private:
   struct Turned {
@@ -41,6 +50,7 @@ class BodyBox {
   std::optional<Turned> box_;  ///< in the solid's own frame, scaled; none: it has no end
   double scale_ = 1;
   double sticks_out_ = 0;  ///< [u]
+  double tolerance_ = 0;   ///< [u] at least this body's share of an impact's
   bool empty_ = false;
 };
 

@@ -11,11 +11,13 @@ constexpr double kWorn = 1.5;
 }  // namespace
 
 void BoxTree::take_room(std::size_t most) {
-  for (auto* const list : {&nodes_, &other_nodes_}) list->reserve(2 * most);
-  for (auto* const list : {&free_, &order_}) list->reserve(2 * most);
-  if (node_of_.size() < most) node_of_.resize(most, kNone);
-  // Two nodes leave at most three of a level waiting; in the worst case the hierarchy is a chain.
-  stack_.reserve(6 * most + 64);
+  // Each node but a root alone has two children.
+  free_.reserve(most + 1);
+  nodes_.reserve(most + 1);
+  order_.reserve(most);
+  if (lane_of_.size() < most) lane_of_.resize(most, kNone);
+  // A pair waits for each level of both; in the worst case a hierarchy is a chain.
+  stack_.reserve(2 * most + 64);
 }
 
 std::uint32_t BoxTree::take_node() noexcept {
@@ -30,85 +32,99 @@ std::uint32_t BoxTree::take_node() noexcept {
   return node;
 }
 
-void BoxTree::fit_above(std::uint32_t node) noexcept {
-  for (std::uint32_t at = nodes_[node].parent; at != kNone; at = nodes_[at].parent) {
-    const SceneBox before = nodes_[at].box;
-    fit(nodes_[at]);
-    if (nodes_[at].box == before) return;
+void BoxTree::fit_above(std::uint32_t at) noexcept {
+  while (nodes_[at].parent != kNone) {
+    const SceneBox box = nodes_[at].whole();
+    const std::uint32_t lane = nodes_[at].place;
+    at = nodes_[at].parent;
+    if (nodes_[at].box(lane) == box) return;
+    nodes_[at].set(lane, box);
+  }
+}
+
+void BoxTree::hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child,
+                   const SceneBox& box) noexcept {
+  nodes_[node].set(lane, box);
+  nodes_[node].child[lane] = child;
+  if (is_leaf(child)) {
+    lane_of_[child & ~kLeaf] = kLanes * node + lane;
+  } else {
+    nodes_[child].parent = node;
+    nodes_[child].place = lane;
   }
 }
 
 void BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
-  const std::uint32_t leaf = take_node();
-  node_of_[body] = leaf;
-  nodes_[leaf].box = box;
-  nodes_[leaf].body = body;
   ++leaves_;
   ++added_;
-  if (root_ == kNone) {
-    root_ = leaf;
-    return;
-  }
+  if (root_ == kNone) root_ = take_node();
   // Down to where the least area is added.
   std::uint32_t at = root_;
-  while (!nodes_[at].is_leaf()) {
-    const double here = nodes_[at].box.united(box).area(), grown = here - nodes_[at].box.area();
-    double cost[2];
-    for (int k = 0; k < 2; ++k) {
-      const Node& child = nodes_[nodes_[at].child[k]];
-      cost[k] = grown + child.box.united(box).area() - (child.is_leaf() ? 0 : child.box.area());
+  for (;;) {
+    const std::uint32_t used = nodes_[at].used();
+    const auto free = static_cast<std::uint32_t>(std::countr_one(used));
+    std::uint32_t best = kNone;
+    double least = 0;
+    for (std::uint32_t k = 0; k < kLanes; ++k) {
+      if ((used >> k & 1) == 0) continue;
+      const SceneBox own = nodes_[at].box(k);
+      const double grown = own.united(box).area() - own.area();
+      if (best != kNone && grown >= least) continue;
+      best = k;
+      least = grown;
     }
-    if (here < cost[0] && here < cost[1]) break;
-    at = nodes_[at].child[cost[1] < cost[0] ? 1 : 0];
+    const std::uint32_t child = best == kNone ? kNone : nodes_[at].child[best];
+    if (child != kNone && !is_leaf(child)) {
+      at = child;
+      continue;
+    }
+    if (free < kLanes) {
+      hang(at, free, body | kLeaf, box);
+    } else {
+      const SceneBox own = nodes_[at].box(best);
+      const std::uint32_t made = take_node();
+      hang(made, 0, child, own);
+      hang(made, 1, body | kLeaf, box);
+      hang(at, best, made, own.united(box));
+    }
+    fit_above(at);
+    return;
   }
-  const std::uint32_t above = take_node(), parent = nodes_[at].parent;
-  nodes_[above].box = nodes_[at].box.united(box);
-  nodes_[above].parent = parent;
-  nodes_[above].child[0] = at;
-  nodes_[above].child[1] = leaf;
-  nodes_[at].parent = nodes_[leaf].parent = above;
-  if (parent == kNone)
-    root_ = above;
-  else
-    nodes_[parent].child[nodes_[parent].child[0] == at ? 0 : 1] = above;
-  fit_above(above);
 }
 
 void BoxTree::remove(std::uint32_t body) noexcept {
-  const std::uint32_t leaf = std::exchange(node_of_[body], kNone);
+  const std::uint32_t lane = std::exchange(lane_of_[body], kNone);
+  std::uint32_t at = lane / kLanes;
   --leaves_;
-  in_order_ = false;
-  free_.push_back(leaf);
-  const std::uint32_t above = nodes_[leaf].parent;
-  if (above == kNone) {
-    root_ = kNone;
+  nodes_[at].clear(lane % kLanes);
+  const std::uint32_t used = nodes_[at].used();
+  if (at == root_) {
+    if (used != 0) return;
+    in_order_ = false;
+    free_.push_back(std::exchange(root_, kNone));
     return;
   }
-  const std::uint32_t other = nodes_[above].child[nodes_[above].child[0] == leaf ? 1 : 0];
-  const std::uint32_t parent = nodes_[above].parent;
-  nodes_[other].parent = parent;
-  free_.push_back(above);
-  if (parent == kNone) {
-    root_ = other;
-    return;
+  if ((used & (used - 1)) == 0) {  // the last one takes the node's place
+    in_order_ = false;
+    const auto last = static_cast<std::uint32_t>(std::countr_zero(used));
+    const std::uint32_t parent = nodes_[at].parent;
+    hang(parent, nodes_[at].place, nodes_[at].child[last], nodes_[at].box(last));
+    free_.push_back(at);
+    at = parent;
   }
-  nodes_[parent].child[nodes_[parent].child[0] == above ? 0 : 1] = other;
-  fit_above(other);
-}
-
-void BoxTree::move(std::uint32_t body, const SceneBox& box) noexcept {
-  nodes_[node_of_[body]].box = box;
-  fit_above(node_of_[body]);
+  fit_above(at);
 }
 
 void BoxTree::refit() noexcept {
+  if (root_ == kNone) return;
   // As dear as to build it: an order that is broken.
   if (!in_order_) return build();
   double area = 0;
   for (std::size_t i = nodes_.size(); i-- > 0;) {
-    if (nodes_[i].is_leaf()) continue;
-    fit(nodes_[i]);
-    area += nodes_[i].box.area();
+    const Node& node = nodes_[i];
+    const SceneBox box = node.whole();
+    area += box.area();
+    if (node.parent != kNone) nodes_[node.parent].set(node.place, box);
   }
   if (area > kWorn * built_area_) build();
 }
@@ -117,52 +133,59 @@ void BoxTree::build() noexcept {
   added_ = 0;
   built_area_ = 0;
   in_order_ = true;
-  if (root_ == kNone) return;
   order_.clear();
-  for (const std::uint32_t leaf : node_of_)
-    if (leaf != kNone) order_.push_back(leaf);
+  for (std::uint32_t body = 0; body < lane_of_.size(); ++body)
+    if (const std::uint32_t lane = lane_of_[body]; lane != kNone)
+      order_.push_back({nodes_[lane / kLanes].box(lane % kLanes), body});
   free_.clear();
-  other_nodes_.clear();
-  root_ = build(order_.data(), order_.data() + order_.size());
-  other_nodes_[root_].parent = kNone;
-  std::swap(nodes_, other_nodes_);
+  nodes_.clear();
+  root_ = order_.empty() ? kNone : build(order_.data(), order_.data() + order_.size());
 }
 
-/// In `other_nodes_`, of leaves of `nodes_`.
-std::uint32_t BoxTree::build(std::uint32_t* first, std::uint32_t* last) noexcept {
-  const auto node = static_cast<std::uint32_t>(other_nodes_.size());
-  if (last - first == 1) {
-    other_nodes_.push_back(nodes_[*first]);
-    node_of_[nodes_[*first].body] = node;
-    return node;
-  }
-  other_nodes_.emplace_back();
-  const auto middle_of = [&](std::uint32_t leaf, std::size_t k) {
-    return nodes_[leaf].box.low[k] + nodes_[leaf].box.high[k];
+/// A node over bodies.
+std::uint32_t BoxTree::build(Leaf* first, Leaf* last) noexcept {
+  const auto node = static_cast<std::uint32_t>(nodes_.size());
+  nodes_.emplace_back();
+  // Full ones below, as far as they go.
+  std::ptrdiff_t full = 1;
+  while (full * kLanes < last - first) full *= kLanes;
+  const auto divide = [&](Leaf* from, Leaf* to) {
+    const std::ptrdiff_t parts = (to - from + full - 1) / full;
+    if (parts < 2) return to;
+    Leaf* const at = from + (parts + 1) / 2 * full;
+    const auto middle_of = [](const Leaf& leaf, std::size_t k) {
+      return leaf.box.low[k] + leaf.box.high[k];
+    };
+    float low[3], high[3];
+    for (std::size_t k = 0; k < 3; ++k) low[k] = high[k] = middle_of(*from, k);
+    for (const Leaf* leaf = from; leaf != to; ++leaf)
+      for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = std::min(low[k], middle_of(*leaf, k));
+        high[k] = std::max(high[k], middle_of(*leaf, k));
+      }
+    std::size_t axis = 0;
+    for (std::size_t k = 1; k < 3; ++k)
+      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+    std::nth_element(from, at, to, [&](const Leaf& x, const Leaf& y) {
+      const float mx = middle_of(x, axis), my = middle_of(y, axis);
+      return mx != my ? mx < my : x.body < y.body;
+    });
+    return at;
   };
-  float low[3], high[3];
-  for (std::size_t k = 0; k < 3; ++k) low[k] = high[k] = middle_of(*first, k);
-  for (const std::uint32_t* leaf = first; leaf != last; ++leaf)
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], middle_of(*leaf, k));
-      high[k] = std::max(high[k], middle_of(*leaf, k));
+  Leaf* const half = divide(first, last);
+  Leaf* const ends[5] = {first, divide(first, half), half, divide(half, last), last};
+  std::uint32_t lane = 0;
+  for (int k = 0; k < 4; ++k) {
+    Leaf *const from = ends[k], *const to = ends[k + 1];
+    if (from == to) continue;
+    if (to - from == 1) {
+      hang(node, lane++, from->body | kLeaf, from->box);
+    } else {
+      const std::uint32_t child = build(from, to);
+      hang(node, lane++, child, nodes_[child].whole());
     }
-  std::size_t axis = 0;
-  for (std::size_t k = 1; k < 3; ++k)
-    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
-  std::uint32_t* const half = first + (last - first) / 2;
-  std::nth_element(first, half, last, [&](std::uint32_t x, std::uint32_t y) {
-    const float mx = middle_of(x, axis), my = middle_of(y, axis);
-    return mx != my ? mx < my : x < y;
-  });
-  const std::uint32_t children[2] = {build(first, half), build(half, last)};
-  Node& made = other_nodes_[node];
-  for (int k = 0; k < 2; ++k) {
-    made.child[k] = children[k];
-    other_nodes_[children[k]].parent = node;
   }
-  made.box = other_nodes_[children[0]].box.united(other_nodes_[children[1]].box);
-  built_area_ += made.box.area();
+  built_area_ += nodes_[node].whole().area();
   return node;
 }
 

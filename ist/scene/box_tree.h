@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace ist {
@@ -11,11 +13,6 @@ namespace ist {
 struct SceneBox {
   std::array<float, 3> low, high;
 
-  bool meets(const SceneBox& other) const noexcept {
-    // Without a branch for each: most boxes that are asked are near.
-    return ((low[0] <= other.high[0]) & (other.low[0] <= high[0]) & (low[1] <= other.high[1]) &
-            (other.low[1] <= high[1]) & (low[2] <= other.high[2]) & (other.low[2] <= high[2])) != 0;
-  }
   SceneBox united(const SceneBox& other) const noexcept {
     SceneBox out;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -33,11 +30,12 @@ struct SceneBox {
   }
 };
 
-/// A binary hierarchy of boxes. Its shape changes no answer: which boxes meet depends on them
+/// A hierarchy of boxes, four a node. Its shape changes no answer: which boxes meet depends on them
 /// alone.
 class BoxTree {
  public:
   static constexpr std::uint32_t kNone = ~0u;
+  static constexpr std::uint32_t kLanes = 4;
 
   /// Memory for `most` bodies, whose numbers are lower.
   explicit BoxTree(std::size_t most) { take_room(most); }
@@ -48,9 +46,16 @@ class BoxTree {
   void add(std::uint32_t body, const SceneBox& box) noexcept;
   void remove(std::uint32_t body) noexcept;
   /// Sets the box of a body and those above it.
-  void move(std::uint32_t body, const SceneBox& box) noexcept;
+  void move(std::uint32_t body, const SceneBox& box) noexcept {
+    const std::uint32_t lane = lane_of_[body];
+    nodes_[lane / kLanes].set(lane % kLanes, box);
+    fit_above(lane / kLanes);
+  }
   /// Sets the box of a body alone: until refit() nothing may be asked.
-  void put(std::uint32_t body, const SceneBox& box) noexcept { nodes_[node_of_[body]].box = box; }
+  void put(std::uint32_t body, const SceneBox& box) noexcept {
+    const std::uint32_t lane = lane_of_[body];
+    nodes_[lane / kLanes].set(lane % kLanes, box);
+  }
   /// Sets all boxes above those of bodies, and builds anew where they have grown too much.
   void refit() noexcept;
   /// Builds anew where many were added.
@@ -58,104 +63,189 @@ class BoxTree {
     if (2 * added_ > leaves_) build();
   }
 
-  /// visit(body) of the leaves below the nodes for which enter(box) holds.
+  /// visit(body) of the leaves below the boxes for which enter(box) holds. It may be asked again of
+  /// a box.
   template <class Enter, class Visit>
   void each(const Enter& enter, const Visit& visit) const noexcept {
-    if (root_ == kNone) return;
-    std::uint32_t at = root_;
-    // Depth first without a stack, by the parents' links.
-    for (;;) {
-      const Node& node = nodes_[at];
-      if (enter(node.box)) {
-        if (!node.is_leaf()) {
-          at = node.child[0];
-          continue;
-        }
-        visit(node.body);
-      }
-      for (;;) {
-        const std::uint32_t up = nodes_[at].parent;
-        if (up == kNone) return;
-        if (nodes_[up].child[0] == at) {
-          at = nodes_[up].child[1];
-          break;
-        }
-        at = up;
-      }
-    }
+    visit_lanes(
+        [&](const Node& node) {
+          std::uint32_t lanes = 0;
+          for (std::uint32_t k = 0; k < kLanes; ++k)
+            if (node.child[k] != kNone && enter(node.box(k))) lanes |= 1u << k;
+          return lanes;
+        },
+        visit);
+  }
+  /// visit(body) of the leaves whose boxes meet this one.
+  template <class Visit>
+  void each_meeting(const SceneBox& box, const Visit& visit) const noexcept {
+    visit_lanes([&](const Node& node) { return node.meeting(box); }, visit);
   }
 
   /// visit(body, body) of all pairs of leaves whose boxes meet, once each.
   template <class Visit>
   void pairs_within(const Visit& visit) noexcept {
-    if (root_ == kNone) return;
-    stack_.clear();
-    stack_.push_back({root_, root_});
-    go_on(*this, visit);
+    if (root_ != kNone) go_on(*this, visit);
   }
   /// The same of one leaf of this and one of another tree.
   template <class Visit>
   void pairs_with(const BoxTree& other, const Visit& visit) noexcept {
-    if (root_ == kNone || other.root_ == kNone) return;
-    stack_.clear();
-    if (nodes_[root_].box.meets(other.nodes_[other.root_].box))
-      stack_.push_back({root_, other.root_});
-    go_on(other, visit);
+    if (root_ != kNone && other.root_ != kNone) go_on(other, visit);
   }
 
  private:
-  struct Node {
-    SceneBox box;
-    std::uint32_t parent = kNone;
-    std::uint32_t child[2] = {kNone, kNone};
-    std::uint32_t body = kNone;
+  /// A child is a node's number, or a body's with this bit.
+  static constexpr std::uint32_t kLeaf = 1u << 31;
+  static bool is_leaf(std::uint32_t child) noexcept { return (child & kLeaf) != 0; }
 
-    bool is_leaf() const noexcept { return child[0] == kNone; }
+  /// A vector of g++ and clang++, on every machine.
+  using Four [[gnu::vector_size(4 * sizeof(float))]] = float;
+
+  struct alignas(64) Node {
+    Four low[3], high[3];  ///< of none: nothing meets it
+    std::uint32_t child[kLanes];
+    std::uint32_t parent, place;  ///< the lane there
+
+    Node() noexcept : parent(kNone), place(0) {
+      for (std::uint32_t k = 0; k < kLanes; ++k) clear(k);
+    }
+    void clear(std::uint32_t k) noexcept {
+      constexpr float kFar = std::numeric_limits<float>::infinity();
+      set(k, {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}});
+      child[k] = kNone;
+    }
+    void set(std::uint32_t k, const SceneBox& box) noexcept {
+      for (std::size_t c = 0; c < 3; ++c) {
+        low[c][k] = box.low[c];
+        high[c][k] = box.high[c];
+      }
+    }
+    SceneBox box(std::uint32_t k) const noexcept {
+      return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
+    }
+    SceneBox whole() const noexcept { return box(0).united(box(1)).united(box(2).united(box(3))); }
+    std::uint32_t used() const noexcept {
+      std::uint32_t lanes = 0;
+      for (std::uint32_t k = 0; k < kLanes; ++k) lanes |= (child[k] != kNone ? 1u : 0u) << k;
+      return lanes;
+    }
+    /// A bit a lane.
+    std::uint32_t meeting(const SceneBox& box) const noexcept {
+      const Four l0 = box.low[0] - Four{}, l1 = box.low[1] - Four{}, l2 = box.low[2] - Four{};
+      const auto meet = (low[0] <= box.high[0] + Four{}) & (high[0] >= l0) &
+                        (low[1] <= box.high[1] + Four{}) & (high[1] >= l1) &
+                        (low[2] <= box.high[2] + Four{}) & (high[2] >= l2);
+      const auto bits = meet & decltype(meet){1, 2, 4, 8};
+      return static_cast<std::uint32_t>(bits[0] | bits[1] | bits[2] | bits[3]);
+    }
   };
+  /// Two nodes, or a node with itself, or a node and a leaf's lane; and of their lanes the pairs
+  /// that are still to be looked at.
   struct Two {
     std::uint32_t a, b;
+    bool leaf_a, leaf_b;
+    std::uint16_t left;  ///< bit 4 · (A's lane) + (B's lane); of a leaf lane 0 alone
   };
 
-  template <class Visit>
-  void go_on(const BoxTree& other, const Visit& visit) noexcept {
-    while (!stack_.empty()) {
-      const Two two = stack_.back();
-      stack_.pop_back();
-      const Node &a = nodes_[two.a], &b = other.nodes_[two.b];
-      const auto wait = [&](std::uint32_t x, std::uint32_t y) {
-        if (nodes_[x].box.meets(other.nodes_[y].box)) stack_.push_back({x, y});
-      };
-      if (this == &other && two.a == two.b) {
-        if (a.is_leaf()) continue;
-        wait(a.child[0], a.child[1]);
-        stack_.push_back({a.child[1], a.child[1]});
-        stack_.push_back({a.child[0], a.child[0]});
-      } else if (a.is_leaf() && b.is_leaf()) {
-        visit(a.body, b.body);
-      } else if (b.is_leaf()) {
-        for (const std::uint32_t x : a.child) wait(x, two.b);
-      } else if (a.is_leaf()) {
-        for (const std::uint32_t y : b.child) wait(two.a, y);
+  template <class LanesOf, class Visit>
+  void visit_lanes(const LanesOf& lanes_of, const Visit& visit) const noexcept {
+    if (root_ == kNone) return;
+    std::uint32_t at = root_, lanes = lanes_of(nodes_[at]);
+    // Depth first without a stack, by the parents' links.
+    for (;;) {
+      if (lanes == 0) {
+        const Node& done = nodes_[at];
+        if (done.parent == kNone) return;
+        at = done.parent;
+        lanes = lanes_of(nodes_[at]) & ~((2u << done.place) - 1);
+        continue;
+      }
+      const std::uint32_t child = nodes_[at].child[std::countr_zero(lanes)];
+      lanes &= lanes - 1;
+      if (is_leaf(child)) {
+        visit(child & ~kLeaf);
       } else {
-        for (const std::uint32_t x : a.child)
-          for (const std::uint32_t y : b.child) wait(x, y);
+        at = child;
+        lanes = lanes_of(nodes_[at]);
       }
     }
   }
-  std::uint32_t take_node() noexcept;
-  void fit_above(std::uint32_t node) noexcept;
-  void build() noexcept;
-  std::uint32_t build(std::uint32_t* first, std::uint32_t* last) noexcept;
-  void fit(Node& node) noexcept {
-    node.box = nodes_[node.child[0]].box.united(nodes_[node.child[1]].box);
+
+  /// All pairs of lanes of two nodes that meet.
+  static std::uint16_t meeting(const Node& a, const Node& b) noexcept {
+    std::uint32_t out = 0;
+    for (std::uint32_t i = 0; i < kLanes; ++i)
+      if (a.child[i] != kNone) out |= b.meeting(a.box(i)) << kLanes * i;
+    return static_cast<std::uint16_t>(out);
+  }
+  /// Of a node with itself: each pair once, and nodes with themselves.
+  static std::uint16_t meeting(const Node& node) noexcept {
+    std::uint32_t out = 0;
+    for (std::uint32_t i = 0; i < kLanes; ++i) {
+      if (node.child[i] == kNone) continue;
+      out |= (node.meeting(node.box(i)) & ~((2u << i) - 1)) << kLanes * i;
+      if (!is_leaf(node.child[i])) out |= 1u << (kLanes + 1) * i;
+    }
+    return static_cast<std::uint16_t>(out);
   }
 
-  std::vector<Node> nodes_, other_nodes_;
-  std::vector<std::uint32_t> node_of_;  ///< of a body
-  std::vector<std::uint32_t> free_, order_;
+  template <class Visit>
+  void go_on(const BoxTree& other, const Visit& visit) noexcept {
+    const bool same = this == &other;
+    const std::vector<Node>&of_a = nodes_, &of_b = other.nodes_;
+    stack_.clear();
+    stack_.push_back({root_, other.root_, false, false,
+                      same ? meeting(of_a[root_]) : meeting(of_a[root_], of_b[other.root_])});
+    while (!stack_.empty()) {
+      Two& two = stack_.back();
+      if (two.left == 0) {
+        stack_.pop_back();
+        continue;
+      }
+      const auto bit = static_cast<std::uint32_t>(std::countr_zero(two.left));
+      two.left = static_cast<std::uint16_t>(two.left & (two.left - 1));
+      // Lanes of nodes; a leaf's is its own.
+      const std::uint32_t a = two.leaf_a ? two.a : kLanes * two.a + bit / kLanes;
+      const std::uint32_t b = two.leaf_b ? two.b : kLanes * two.b + bit % kLanes;
+      const std::uint32_t child_a = of_a[a / kLanes].child[a % kLanes];
+      const std::uint32_t child_b = of_b[b / kLanes].child[b % kLanes];
+      if (is_leaf(child_a) && is_leaf(child_b)) {
+        visit(child_a & ~kLeaf, child_b & ~kLeaf);
+      } else if (is_leaf(child_a)) {
+        const std::uint32_t lanes = of_b[child_b].meeting(of_a[a / kLanes].box(a % kLanes));
+        stack_.push_back({a, child_b, true, false, static_cast<std::uint16_t>(lanes)});
+      } else if (is_leaf(child_b)) {
+        const std::uint32_t lanes = of_a[child_a].meeting(of_b[b / kLanes].box(b % kLanes));
+        std::uint32_t spread = 0;
+        for (std::uint32_t i = 0; i < kLanes; ++i) spread |= (lanes >> i & 1) << kLanes * i;
+        stack_.push_back({child_a, b, false, true, static_cast<std::uint16_t>(spread)});
+      } else {
+        stack_.push_back({child_a, child_b, false, false,
+                          same && child_a == child_b ? meeting(of_a[child_a])
+                                                     : meeting(of_a[child_a], of_b[child_b])});
+      }
+    }
+  }
+
+  /// A body, or a node that is built.
+  struct Leaf {
+    SceneBox box;
+    std::uint32_t body;
+  };
+  std::uint32_t take_node() noexcept;
+  void fit_above(std::uint32_t node) noexcept;
+  void hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child,
+            const SceneBox& box) noexcept;
+  void build() noexcept;
+  std::uint32_t build(Leaf* first, Leaf* last) noexcept;
+
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> lane_of_;  ///< of a body: 4 · node + lane
+  std::vector<std::uint32_t> free_;
+  std::vector<Leaf> order_;
   std::vector<Two> stack_;
   std::uint32_t root_ = kNone, leaves_ = 0;
-  double built_area_ = 0;  ///< of all nodes above leaves, when they were built
+  double built_area_ = 0;  ///< of all nodes, when they were built
   std::size_t added_ = 0;  ///< since
   bool in_order_ = true;   ///< no node is taken out, and each stands before those below it
 };

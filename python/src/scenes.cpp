@@ -22,11 +22,9 @@ constexpr std::pair<const char*, SceneAnswer> kAnswers[] = {
     {"penetration", SceneAnswer::penetration}};
 
 struct PyScene {
-  explicit PyScene(const SceneSettings& settings)
-      : scene(settings), max_pairs(settings.max_pairs) {}
+  explicit PyScene(Scene made) : scene(std::move(made)) {}
 
   Scene scene;
-  std::size_t max_pairs;
   std::uint32_t next = 0;
   std::map<std::uint32_t, py::object> owners;
 };
@@ -88,7 +86,7 @@ std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
     found = self.scene.step(tbb_parallel_for());
   }
   if (found.pairs_exceeded)
-    throw Error("more than " + std::to_string(self.max_pairs) +
+    throw Error("more than " + std::to_string(self.scene.settings().max_pairs) +
                 " pairs of bodies have boxes that meet: make the Scene with a larger max_pairs");
   auto out = std::make_shared<SceneAnswers>(SceneAnswers{{found.pairs.size()}});
   out->penetration = std::make_shared<Penetrations>(Penetrations{out->rows});
@@ -139,6 +137,25 @@ std::uint32_t add(PyScene& self, const py::object& solid, const py::object& pose
   return body.number;
 }
 
+std::size_t workers_of(unsigned threads) {
+  const unsigned workers = take_threads(threads);
+  return workers != 0 ? workers : std::max(1u, std::thread::hardware_concurrency());
+}
+
+std::unique_ptr<PyScene> replay(const py::bytes& record, const py::object& assets,
+                                unsigned threads) {
+  const py::list given(assets);
+  std::vector<TreeView> trees;
+  for (const py::handle asset : given) trees.push_back(tree_of(asset, "assets"));
+  auto out = std::make_unique<PyScene>(
+      Scene::replay({reinterpret_cast<const std::byte*>(record.c_str()), record.size()}, trees,
+                    workers_of(threads)));
+  // Any of the assets may be whose memory a body reads.
+  for (const std::uint32_t number : out->scene.numbers()) out->owners[number] = given;
+  if (!out->owners.empty()) out->next = out->owners.rbegin()->first + 1;
+  return out;
+}
+
 constexpr const char* kSceneDoc =
     R"(Many solids, and which of them meet: ist.Scene in <ist/scene.h>.
 
@@ -182,10 +199,8 @@ void add_scenes(py::module_& module) {
              settings.max_bodies = max_bodies;
              settings.max_pairs = max_pairs;
              settings.patches_per_pair = 1;
-             const unsigned workers = take_threads(threads);
-             settings.workers =
-                 workers != 0 ? workers : std::max(1u, std::thread::hardware_concurrency());
-             return std::make_unique<PyScene>(settings);
+             settings.workers = workers_of(threads);
+             return std::make_unique<PyScene>(Scene(settings));
            }),
            py::kw_only(), py::arg("max_bodies") = 1024, py::arg("max_pairs") = 8192,
            py::arg("threads") = 0)
@@ -239,6 +254,19 @@ void add_scenes(py::module_& module) {
           "include",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.include(a, b); },
           py::arg("a"), py::arg("b"), "Takes exclude() back.")
+      .def(
+          "record",
+          [](const PyScene& self) {
+            const std::vector<std::byte> record = self.scene.record();
+            return py::bytes(reinterpret_cast<const char*>(record.data()), record.size());
+          },
+          "bytes of what decides the next step: bodies, rules and the pairs that met, with the "
+          "content hashes of assets.")
+      .def_static("replay", replay, py::arg("record"), py::arg("assets"), py::kw_only(),
+                  py::arg("threads") = 0,
+                  "The scene that was recorded, whose next step has the same bits. assets: a list "
+                  "that holds those of the record. Raises ist.Error where one is missing, naming "
+                  "its content hash, or the record is none.")
       .def("step", step, py::arg("poses") = py::none(), py::kw_only(),
            py::arg("numbers") = py::none(), kStepDoc);
 }

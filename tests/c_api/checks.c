@@ -197,8 +197,8 @@ static int versions_and_words(void) {
   CHECK(ist_check_version(IST_VERSION + 100) == IST_WRONG_VERSION);
   CHECK(ist_check_version(IST_VERSION + 10000) == IST_WRONG_VERSION);
   CHECK(ist_check_version(0) == IST_WRONG_VERSION);
-  for (status = IST_NOT_BAKED - 1; status <= IST_ERROR_EXCEEDED + 1; ++status) {
-    const int known = status >= IST_NOT_BAKED && status <= IST_ERROR_EXCEEDED;
+  for (status = IST_NO_BODY - 1; status <= IST_ERROR_EXCEEDED + 1; ++status) {
+    const int known = status >= IST_NO_BODY && status <= IST_ERROR_EXCEEDED;
     const int unknown = strcmp(ist_describe(status), ist_describe(12345)) == 0;
     CHECK(known != unknown);
   }
@@ -216,6 +216,6 @@ int c_api_checks(const char* path_a, const char* path_b) {
          fields_answer(&scene) != 0 || bodies_are_told(&scene) != 0 ||
          impacts_are_found(&scene) != 0 || batches_answer(&scene) != 0 ||
          balls_are_told(&scene) != 0 || surfaces_are_told(&scene) != 0 ||
-         lenses_are_told(&scene) != 0 || capacities_are_told(&scene) != 0 ||
+         lenses_are_told(&scene) != 0 || scenes_answer(&scene) != 0 || capacities_are_told(&scene) != 0 ||
          released_handles_are_known(&scene) != 0;
 }

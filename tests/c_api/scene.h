@@ -64,5 +64,6 @@ int batches_answer(scene_t* s);
 int balls_are_told(scene_t* s);
 int surfaces_are_told(scene_t* s);
 int lenses_are_told(scene_t* s);
+int scenes_answer(scene_t* s);
 
 #endif

@@ -125,6 +125,9 @@ TEST_F(ExactMated, EveryRow) {
       const Penetration found = compare(row, a, b), exchanged = compare(row, b, a);
       EXPECT_NEAR(found.contact_area, exchanged.contact_area, 1e-12 * found.contact_area);
       EXPECT_LE((found.contact_normal + exchanged.contact_normal).norm(), 1e-9);
+      if (found.contact_area > 0) {
+        EXPECT_LE((found.centroid - exchanged.centroid).norm(), 1e-9 * testing::size_of(a));
+      }
       const testing::ExactCheck check = testing::check_exactly(a, b, workspace_);
       EXPECT_TRUE(check.complete && check.consistent);
       EXPECT_LE(check.gap, testing::gap_bound(check));
@@ -139,6 +142,8 @@ TEST_F(ExactMated, EveryRow) {
       const double area = moved->volume / 1e-6;
       ++planar;
       EXPECT_NEAR(found.contact_area, area, area * 1e-4);
+      const Penetration deeper = testing::exactly(a, {b.tree, moved->pose, 1}, workspace_);
+      EXPECT_LE((found.centroid - deeper.centroid).norm(), 1e-3 * testing::size_of(a));
       const Point way = Point(moved->pose.t) - Point(row.pose.t);
       EXPECT_LE((found.contact_normal + way.normalized()).norm(), 1e-6);
     }

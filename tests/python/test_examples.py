@@ -45,6 +45,13 @@ def test_many_bodies_of_the_guide():
     assert len(names["scene"]) == 4 and len(names["step"].ended) + len(names["step"]) > 0
 
 
+@pytest.mark.parametrize("number", range(3))
+def test_twenty_lines_of_each_trade(number):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/trades.md").read_text(), re.S)
+    assert len(blocks) == 3
+    exec(blocks[number], {})
+
+
 def test_the_tour():
     assert "it lands at 0.7" in run("tour.py")
 

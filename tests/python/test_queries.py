@@ -680,6 +680,28 @@ def test_a_scene_asks_what_pairs_are_asked(gear, knot):
     assert scene.step().refused.size == 0 and len(scene) == 12
 
 
+def test_a_recorded_scene_is_asked_again_to_the_same_bits(gear, knot):
+    scene = ist.Scene(threads=1)
+    scene.set_rule(measure="exact")
+    size = (gear.bounds().upper - gear.bounds().lower).max()
+    for i, solid in enumerate((gear, knot, gear)):
+        scene.add(solid, [1, 0.1 * i, 0, 0, 0.4 * i * size, 0, 0], number=10 - i)
+    scene.add(ist.HalfSpaceField(), moves=False, group=1)
+    scene.step()
+    scene.step([[1, 0, 0.2, 0, 0.3 * size, 0, 0]], numbers=[9])
+    record = scene.record()
+    again = ist.Scene.replay(record, [knot, gear], threads=2)
+    assert len(again) == 4 and again.record() == record
+    first, second = scene.step(), again.step()
+    assert np.array_equal(first.pairs, second.pairs) and len(first) > 0
+    assert np.array_equal(first.begins, second.begins)
+    assert first.penetration.volume.tobytes() == second.penetration.volume.tobytes()
+    with pytest.raises(ist.Error, match="content hash .* is not among those given"):
+        ist.Scene.replay(record, [gear])
+    with pytest.raises(ist.Error, match="its content was changed"):
+        ist.Scene.replay(record[:-1], [gear, knot])
+
+
 def test_mistakes_of_scenes_are_told(gear):
     scene = ist.Scene(max_bodies=4, max_pairs=1)
     scene.set_rule(answer="boxes")

@@ -28,7 +28,7 @@ const char* ist_describe(ist_status_t status) {
       return "this library does not support programs compiled with these headers; use headers and "
              "library of one version";
     case IST_NO_HANDLE:
-      return "a tree or workspace is empty, released or was never created";
+      return "a tree, workspace or scene is empty, released or was never created";
     case IST_NO_MEMORY:
       return "out of memory";
     case IST_CANNOT_READ:
@@ -49,6 +49,12 @@ const char* ist_describe(ist_status_t status) {
       return "ist_impact_settings_t::duration is 0; set the duration of the motion";
     case IST_NOT_BAKED:
       return "the mesh or a setting cannot be baked; the message of ist_bake() says why";
+    case IST_SCENE_FULL:
+      return "the scene is full: make it with a larger max_bodies";
+    case IST_NUMBER_TAKEN:
+      return "a body of this number is in the scene already";
+    case IST_NO_BODY:
+      return "no body of the scene has this number";
     default:
       return "unknown status";
   }

@@ -8,6 +8,7 @@
 #include <ist/field.h>
 #include <ist/ist.h>
 #include <ist/query.h>
+#include <ist/surface.h>
 #include <ist/time_of_impact.h>
 
 #include "query/base/members.h"
@@ -108,6 +109,11 @@ ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& 
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
 ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept;
 
+inline Ray read(const ist_ray_t& given) noexcept {
+  Ray ray{vector(given.origin), vector(given.direction)};
+  if (given.longest != 0) ray.longest = given.longest;
+  return ray;
+}
 inline Penetration read(const ist_penetration_t& given) noexcept {
   Penetration result;
   write(given, result);

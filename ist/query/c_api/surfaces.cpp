@@ -9,12 +9,6 @@
 namespace ist::c_api {
 namespace {
 
-Ray read(const ist_ray_t& given) noexcept {
-  Ray ray{vector(given.origin), vector(given.direction)};
-  if (given.longest != 0) ray.longest = given.longest;
-  return ray;
-}
-
 /// ask(placed, i) for each of `count`; the least of their statuses.
 template <class Ask>
 ist_status_t ask_each(const ist_placed_t* given, std::size_t count, bool there,

@@ -68,11 +68,12 @@ class TriangleSearch : PairSigns {
     SurfaceContact out;
     TrianglePairs& pairs = *scratch_.pairs;
     const auto add_areas = [&] {
-      alignas(64) double area[8], along[3][8];
-      find_areas(pairs, area, along);
+      alignas(64) double area[8], along[3][8], moment[3][8];
+      find_areas(pairs, area, along, moment);
       for (std::uint32_t n = 0; n < pairs.count; ++n) {
         out.area += area[n];
         out.normal = out.normal + exact::Point{along[0][n], along[1][n], along[2][n]};
+        out.moment = out.moment + exact::Point{moment[0][n], moment[1][n], moment[2][n]};
       }
       pairs.count = 0;
     };

@@ -42,6 +42,7 @@ struct SurfaceContact {
   bool touching = false;     ///< points of both are within CrossingSearch::touch of each other
   double area = 0;           ///< of the faces that lie on each other, back to back
   exact::Point normal = {};  ///< ∫ n dA over them, n out of A
+  exact::Point moment = {};  ///< ∫ x dA over them
 };
 
 /// Finds the pairs of blocks.

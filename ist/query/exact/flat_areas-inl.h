@@ -34,13 +34,19 @@ struct FlatEdge {
   V at(V where) const { return y + (where - x) * slope; }
 };
 
+/// What triangles in one plane have in common.
+struct CommonArea {
+  V over_normal;  ///< its area, over the length of A's normal
+  Vec3 centre;    ///< seen from A's first corner
+};
+
 /// The area that triangles in one plane have in common, over the length of `normal`, A's.
 ///
 /// A triangle is the sum of what lies below its edges, signed by the way they go. What two such
 /// areas have in common is the integral of the lower edge, whose parts that do not depend on both
 /// edges add up to 0: ∫ min(e − f, 0) over the x of both is left. No side of a point is asked, so
 /// edges and corners that coincide are nothing special.
-HWY_INLINE V common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& normal) {
+HWY_INLINE CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& normal) {
   const D d;
   const V zero = hn::Zero(d), one = hn::Set(d, 1.0);
   const V nx = hn::Abs(normal.x), ny = hn::Abs(normal.y), nz = hn::Abs(normal.z);
@@ -59,7 +65,7 @@ HWY_INLINE V common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& nor
       low = hn::Min(low, at[s][c].y);
       high = hn::Max(high, at[s][c].y);
     }
-  V twice = zero;
+  V twice = zero, moment_x = zero, moment_y = zero;
   for (int i = 0; i < 3; ++i) {
     const FlatEdge e(at[0][i], at[0][(i + 1) % 3]);
     for (int j = 0; j < 3; ++j) {
@@ -71,13 +77,34 @@ HWY_INLINE V common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const Vec3& nor
       const auto counts = hn::And(to > from, whole > zero);
       const V part = (to - from) * (below * below) / hn::IfThenElse(counts, whole, one);
       twice = twice + hn::IfThenElseZero(counts, e.turn * f.turn * part);
+      // ∫ x (e − f) and ∫ (e² − f²) / 2 between the places where e − f is below 0.
+      const V root = from + (to - from) * hn::Abs(first) / hn::IfThenElse(counts, whole, one);
+      const V p = hn::IfThenElse(first < zero, from, root),
+              q = hn::IfThenElse(last < zero, to, root);
+      const V dp = hn::Min(first, zero), dq = hn::Min(last, zero);
+      const V at_p = (dp + dp) + dq, at_q = dp + (dq + dq);
+      const V half = hn::Set(d, 0.5);
+      const V mean_p = half * (e.at(p) + f.at(p)), mean_q = half * (e.at(q) + f.at(q));
+      const V turned = hn::IfThenElseZero(counts, e.turn * f.turn * (p - q));
+      moment_x = moment_x + turned * (at_p * p + at_q * q);
+      moment_y = moment_y + turned * (at_p * mean_p + at_q * mean_q);
     }
   }
   // What roundings leave of nothing is nothing.
   const V found = hn::Abs(twice), least = hn::Set(d, 1e-14) * ((right - left) * (high - low));
   const V size = one_of(nx, ny, nz);
   const auto counts = hn::And(found > least, size > zero);
-  return hn::IfThenElseZero(counts, hn::Set(d, 0.5) * found / hn::IfThenElse(counts, size, one));
+  const V divisor = hn::IfThenElse(counts, size, one);
+  // `moment_x` is six times what it says, `twice` two times.
+  const V thrice = hn::Set(d, 3.0) * hn::IfThenElse(counts, twice, one);
+  const V x = moment_x / thrice, y = moment_y / thrice;
+  // In the plane: the third coordinate is by the normal.
+  const V along_x = one_of(normal.y, normal.z, normal.x),
+          along_y = one_of(normal.z, normal.x, normal.y);
+  const V along = one_of(normal.x, normal.y, normal.z);
+  const V z = hn::Neg(along_x * x + along_y * y) / hn::IfThenElse(counts, along, one);
+  return {hn::IfThenElseZero(counts, hn::Set(d, 0.5) * found / divisor),
+          {one_of(z, y, x), one_of(x, z, y), one_of(y, x, z)}};
 }
 
 }  // namespace ist::HWY_NAMESPACE

@@ -246,7 +246,7 @@ class PairSigns {
   /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal; of
   /// those that look the same way 0.
   static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
-                                      double (&along)[3][8]) {
+                                      double (&along)[3][8], double (&moment)[3][8]) {
     const D d;
     for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
@@ -255,9 +255,15 @@ class PairSigns {
       const auto normal_of = [](const Vec3(&t)[3]) { return cross(t[1] - t[0], t[2] - t[0]); };
       const Vec3 normal = normal_of(corner[0]);
       const V length = hn::Sqrt(dot(normal, normal));
-      const V factor = hn::IfThenElseZero(dot(normal, normal_of(corner[1])) < hn::Zero(d),
-                                          common_area(corner[0], corner[1], normal));
-      hn::Store(factor * length, d, area + l);
+      const CommonArea common = common_area(corner[0], corner[1], normal);
+      const V factor =
+          hn::IfThenElseZero(dot(normal, normal_of(corner[1])) < hn::Zero(d), common.over_normal);
+      const V whole = factor * length;
+      const Vec3 centre = corner[0][0] + common.centre;
+      hn::Store(whole * centre.x, d, moment[0] + l);
+      hn::Store(whole * centre.y, d, moment[1] + l);
+      hn::Store(whole * centre.z, d, moment[2] + l);
+      hn::Store(whole, d, area + l);
       hn::Store(factor * normal.x, d, along[0] + l);
       hn::Store(factor * normal.y, d, along[1] + l);
       hn::Store(factor * normal.z, d, along[2] + l);

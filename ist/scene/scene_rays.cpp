@@ -1,0 +1,60 @@
+#include <ist/scene.h>
+
+#include <algorithm>
+
+#include "scene/scene_impl.h"
+
+namespace ist {
+
+SceneHit Scene::raycast(const Ray& ray) const noexcept {
+  SceneHit best;
+  // (also for a ray that is not usable)
+  if (!ray.origin.allFinite() || !ray.direction.allFinite() || ray.direction.isZero(0)) return best;
+  const Eigen::Vector3d unit = ray.direction.stableNormalized();
+  double longest = ray.longest;
+  const auto enter = [&](const SceneBox& box) {
+    double from = 0, to = longest;
+    for (int k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      const double low = box.low[i] - ray.origin[k], high = box.high[i] - ray.origin[k];
+      if (unit[k] == 0) {
+        if (low > 0 || high < 0) return false;
+        continue;
+      }
+      const double x = low / unit[k], y = high / unit[k];
+      from = std::max(from, std::min(x, y));
+      to = std::min(to, std::max(x, y));
+    }
+    // Rounding must not pass a flat box.
+    return from <= to * (1 + 1e-12) + 1e-300;
+  };
+  const auto visit = [&](std::uint32_t i) {
+    const auto& body = impl_->bodies[i];
+    const RayHit hit = ist::raycast(body.given.solid, ray);
+    if (hit.status != QueryStatus::ok || !hit.hit() || !(hit.distance <= longest)) return;
+    if (best.hit.hit() && hit.distance == best.hit.distance && body.given.number > best.number)
+      return;
+    best = {body.given.number, hit};
+    longest = hit.distance;
+  };
+  for (const std::uint32_t i : impl_->endless) visit(i);
+  impl_->still.each(enter, visit);
+  impl_->moving.each(enter, visit);
+  return best;
+}
+
+std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
+                          std::span<std::uint32_t> numbers) const noexcept {
+  const SceneBox box = box_around(lower, upper);
+  std::size_t count = 0;
+  const auto visit = [&](std::uint32_t i) {
+    if (count < numbers.size()) numbers[count] = impl_->bodies[i].given.number;
+    ++count;
+  };
+  for (const std::uint32_t i : impl_->endless) visit(i);
+  impl_->still.each_meeting(box, visit);
+  impl_->moving.each_meeting(box, visit);
+  return count;
+}
+
+}  // namespace ist
