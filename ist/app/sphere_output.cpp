@@ -84,6 +84,7 @@ Json robot_json(const SphereRobot& robot) {
   return {{"robot", robot.name},
           {"links", links},
           {"left_out", robot.left_out},
+          {"taken_as_fixed", robot.taken_as_fixed},
           {"default_pose",
            {{"positions", positions},
             {"from", self.pose.from},

@@ -31,7 +31,8 @@ struct SphereRobot {
   std::vector<ClosedMesh> meshes;   ///< of the links that have one, in their order
   RobotModel robot;                 ///< of a mesh: one link; its file is empty
   SelfCollision self;
-  std::vector<std::string> left_out;  ///< links with visual shapes alone
+  std::vector<std::string> left_out;        ///< links with visual shapes alone
+  std::vector<std::string> taken_as_fixed;  ///< joints that move in the file
 
   bool has_capsules() const {
     return std::any_of(links.begin(), links.end(),

@@ -85,6 +85,17 @@ void warn_of_size(const RobotModel& robot, const std::string& link, const Triang
       robot.file.path, link, box.diagonal().norm(), apart);
 }
 
+/// Joints that move in the file, but not here; those that carry a whole robot do not matter.
+std::vector<std::string> taken_as_fixed(const RobotModel& robot) {
+  const RobotLink& root = robot.links[robot.order.front()];
+  const bool is_bare = root.collision.empty() && root.visual.empty();
+  std::vector<std::string> names;
+  for (const RobotJoint& joint : robot.joints)
+    if (joint.taken_as_fixed && !(is_bare && joint.parent == robot.order.front()))
+      names.push_back(joint.name);
+  return names;
+}
+
 SphereRobot read_robot_input(const SpheresOptions& options) {
   SphereRobot out;
   out.input = options.input;
@@ -95,6 +106,12 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   LinkMeshes meshes(options.input, options.closing.settings.mesh, options.robot.repaired);
   out.left_out = links_seen_only(out.robot, options.robot);
   warn_of_left_out(out.left_out, options.input);
+  out.taken_as_fixed = taken_as_fixed(out.robot);
+  if (!out.taken_as_fixed.empty())
+    spdlog::warn(
+        "{}: taken as fixed, because they have several axes, or slide without limits: {}; "
+        "collisions are found only as their links stand in the file",
+        options.input, fmt::join(out.taken_as_fixed, ", "));
   for (const RobotLink& link : out.robot.links) {
     const auto& shapes = link.shapes(options.robot.shapes());
     if (shapes.empty()) continue;

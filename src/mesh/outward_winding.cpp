@@ -43,7 +43,11 @@ double solid_angle(const Corners& t, const double p[3]) {
                                   dot(1, 2) * length[0] + dot(2, 0) * length[1]);
 }
 
-constexpr std::uint32_t kLines = 200;  ///< of sight, along each side of a view
+/// Lines of sight along each side of a view: two or more a triangle, if triangles are alike.
+std::uint32_t lines_to_see(const std::size_t triangles) {
+  return static_cast<std::uint32_t>(
+      std::clamp(2 * std::sqrt(static_cast<double>(triangles)), 64.0, 200.0));
+}
 
 /// What is seen first along a line, from one of its ends.
 struct Seen {
@@ -68,9 +72,9 @@ void look_along(const std::vector<std::array<double, 3>>& points,
                 std::vector<Votes>& votes) {
   LineLattice lattice;
   lattice.y0 = lattice.z0 = -1;
-  lattice.step_y = lattice.step_z = 2.0 / kLines;
+  lattice.ny = lattice.nz = lines_to_see(triangles.size());
+  lattice.step_y = lattice.step_z = 2.0 / lattice.ny;
   lattice.offset = kGoldenRatio;
-  lattice.ny = lattice.nz = kLines;
   std::vector<Seen> low(lattice.lines()), high(lattice.lines());
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     const auto corner = [&](std::size_t k) { return points[triangles[t][k]].data(); };

@@ -217,9 +217,19 @@ std::size_t odd_edges(const TriangleMesh& mesh) {
   return count_odd_edges(EdgeTable(mesh.triangles));
 }
 
+/// Whether stitch() may change anything by a tolerance up to the widest crack. A vertex on a side
+/// that is too near to its end for the widest tolerance is within twice that of the end.
+bool may_have_cracks(const TriangleMesh& mesh, const EdgeTable& edges, const double tolerance) {
+  return weld_among(mesh, 2 * tolerance, border_vertices(mesh, edges)).triangles !=
+             mesh.triangles ||
+         count_t_junctions(mesh, edges) > 0;
+}
+
 /// Of all tolerances up to 1e-5 of the diagonal, the smallest that leaves the fewest odd edges.
 void close_cracks(TriangleMesh& mesh, MeshReport& report) {
-  const std::size_t before = odd_edges(mesh);
+  const EdgeTable edges(mesh.triangles);
+  if (!may_have_cracks(mesh, edges, kWidestCrack * report.bounds.diagonal().norm())) return;
+  const std::size_t before = count_odd_edges(edges);
   std::size_t fewest = before;
   double best_fraction = 0;
   TriangleMesh best;

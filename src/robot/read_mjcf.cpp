@@ -307,6 +307,7 @@ class MjcfReader {
         joint.origin = joint.origin * Eigen::AngleAxisd(-zero, joint.axis);
       } else {
         if (has_range) joint.motion = RobotJoint::Motion::sliding;
+        joint.taken_as_fixed = !has_range;
         joint.origin = joint.origin * Eigen::Translation3d(-zero * joint.axis);
       }
       joints.push_back(joint);

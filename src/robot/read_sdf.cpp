@@ -232,6 +232,8 @@ class SdfReader {
       xml_.fail(e, "its type " + in_quotes(type) +
                        " is unknown. Use fixed, revolute, continuous or "
                        "prismatic");
+    else
+      joint.taken_as_fixed = type != "fixed";
     if (joint.motion != RobotJoint::Motion::fixed) {
       const std::uint32_t axis = xml_.child(e, "axis");
       if (axis == kNoTag) xml_.fail(e, "has no <axis>. Add one");
@@ -282,7 +284,8 @@ class SdfReader {
     const double upper = limit == kNoTag ? kEndless : numbers(limit, "upper", {kEndless})[0];
     if (lower > upper) xml_.fail(limit, "lower is above upper. Exchange them");
     const bool limited = lower > -kEndless && upper < kEndless;
-    if (slides && !limited) joint.motion = RobotJoint::Motion::fixed;  // it has no middle
+    joint.taken_as_fixed = slides && !limited;  // it has no middle
+    if (joint.taken_as_fixed) joint.motion = RobotJoint::Motion::fixed;
     if (endless || !limited) return;
     joint.lower = lower;
     joint.upper = upper;

@@ -208,6 +208,8 @@ class RobotReader {
       xml_.fail(e, "its type " + in_quotes(type) +
                        " is unknown. Use fixed, revolute, continuous, prismatic, floating or "
                        "planar");
+    } else {
+      joint.taken_as_fixed = type != "fixed";
     }
     if (joint.motion != RobotJoint::Motion::fixed) read_motion(e, type == "continuous", joint);
     if (!joint_.emplace(joint.name, robot_.joints.size()).second)

@@ -64,13 +64,15 @@ struct RobotLink {
 
 inline constexpr std::size_t kNone = SIZE_MAX;  ///< no link or joint
 
-/// How a link stands in its parent's frame. Floating and planar joints are taken as fixed.
+/// How a link stands in its parent's frame. Joints of several axes and slides without limits are
+/// taken as fixed.
 struct RobotJoint {
   enum class Motion { fixed, turning, sliding };
   std::string name;
   std::size_t parent = 0, child = 0;                         ///< links
   Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();  ///< of the child, at position 0
   Motion motion = Motion::fixed;
+  bool taken_as_fixed = false;                      ///< though it moves in the file
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< of length 1, in the child's frame
   double lower = 0, upper = 0;                      ///< [rad] or [u]
   /// The joint that moves this one, which stands at multiplier · (its position) + offset; or kNone.

@@ -251,6 +251,23 @@ TEST_F(RobotCommands, WhatCannotBeClosedGetsABoundingCapsule) {
   EXPECT_TRUE(json["links"]["a"]["protrusion"].is_null());
 }
 
+TEST_F(RobotCommands, JointsThatAreTakenAsFixedAreNamed) {
+  const std::string box =
+      "<collision name='c'><geometry><box><size>1 1 1</size></box></geometry>"
+      "</collision></link>";
+  write("two.sdf",
+        "<sdf version='1.9'><model name='m'><link name='a'>" + box + "<link name='b'>" + box +
+            "<link name='c'>" + box +
+            "<joint name='u' type='universal'><parent>a</parent><child>b</child></joint>"
+            "<joint name='s' type='prismatic'><parent>b</parent><child>c</child><axis><xyz>0 0 1"
+            "</xyz></axis></joint></model></sdf>");
+  const Outcome outcome = ist({"spheres", "two.sdf", "-o", "t.json", "--count", "2"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("taken as fixed"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find(": u, s; "), std::string::npos) << outcome.err;
+  EXPECT_EQ(Json::parse(read("t.json"))["taken_as_fixed"], Json::parse("[\"u\", \"s\"]"));
+}
+
 TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
   write("arm.urdf", kArm);
   const auto links = [&](const std::vector<std::string>& more) {

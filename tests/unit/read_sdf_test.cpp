@@ -81,6 +81,21 @@ TEST(Sdf, LinksJointsAndShapes) {
       turned.linear().isApprox(Eigen::AngleAxisd(0.5, -Vector3d::UnitY()).toRotationMatrix()));
 }
 
+TEST(Sdf, JointsThatAreTakenAsFixedAreMarked) {
+  const auto marked = [](const std::string& type, const std::string& limit) {
+    const RobotModel robot = sdf("<link name='a'/><link name='b'/><joint name='j' type='" + type +
+                                 "'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz>" +
+                                 limit + "</axis></joint>");
+    return robot.joints.at(0).taken_as_fixed;
+  };
+  const std::string limit = "<limit><lower>-1</lower><upper>1</upper></limit>";
+  for (const char* const type : {"ball", "universal", "revolute2", "screw", "gearbox"})
+    EXPECT_TRUE(marked(type, limit)) << type;
+  EXPECT_TRUE(marked("prismatic", ""));
+  for (const char* const type : {"prismatic", "revolute", "fixed"})
+    EXPECT_FALSE(marked(type, limit)) << type;
+}
+
 TEST(Sdf, MistakesAreToldWithTheirLines) {
   const auto expect = [](const std::string& inside, const std::string& message) {
     EXPECT_NE(sdf_error(inside).find(message), std::string::npos) << sdf_error(inside);

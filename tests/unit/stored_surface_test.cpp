@@ -133,6 +133,35 @@ TEST(StoredSurface, HoldsTheMeshsOwnTriangles) {
   expect_near(asset, torus);
 }
 
+/// A plate and a needle thinner than float precision cancel: the error says how far they are.
+TEST(StoredSurface, ErrorCountsWhatVanishesInFloats) {
+  for (const bool needle : {false, true}) {
+    TriangleMesh mesh = testing::cube_mesh();
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    const double thin = 1e-10;
+    const Point corner(2, 0.2, 0.3);
+    const Point u = needle ? Point(0, thin, 0) : Point(0, 0.5, 0);
+    for (const Point& p : {corner, Point(corner + Point(1, 0, 0)), Point(corner + u)})
+      mesh.vertices.push_back(p);
+    for (int i = 0; i < 3; ++i)
+      mesh.vertices.push_back(mesh.vertices[first + static_cast<std::size_t>(i)] +
+                              Point(0, 0, thin));
+    for (const auto& [a, b, c] : std::initializer_list<std::array<std::uint32_t, 3>>{{0, 2, 1},
+                                                                                     {3, 4, 5},
+                                                                                     {0, 1, 4},
+                                                                                     {0, 4, 3},
+                                                                                     {1, 2, 5},
+                                                                                     {1, 5, 4},
+                                                                                     {2, 0, 3},
+                                                                                     {2, 3, 5}})
+      mesh.triangles.push_back({first + a, first + b, first + c});
+    const ClosedMesh thing = closed(std::move(mesh), needle ? "needle" : "plate");
+    const Asset asset = baked(thing);
+    expect_sound_surface(asset, thing);
+    expect_near(asset, thing);
+  }
+}
+
 TEST(StoredSurface, HoldsThemHoweverMany) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(6), "ball");
   const Asset asset = baked(ball);

@@ -135,7 +135,35 @@ SurfaceArrays laid_out(const FloatMesh& mesh, const Hierarchy& hierarchy) {
   return arrays;
 }
 
-/// The triangles themselves over vertices rounded to float: no point moves further than a vertex.
+/// Triangles that are not in a reduced mesh, not even as a side or a corner: fins and needles
+/// thinner than float precision, whose faces cancel. `before`: its triangles; `place`: reduce()'s.
+FloatMesh lost(const FloatMesh& mesh, const std::vector<FloatMesh::Triangle>& before,
+               const std::vector<std::uint32_t>& place) {
+  using Corners = FloatMesh::Triangle;
+  const auto named = [](Corners t) {  // a side as a, b, b
+    std::sort(t.begin(), t.end());
+    if (t[0] == t[1]) t[1] = t[2];
+    return t;
+  };
+  std::vector<Corners> there;
+  for (const Corners& t : mesh.triangles) {
+    there.push_back(named(t));
+    for (std::size_t k = 0; k < 3; ++k) {
+      there.push_back(named({t[k], t[k], t[(k + 1) % 3]}));
+      there.push_back({t[k], t[k], t[k]});
+    }
+  }
+  std::sort(there.begin(), there.end());
+  FloatMesh out{mesh.vertices, {}};
+  for (const Corners& t : before) {
+    const Corners now = {place[t[0]], place[t[1]], place[t[2]]};
+    if (!std::binary_search(there.begin(), there.end(), named(now))) out.triangles.push_back(now);
+  }
+  return out;
+}
+
+/// The triangles themselves over vertices rounded to float: no point moves further than a vertex,
+/// but that some triangles vanish.
 Approximation own_triangles(const MeshView& surface) {
   Approximation out{in_floats(surface)};
   for (std::size_t v = 0; v < out.mesh.vertices.size(); ++v) {
@@ -146,7 +174,11 @@ Approximation own_triangles(const MeshView& surface) {
     }
     out.error = std::max(out.error, std::sqrt(moved2) * (1 + 1e-12));
   }
-  reduce(out.mesh);
+  const std::vector<FloatMesh::Triangle> before = out.mesh.triangles;
+  const std::vector<std::uint32_t> place = reduce(out.mesh);
+  if (out.mesh.triangles.empty() || out.mesh.triangles.size() == before.size()) return out;
+  const FloatMesh gone = lost(out.mesh, before, place);
+  if (!gone.triangles.empty()) out.error += farthest_from(SurfaceHierarchy(out.mesh), gone);
   return out;
 }
 

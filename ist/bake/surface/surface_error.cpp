@@ -126,6 +126,16 @@ void raise(const std::atomic_ref<double>& value, double to) {
 
 }  // namespace
 
+double farthest_from(const SurfaceHierarchy& surface, const FloatMesh& triangles) {
+  const SurfaceNearMesh near_surface(surface.view());
+  double most = 0, target = 1e-8;
+  for (std::size_t t = 0; t < triangles.triangles.size(); ++t) {
+    most = std::max(most, near_surface.bound(part_of(triangles, t), target, kFar));
+    target = std::max(target, most);
+  }
+  return most + kDistanceRounding;
+}
+
 SweptError::Point SweptError::Prism::centre() const {
   Point c = {};
   for (const Point& p : corner)

@@ -88,6 +88,10 @@ class KnownDistances {
   tbb::concurrent_unordered_map<std::array<double, 3>, double, Hash> known_;
 };
 
+/// A bound on how far points of some triangles are from a surface, unit frame; within 1e-8 of what
+/// is seen where that is less.
+double farthest_from(const SurfaceHierarchy& surface, const FloatMesh& triangles);
+
 /// How a surface differs from the mesh that it is the image of. Unit frame. Deterministic.
 class SurfaceError {
  public:
