@@ -314,7 +314,9 @@ class SdfReader {
       std::size_t& of = robot_.joint_of[robot_.joints[j].child];
       if (of != kNone)
         xml_.fail(model, "link " + in_quotes(robot_.links[robot_.joints[j].child].name) +
-                             " is the child of two joints. A robot is a tree");
+                             " is the child of the joints " + in_quotes(robot_.joints[of].name) +
+                             " and " + in_quotes(robot_.joints[j].name) +
+                             ". A robot is a tree: remove the one that closes a loop");
       of = j;
     }
     for (std::size_t i = 0; i < robot_.links.size(); ++i)

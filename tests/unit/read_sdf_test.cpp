@@ -123,6 +123,10 @@ TEST(Sdf, MistakesAreToldWithTheirLines) {
              joint("<axis><xyz>0 0 1</xyz></axis>"),
          "relative to \"f\"");
   expect("<link name='a'>\n<collision name='c'/></link>", "line 2");
+  const std::string loop =
+      "<joint name='k' type='fixed'><parent>a</parent><child>b</child></joint>";
+  expect(two + joint("<axis><xyz>0 0 1</xyz></axis>") + loop,
+         "\"b\" is the child of the joints \"j\" and \"k\". A robot is a tree: remove the one");
 }
 
 }  // namespace
