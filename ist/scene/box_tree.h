@@ -125,9 +125,8 @@ class BoxTree {
     }
     SceneBox whole() const noexcept { return box(0).united(box(1)).united(box(2).united(box(3))); }
     std::uint32_t used() const noexcept {
-      std::uint32_t lanes = 0;
-      for (std::uint32_t k = 0; k < kLanes; ++k) lanes |= (child[k] != kNone ? 1u : 0u) << k;
-      return lanes;
+      return (child[0] != kNone ? 1u : 0u) | (child[1] != kNone ? 2u : 0u) |
+             (child[2] != kNone ? 4u : 0u) | (child[3] != kNone ? 8u : 0u);
     }
     /// A bit a lane.
     std::uint32_t meeting(const SceneBox& box) const noexcept {

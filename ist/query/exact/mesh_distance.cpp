@@ -9,6 +9,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/mesh_distance.cpp"
 #include <hwy/foreach_target.h>
 
+#include "numerics/bits.h"
 #include "query/exact/box_gaps-inl.h"
 #include "query/exact/crossing.h"
 #include "query/exact/mesh_queries.h"
@@ -81,7 +82,8 @@ class MeshGapSearch {
     }
     if (kept != nullptr && ring.serves(*kept, b_, asked_.a_from_b, 0)) {
       for (std::uint32_t n = 0; n < kept->count && !done(); n += 2) {
-        if (std::bit_cast<double>(ring.pair(*kept, n + 1)) - kept->moved > limit_) continue;
+        const double least = double{float_of(static_cast<std::uint32_t>(ring.pair(*kept, n + 1)))};
+        if (least - kept->moved > limit_) continue;
         const std::uint64_t blocks = ring.pair(*kept, n);
         measure(static_cast<std::uint32_t>(blocks >> 32), static_cast<std::uint32_t>(blocks));
       }
@@ -191,7 +193,7 @@ class MeshGapSearch {
   /// with it cannot answer.
   static float coarse(double x) {
     const auto single = static_cast<float>(std::min(x, 1e37));
-    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(single) & 0xfffff000u);
+    return float_of(bits_of(single) & 0xfffff000u);
   }
 
   /// The least order comes on top, of like ones the first; below `first` nothing is moved.
@@ -373,7 +375,7 @@ class MeshGapSearch {
       return;
     }
     ring.add(*keep_, blocks);
-    ring.add(*keep_, std::bit_cast<std::uint64_t>(least));
+    ring.add(*keep_, bits_of(static_cast<float>(least)));
   }
 
   using Corners = std::array<exact::Point, 3>;
