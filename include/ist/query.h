@@ -72,7 +72,7 @@ using ContactSettings = PenetrationSettings;
 
 /// Limits of a separation. Zero, a negative value or NaN means no limit.
 struct SeparationSettings {
-  std::uint32_t max_visits = 0;  ///< count of node pairs opened, the nearest first
+  std::uint32_t max_visits = 0;  ///< count of node pairs opened, depth first
   bool inner_spheres = false;    ///< use the inner spheres even if both assets keep a mesh
 
   /// [u] Of solids that are farther apart than this the answer says no more: distance and

@@ -104,9 +104,9 @@ class BoxLook {
     }
   }
 
-  /// Squared distances of sixteen boxes from `one` of the other mesh, or less; bit l: box
-  /// l may be within `limit`, squared too. `apart`: the largest gap along an axis, where both
-  /// overlap below zero. Only what may be within is written.
+  /// Which of sixteen boxes may be within `limit`, squared, of `one` of the other mesh: a bit each.
+  /// Of these come the squared distances, or less, and `apart`: the largest gap along any axis,
+  /// which is negative where both overlap along all of them.
   HWY_INLINE std::uint32_t measure(const BoxBlock& boxes, const MiddleBox& one, double limit,
                                    T (&squared)[kWidth], T (&apart)[kWidth]) const {
     double middle[3], hull[3], reach[3], normal[3];
@@ -218,7 +218,7 @@ class BoxLook {
   const Similarity& map_;
   const double blur_;
   double axis_[3][3];        ///< the other's, in their frame
-  double along_[3][3] = {};  ///< of each way each of the other's axes
+  double along_[3][3] = {};  ///< [way][axis of the other]: their product
   // For lanes; ways go from the boxes to the other, and two beside that.
   T lane_axis_[3][3], abs_axis_[3][3], lane_way_[3][3] = {}, abs_way_[3][3] = {};
 };

@@ -95,7 +95,7 @@ HWY_INLINE CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const 
   const V size = one_of(nx, ny, nz);
   const auto counts = hn::And(found > least, size > zero);
   const V divisor = hn::IfThenElse(counts, size, one);
-  // `moment_x` is six times what it says, `twice` two times.
+  // The sums are six times the moments, and twice the area.
   const V thrice = hn::Set(d, 3.0) * hn::IfThenElse(counts, twice, one);
   const V x = moment_x / thrice, y = moment_y / thrice;
   // In the plane: the third coordinate is by the normal.

@@ -189,14 +189,14 @@ class MeshGapSearch {
     out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
-  /// What differs by less is as near: then the lowest number comes first, and others that are level
-  /// with it cannot answer.
+  /// Drops the last twelve bits. Level faces are equally near but for roundings; with equal orders
+  /// the lowest number comes first, and cannot_answer() then leaves the others out.
   static float coarse(double x) {
     const auto single = static_cast<float>(std::min(x, 1e37));
     return float_of(bits_of(single) & 0xfffff000u);
   }
 
-  /// The least order comes on top, of like ones the first; below `first` nothing is moved.
+  /// Sorts by order from `first` on: the least is on top, and of equal ones what came first.
   void push(const GapPair& pair, std::uint32_t first) {
     std::uint32_t place = size_++;
     for (; place > first && waiting_[place - 1].order <= pair.order; --place)
@@ -207,7 +207,7 @@ class MeshGapSearch {
   void visit(const GapPair& pair) {
     if (pair.level_a == 0 && pair.level_b == 0) {
       measure(pair.a, pair.b);
-      // A few pairs wait for more.
+      // A few pairs wait until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
     } else if (single_) {
       open(pair, single_a_, single_b_);
