@@ -18,8 +18,6 @@ namespace ist::gpu {
 /// A leaf block that is tested. Each half of the team's items tests one; or both are the same, and
 /// the halves share its triangles.
 struct TestedBlock {
-  double from[3];  ///< a point within the block's ball, if crossings tell sides
-  bool inside;     ///< its side
   std::uint32_t block;
   std::uint32_t triangles;  ///< of those seen, a bit each
 };
@@ -35,10 +33,7 @@ struct TestMemory {
 
 /// Source: what has the triangles.
 ///   Id: what it calls one
-///   kCrossings: sides are told by the triangles on the way from TestedBlock::from, all of which
-///     come near the block; else by inside()
 ///   corners(id, c): of a triangle
-///   crosses(from, x, id): whether the way goes through a triangle, exactly
 ///   settles(x, r, part): whether a ball's part is told without triangles
 ///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
 ///   inside(team, wanted, x): whether a lane's point is inside
@@ -108,28 +103,18 @@ class BallTests {
     }
   };
 
-  /// Which of the triangles that are seen may meet a ball. If crossings tell sides: whether its
-  /// centre is on the other side of them than `from`, but for those where that is unclear.
-  IST_HD bool meet(const double (&from)[3], std::uint32_t triangles, const double (&x)[3], double r,
-                   const Share& share, std::uint32_t& met, std::uint32_t& unclear) const {
-    float begin[3], end[3];
+  /// Which of the triangles that are seen may meet a ball.
+  IST_HD std::uint32_t meet(std::uint32_t triangles, const double (&x)[3], double r,
+                            const Share& share) const {
+    float end[3];
     m_.seen.seen(x, end);
-    if constexpr (Source::kCrossings) m_.seen.seen(from, begin);
     const float radius = m_.seen.seen_radius(r);
-    bool crossed = false;
+    std::uint32_t met = 0;
     IST_ROLLED
-    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left)) {
-      const int k = lowest_bit(left);
-      const std::uint32_t bit = left & (~left + 1);
-      const SeenFrom to = m_.seen.from(k, end);
-      if (SeenTriangles::meets(to, radius)) met |= bit;
-      if constexpr (Source::kCrossings) {
-        const Crossing crossing = SeenTriangles::crosses(m_.seen.from(k, begin), to);
-        crossed = crossed != (crossing == Crossing::yes);
-        if (crossing == Crossing::unclear) unclear |= bit;
-      }
-    }
-    return crossed;
+    for (std::uint32_t left = share.first(triangles); left != 0; left = share.next(left))
+      if (SeenTriangles::meets(m_.seen.from(lowest_bit(left), end), radius))
+        met |= left & (~left + 1);
+    return met;
   }
 
  private:
@@ -139,32 +124,20 @@ class BallTests {
     double x[kItemsALane][3], r[kItemsALane];
     BallPart part[kItemsALane] = {};
     bool settled[kItemsALane];
-    std::uint32_t touched = 0, odd = 0;
+    std::uint32_t touched = 0;
     for (int i = 0; i < kItemsALane; ++i) {
       const TestedBlock& block = tested(item(i));
       met_[i] = 0;
-      bool crossed = false;
       settled[i] = true;
       if (place_ball(probe_, 0, block.block, item(i) % static_cast<int>(kWidth), x[i], r[i])) {
         settled[i] = source_.settles(x[i], r[i], part[i]);
-        std::uint32_t unclear = 0;
-        if (!settled[i])
-          crossed = meet(block.from, block.triangles, x[i], r[i], Share(item(i), !two_), met_[i],
-                         unclear);
-        if constexpr (Source::kCrossings)
-          if (unclear != 0)
-            crossed = crossed != crosses_odd(source_, block.from, x[i], m_.id, unclear);
+        if (!settled[i]) met_[i] = meet(block.triangles, x[i], r[i], Share(item(i), !two_));
       }
       touched |= team_.ballot(met_[i] != 0) << (i * Team::kWidth);
-      odd |= team_.ballot(crossed) << (i * Team::kWidth);
     }
     constexpr std::uint32_t kHalf = (1u << kWidth) - 1;
     lists_ = touched != 0;
-    if (!two_) {
-      touched = (touched | touched >> kWidth) & kHalf;
-      odd = (odd ^ odd >> kWidth) & kHalf;
-    }
-    odd_ = first_ ? odd : odd_ ^ odd;
+    if (!two_) touched = (touched | touched >> kWidth) & kHalf;
     for (int i = 0; i < kItemsALane; ++i) {
       const bool is_ball = two_ || item(i) < static_cast<int>(kWidth);
       if (first_ && is_ball) m_.held_as[item(i)] = kNotHeld;
@@ -176,11 +149,7 @@ class BallTests {
       if (fresh) hold(place, item(i));
       if (!last_) continue;
       const bool there = is_ball && r[i] > 0;
-      bool inside;
-      if constexpr (Source::kCrossings)
-        inside = tested(item(i)).inside != ((odd_ >> item(i) & 1) != 0);
-      else
-        inside = source_.inside(team_, there && !settled[i], x[i]);
+      const bool inside = source_.inside(team_, there && !settled[i], x[i]);
       if (!there) continue;
       if (settled[i])
         add_settled(x[i], part[i]);
@@ -212,15 +181,6 @@ class BallTests {
     team_.sync();
   }
 
-  IST_HD_COLD static bool crosses_odd(const Source source, const double (&from)[3],
-                                      const double (&x)[3], const Id* ids,
-                                      std::uint32_t triangles) {
-    bool odd = false;
-    for (; triangles != 0; triangles &= triangles - 1)
-      if (source.crosses(from, x, ids[lowest_bit(triangles)])) odd = !odd;
-    return odd;
-  }
-
   IST_HD void hold(int place, int of_item) {
     m_.met.balls[place] =
         tested(of_item).block * kWidth + static_cast<std::uint32_t>(of_item) % kWidth;
@@ -250,7 +210,6 @@ class BallTests {
   std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and wait to be listed
   bool two_ = false, first_ = false, last_ = false;  ///< of what is tested
   bool tests_ = false, lists_ = false;               ///< something waits
-  std::uint32_t odd_ = 0;  ///< balls that lie on the other side of what is known
 };
 
 }  // namespace ist::gpu

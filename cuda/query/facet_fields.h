@@ -24,7 +24,6 @@ struct FacetWalkMemory : WalkMemory {
 class FacetSource {
  public:
   using Id = FacetId;
-  static constexpr bool kCrossings = false;
 
   /// `whole`: a ball around all that is asked for.
   IST_HD FacetSource(const FieldRef& field, const double (&whole)[4])
@@ -131,8 +130,7 @@ class FacetWalk {
         source_(memory.field, memory.whole),
         tests_(team, memory, memory.tests, source_, sums) {}
 
-  /// As SurfaceWalk, which alone needs a side to begin with.
-  IST_HD void start(bool) {
+  IST_HD void start() {
     if (team_.lane() == 0) {
       const double centre[3] = {m_.whole[0], m_.whole[1], m_.whole[2]};
       m_.tests.seen.look_from(centre, m_.whole[3]);
@@ -140,7 +138,8 @@ class FacetWalk {
     team_.sync();
   }
 
-  /// As SurfaceWalk, but that it goes on to the end, without tests, where take() is false.
+  /// take(met, end) takes what is found: more of the same balls follow, or this is the `end` of a
+  /// part. Where it returns false, the rest is gone through without tests.
   template <class Take>
   IST_HD void run(const Take& take) {
     FieldWalk<Team> walk(team_, m_, sums_);

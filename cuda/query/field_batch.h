@@ -21,12 +21,12 @@ struct TriangleRound {
   std::uint32_t summed;  ///< parts
 };
 
-/// Counters of a batch with fields, by FieldGroup: zero at first.
+/// Counters of a batch with fields: zero at first.
 struct FieldCounters {
-  std::uint32_t listed[kFieldGroups];
-  std::uint32_t taken[kFieldGroups];     ///< of smooth ones, and of those that are in no round
-  std::uint32_t large[kFieldGroups];     ///< pairs that found no room in their round
-  TriangleRound round[kFieldGroups][2];  ///< the one in work, and the one before
+  std::uint32_t listed[kFieldGroups];  ///< by FieldGroup
+  std::uint32_t taken[kFieldGroups];   ///< of smooth ones, and of those that are in no round
+  std::uint32_t large;                 ///< pairs that found no room in their round
+  TriangleRound round[2];              ///< the one in work, and the one before
 };
 
 constexpr std::uint32_t kNoPart = ~0u;
@@ -37,7 +37,6 @@ struct TriangleQuery {
   LensTotals walked;  ///< of balls that no triangle meets
   std::uint32_t pair;
   std::uint32_t first_part;  ///< kNoPart: none
-  bool inside;               ///< whether the centre of the root's node_ball() is; of a mesh
   bool fits;                 ///< parts found room
 };
 
@@ -67,8 +66,7 @@ struct FieldBatch : SolidPairs {
 
 /// Where the k-th pair of a group is listed: no pair is in two.
 IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std::uint32_t k) {
-  if (group == kSmooth) return batch.list[0][k];
-  return batch.list[1][group == kMesh ? k : batch.pairs.count - 1 - k];
+  return batch.list[group == kSmooth ? 0 : 1][k];
 }
 
 /// The sides of pair i.

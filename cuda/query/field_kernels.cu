@@ -37,8 +37,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_smooth_pairs(const 
 
 void find_field_grids(Grids& grids) {
   grids.smooth = blocks_at_a_time(sum_smooth_pairs, kThreads);
-  grids.of[kFacets] = triangle_grids<FacetKind>();
-  grids.of[kMesh] = triangle_grids<MeshKind>();
+  grids.facets = triangle_grids();
 }
 
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
@@ -50,8 +49,7 @@ void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups]
     sum_smooth_pairs<<<static_cast<unsigned>(grids.smooth), kThreads, 0, stream>>>(batch);
     check_launch("summing trees in fields");
   }
-  if (has[kFacets]) launch_triangle_pairs<FacetKind>(batch, grids, stream);
-  if (has[kMesh]) launch_triangle_pairs<MeshKind>(batch, grids, stream);
+  if (has[kFacets]) launch_triangle_pairs(batch, grids.facets, stream);
 }
 
 }  // namespace ist::gpu

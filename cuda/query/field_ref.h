@@ -2,7 +2,6 @@
 
 #include <cstdint>
 
-#include "cuda/query/surface_ref.h"
 #include "query/field/plain_shapes.h"
 
 namespace ist::gpu {
@@ -17,8 +16,7 @@ enum class FieldKind : std::uint32_t {
   cylinder,
   grid,
   box,
-  height,
-  mesh
+  height
 };
 
 /// A field of a batch in plain numbers (ist/field.h), what it points to being where the batch is
@@ -33,17 +31,14 @@ struct FieldRef {
     PlainGrid grid;
     PlainBox box;
     PlainTerrain height;
-    SurfaceRef mesh;
   };
 };
 
 /// Kinds that are summed in the same way.
-enum FieldGroup { kSmooth, kFacets, kMesh, kFieldGroups };
+enum FieldGroup { kSmooth, kFacets, kFieldGroups };
 
 IST_HD inline FieldGroup group_of(FieldKind kind) {
-  return kind == FieldKind::mesh                               ? kMesh
-         : kind == FieldKind::box || kind == FieldKind::height ? kFacets
-                                                               : kSmooth;
+  return kind == FieldKind::box || kind == FieldKind::height ? kFacets : kSmooth;
 }
 
 }  // namespace ist::gpu

@@ -11,17 +11,6 @@
 
 namespace ist::gpu {
 
-/// How far outside a point is of the grid around a surface: the distance, squared.
-IST_HD inline double outside_grid2(const SurfaceRef& s, const double (&x)[3]) {
-  double square = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double high = s.low[k] + s.cell * (kBrickWidth * s.bricks[k]);
-    const double beyond = most(most(s.low[k] - x[k], x[k] - high), 0);
-    square += beyond * beyond;
-  }
-  return square;
-}
-
 /// Which group pair i is of; −1: it is answered, or none of a tree and a field. One thread a pair.
 IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   if (kind_of(batch, i) != PairKind::tree_and_field) return -1;
@@ -38,12 +27,6 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   double x[3];
   place.a_from_b.apply_fused(centre, x);
   const double r = tree.root[3] * place.a_from_b.scale;
-  if (field.kind == FieldKind::mesh) {
-    const double reach = sure_reach(r, 0);
-    if (outside_grid2(field.mesh, x) < reach * reach) return kMesh;
-    write_nothing(batch.answers, i, QueryStatus::ok);
-    return -1;
-  }
   bool sound = true;
   const double d = distance_in(field, x, sound), reach = sure_reach(r, distance_error(field));
   if (sound && d > -reach && d < reach) return group_of(field.kind);

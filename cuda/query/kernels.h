@@ -18,11 +18,11 @@ struct TriangleGrids {
 
 /// Blocks of each kernel that the current device runs at a time.
 struct Grids {
-  int sum, details;                ///< of a batch of trees
-  int search[2];                   ///< of separations, in float and in double
-  int divide;                      ///< of contact patches
-  int smooth;                      ///< of trees in fields …
-  TriangleGrids of[kFieldGroups];  ///< … by their group
+  int sum, details;      ///< of a batch of trees
+  int search[2];         ///< of separations, in float and in double
+  int divide;            ///< of contact patches
+  int smooth;            ///< of trees in smooth fields
+  TriangleGrids facets;  ///< of trees in boxes and terrains
 };
 
 /// Each sets the members of its kernels.
@@ -30,7 +30,6 @@ void find_batch_grids(Grids& grids);
 void find_separation_grids(Grids& grids);
 void find_patch_grids(Grids& grids);
 void find_field_grids(Grids& grids);
-template <class Kind>
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
@@ -41,8 +40,8 @@ void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t ro
 /// `has`: groups of which there are fields.
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
                         const Grids& grids, cudaStream_t stream);
-/// The pairs of a kind that a batch of fields has listed.
-template <class Kind>
-void launch_triangle_pairs(const FieldBatch& batch, const Grids& grids, cudaStream_t stream);
+/// The pairs with boxes and terrains that a batch of fields has listed.
+void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
+                           cudaStream_t stream);
 
 }  // namespace ist::gpu

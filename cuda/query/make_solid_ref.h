@@ -65,8 +65,7 @@ class TreeRegions {
   std::uint32_t ranked_ = 0;
 };
 
-/// The memory that a field points to: heights, distances, an asset's bytes; none of what is out of
-/// range.
+/// The memory that a field points to: heights or distances; none of what is out of range.
 inline std::span<const std::byte> pointed_to(const Field& field) {
   const auto bytes = [](const auto* from, std::size_t count) {
     return std::as_bytes(std::span(from, count));
@@ -75,16 +74,7 @@ inline std::span<const std::byte> pointed_to(const Field& field) {
     return bytes(f->heights, std::size_t{f->columns} * f->rows);
   if (const auto* const g = std::get_if<DistanceGridField>(&field); g != nullptr && is_sound(*g))
     return bytes(g->distances, std::size_t{g->size[0]} * g->size[1] * g->size[2]);
-  if (const auto* const m = std::get_if<MeshField>(&field); m != nullptr && is_sound(*m))
-    return bytes(reinterpret_cast<const std::byte*>(&m->tree.header()),
-                 m->tree.header().file_bytes);
   return {};
-}
-
-inline AssetFrame frame_of(const Field& field) {
-  const auto* const mesh = std::get_if<MeshField>(&field);
-  return mesh != nullptr && mesh->tree.has_surface() ? frame_of(mesh->tree.header())
-                                                     : AssetFrame{{0, 0, 0}, 1};
 }
 
 /// `at`: where who works on the field finds what it points to. `unusable` if out of range.
@@ -118,9 +108,6 @@ inline FieldRef field_ref(const Field& field, const std::byte* at) {
     ref.kind = FieldKind::grid;
     ref.grid = plain(*f);
     ref.grid.distances = floats;
-  } else if (const auto* const f = std::get_if<MeshField>(&field)) {
-    ref.kind = FieldKind::mesh;
-    ref.mesh = SurfaceRef::of(f->tree.header(), at);
   }
   return ref;
 }
@@ -201,15 +188,14 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
     if (std::holds_alternative<FunctionField>(*field))
       refuse(
           "a FunctionField, which a GPU cannot call: sample it into a DistanceGridField, or bake "
-          "its solid for a MeshField");
-    ref.frame = frame_of(*field);
+          "its solid");
+    ref.frame = {{0, 0, 0}, 1};
     ref.field = field_ref(*field, put(pointed_to(*field)));
     return ref;
   }
   const TreeView& asset = std::get<TreeView>(solids[i]);
   if (asset.empty()) refuse("an empty asset");
-  if (asset.sphere_count() == 0)
-    refuse("an asset without spheres: bake it with spheres, or pass it as a MeshField");
+  if (asset.sphere_count() == 0) refuse("an asset without spheres: bake it with spheres");
   const AssetHeader& header = asset.header();
   const auto* const here = reinterpret_cast<const std::byte*>(&header);
   const std::byte* const bytes = put(std::span(here, header.file_bytes));

@@ -19,8 +19,6 @@ struct SeenFrom {
   float height, edge[3];
 };
 
-enum class Crossing { no, yes, unclear };
-
 /// Triangles as they are seen near a point: in floats, lengths being parts of a reach about it.
 struct SeenTriangles {
   struct alignas(16) Plane {
@@ -88,24 +86,6 @@ struct SeenTriangles {
   /// Whether a triangle may meet a ball of that radius.
   IST_HD static bool meets(const SeenFrom& at, float r) {
     return at.height < r && -at.height < r && at.edge[0] > -r && at.edge[1] > -r && at.edge[2] > -r;
-  }
-
-  /// Whether the way from one point to another goes through the triangle.
-  IST_HD static Crossing crosses(const SeenFrom& a, const SeenFrom& b) {
-    const float ha = a.height < 0 ? -a.height : a.height, hb = b.height < 0 ? -b.height : b.height;
-    const bool clear = ha > kSeenRoom && hb > kSeenRoom;
-    if (clear && (a.height > 0) == (b.height > 0)) return Crossing::no;
-    bool through = clear;
-    for (int i = 0; i < 3; ++i) {
-      const float ea = a.edge[i], eb = b.edge[i];
-      if (ea < -kSeenRoom && eb < -kSeenRoom) return Crossing::no;
-      // Where it goes through the plane, times ha + hb.
-      const float there = std::fma(ea, hb, eb * ha);
-      const float room = kSeenRoom * ((ha + hb) + ((ea < 0 ? -ea : ea) + (eb < 0 ? -eb : eb)));
-      if (clear && there < -room) return Crossing::no;
-      through = through && there > room;
-    }
-    return through ? Crossing::yes : Crossing::unclear;
   }
 
  private:

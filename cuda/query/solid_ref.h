@@ -12,7 +12,7 @@ namespace ist::gpu {
 
 /// A solid as a batch finds it: a field, or an asset's trees.
 struct SolidRef {
-  AssetFrame frame;  ///< of an asset and of its surface; of all other fields their own
+  AssetFrame frame;  ///< of an asset; of a field its own
   FieldRef field;    ///< FieldKind::none: an asset, which has all that follows
   TreeRef tree[2];   ///< by Measure
   SumsRef sums[2];   ///< by Measure

@@ -6,11 +6,10 @@
 #include "cuda/query/disc_sums.h"
 #include "cuda/query/facet_fields.h"
 #include "cuda/query/field_batch.h"
-#include "cuda/query/surface_walk.h"
 #include "numerics/host_device.h"
 #include "numerics/team.h"
 
-// Trees against triangles: meshes, boxes, terrains. A round takes pairs of a batch through steps of
+// Trees against triangles: of boxes and terrains. A round takes pairs of a batch through steps of
 // which each fits the instruction cache: they are placed, walks find what meets, that is summed,
 // answers are written. The next begins where the room of one has come to its end. Pairs that are
 // too large for a round, or for which there is none left, go through all steps by one team, to the
@@ -18,96 +17,42 @@
 
 namespace ist::gpu {
 
-/// Memory of a team that sums parts. `More`: what the source needs.
-template <class Source, class More>
-struct MetMemory : More {
-  DiscMemory<typename Source::Id> discs;
+/// Memory of a team that sums parts, and of one that walks too.
+struct FacetSumMemory : ProbeMemory {
+  DiscMemory<FacetId> discs;
 };
-
-/// Meshes: their group, what has their triangles, who walks them, and the memory of both.
-struct MeshKind {
-  static constexpr FieldGroup kGroup = kMesh;
-  using Source = SurfaceSource;
-  using WalkMemory = SurfaceWalkMemory;
-  struct ProbeRoom : ProbeMemory {
-    SurfaceNode open[kOpenRoom];
-  };
-  template <class Team>
-  using Walk = SurfaceWalk<Team>;
-
-  template <class Memory>
-  IST_HD static Source source(Memory& memory) {
-    return {memory.field.mesh, memory.open};
-  }
-  template <class Team>
-  IST_HD static bool root_inside(const Team& team, const FieldRef& field, const TreeRef& tree,
-                                 const Similarity& a_from_b) {
-    double centre[3], reach;
-    node_ball(tree, tree.top, 0, a_from_b, centre, reach);
-    return inside_surface(team, field.mesh, team.lane() == 0, centre);
-  }
+struct FacetWholeMemory : FacetWalkMemory {
+  DiscMemory<FacetId> discs;
 };
-
-/// Boxes and terrains.
-struct FacetKind {
-  static constexpr FieldGroup kGroup = kFacets;
-  using Source = FacetSource;
-  using WalkMemory = FacetWalkMemory;
-  using ProbeRoom = ProbeMemory;
-  template <class Team>
-  using Walk = FacetWalk<Team>;
-
-  IST_HD static Source source(const ProbeMemory& memory) { return {memory.field, memory.whole}; }
-  /// Its sides are told ball by ball.
-  template <class Team>
-  IST_HD static bool root_inside(const Team&, const FieldRef&, const TreeRef&, const Similarity&) {
-    return false;
-  }
-};
-
-template <class Kind>
-using SumMemory = MetMemory<typename Kind::Source, typename Kind::ProbeRoom>;
-template <class Kind>
-using WholeMemory = MetMemory<typename Kind::Source, typename Kind::WalkMemory>;
 
 /// The counters of the n-th round.
-template <class Kind>
-IST_HD TriangleRound& round_of(const FieldBatch& batch, std::uint32_t n) {
-  return batch.counters->round[Kind::kGroup][n % 2];
+IST_HD inline TriangleRound& round_of(const FieldBatch& batch, std::uint32_t n) {
+  return batch.counters->round[n % 2];
 }
 
 /// Pairs of a round that begins with the first-th of those listed, if all are walked.
-template <class Kind>
-IST_HD std::uint32_t pairs_from(const FieldBatch& batch, std::uint32_t first) {
-  const std::uint32_t left = batch.counters->listed[Kind::kGroup] - first;
+IST_HD inline std::uint32_t pairs_from(const FieldBatch& batch, std::uint32_t first) {
+  const std::uint32_t left = batch.counters->listed[kFacets] - first;
   return left < batch.room.query_room ? left : batch.room.query_room;
 }
 
 /// Pairs of a round that were walked.
-template <class Kind>
-IST_HD std::uint32_t walked_of(const FieldBatch& batch, const TriangleRound& round) {
-  const std::uint32_t most = pairs_from<Kind>(batch, round.first);
+IST_HD inline std::uint32_t walked_of(const FieldBatch& batch, const TriangleRound& round) {
+  const std::uint32_t most = pairs_from(batch, round.first);
   return round.walked < most ? round.walked : most;
 }
 
 /// Where the round after this one begins.
-template <class Kind>
-IST_HD std::uint32_t end_of(const FieldBatch& batch, const TriangleRound& round) {
-  return round.first + walked_of<Kind>(batch, round);
+IST_HD inline std::uint32_t end_of(const FieldBatch& batch, const TriangleRound& round) {
+  return round.first + walked_of(batch, round);
 }
 
 /// Places the k-th pair of a round, `listed` among all; by one thread.
-template <class Kind>
-IST_HD void place_query(const FieldBatch& batch, std::uint32_t k, std::uint32_t listed) {
+IST_HD inline void place_query(const FieldBatch& batch, std::uint32_t k, std::uint32_t listed) {
   TriangleQuery& query = batch.room.queries[k];
-  query.pair = listed_pair(batch, Kind::kGroup, listed);
+  query.pair = listed_pair(batch, kFacets, listed);
   place_field_pair(batch, query.pair, query.place);
   query.first_part = kNoPart;
-  const FieldSides sides(batch, query.pair);
-  const SolidRef& asset = solid_of(batch, sides.tree, query.pair);
-  query.inside =
-      Kind::root_inside(SerialTeam(), solid_of(batch, sides.field, query.pair).field,
-                        asset.tree[static_cast<int>(batch.measure)], query.place.a_from_b);
 }
 
 /// Whether a round has room for one more pair, as far as can be told. `teams`: those that walk, of
@@ -175,17 +120,17 @@ IST_HD void load_query(const Team& team, const FieldBatch& batch, const Triangle
 }
 
 /// Walks the k-th pair of a round: its parts are kept, or it is listed among the large.
-template <class Kind, class Team>
+template <class Team>
 IST_HD void walk_query(const Team& team, const FieldBatch& batch, TriangleRound& round,
-                       std::uint32_t k, typename Kind::WalkMemory& memory) {
+                       std::uint32_t k, FacetWalkMemory& memory) {
   TriangleQuery& query = batch.room.queries[k];
   load_query(team, batch, query, memory);
   PartSums sums;
-  typename Kind::template Walk<Team> walk(team, memory, sums);
-  walk.start(query.inside);
+  FacetWalk<Team> walk(team, memory, sums);
+  walk.start();
   std::uint32_t part = kNoPart;
   bool fits = true;
-  walk.run([&](const MetView<typename Kind::Source::Id>& met, bool end) {
+  walk.run([&](const MetView<FacetId>& met, bool end) {
     fits = end;
     if (!end || met.ball_count == 0) return end;
     part = keep_part(team, batch.room, round, k, part, met);
@@ -196,23 +141,20 @@ IST_HD void walk_query(const Team& team, const FieldBatch& batch, TriangleRound&
   if (team.lane() == 0) {
     query.walked = totals;
     query.fits = fits;
-    if (!fits)
-      listed_pair(batch, Kind::kGroup, atomic_add(&batch.counters->large[Kind::kGroup], 1)) =
-          query.pair;
+    if (!fits) listed_pair(batch, kFacets, atomic_add(&batch.counters->large, 1)) = query.pair;
   }
   team.sync();
 }
 
 /// Sums the k-th part of a round.
-template <class Kind, class Team>
+template <class Team>
 IST_HD void sum_part(const Team& team, const FieldBatch& batch, std::uint32_t k,
-                     SumMemory<Kind>& memory) {
+                     FacetSumMemory& memory) {
   MetPart& part = batch.room.parts[k];
   load_query(team, batch, batch.room.queries[part.query], memory);
   PartSums sums;
-  DiscSums<Team, typename Kind::Source> discs(team, memory, memory.discs, Kind::source(memory),
-                                              sums);
-  discs.add(met_of<typename Kind::Source::Id>(batch.room, part), true);
+  DiscSums<Team, FacetSource> discs(team, memory, memory.discs, {memory.field, memory.whole}, sums);
+  discs.add(met_of<FacetId>(batch.room, part), true);
   const LensTotals totals = sums.total(team);
   if (team.lane() == 0) part.totals = totals;
   team.sync();
@@ -234,19 +176,18 @@ IST_HD inline void answer_query(const FieldBatch& batch, std::uint32_t k) {
 }
 
 /// All steps of pair i.
-template <class Kind, class Team>
+template <class Team>
 IST_HD void sum_whole_query(const Team& team, const FieldBatch& batch, std::uint32_t i,
-                            WholeMemory<Kind>& memory) {
+                            FacetWholeMemory& memory) {
   if (team.lane() == 0) place_field_pair(batch, i, memory.place);
   load_solids(team, batch, i, memory);
   PartSums walked, sums;
-  typename Kind::template Walk<Team> walk(team, memory, walked);
-  DiscSums<Team, typename Kind::Source> discs(team, memory, memory.discs, Kind::source(memory),
-                                              sums);
-  walk.start(Kind::root_inside(team, memory.field, memory.tree, memory.place.a_from_b));
+  FacetWalk<Team> walk(team, memory, walked);
+  DiscSums<Team, FacetSource> discs(team, memory, memory.discs, {memory.field, memory.whole}, sums);
+  walk.start();
   LensTotals total;
   total.clear();
-  walk.run([&](const MetView<typename Kind::Source::Id>& met, bool end) {
+  walk.run([&](const MetView<FacetId>& met, bool end) {
     if (met.ball_count == 0) return true;
     discs.add(met, end);
     if (end) {

@@ -43,7 +43,7 @@ def push_apart(solids, poses, pairs, scales, device="cpu", most_steps=2000):
     for step in range(most_steps):
         swollen = min(1, 0.3 + 0.7 * step / SWELLING)
         descent.zero_grad()
-        energy = overlap(solids, moved, pairs=pairs, scales=swollen * grown, surface="never").sum()
+        energy = overlap(solids, moved, pairs=pairs, scales=swollen * grown, spheres_only=True).sum()
         energies.append(energy.item())
         if energies[-1] == 0 and swollen == 1:
             break

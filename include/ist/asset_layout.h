@@ -14,10 +14,9 @@
 //   for each detail i = 1 … d, of m = ⌊n / 4^i⌋ spheres
 //     matched spheres                 Sphere[m]   the matched set of the first m inner spheres
 //     matched tree                    as below, without sphere covers
-//   surface, if there is one          as below
 //   mesh, if there is one             as below
 //
-// An asset without spheres, n = d = 0, has neither trees nor this surface, but a mesh.
+// An asset without spheres, n = d = 0, has no trees, but a mesh.
 //
 // The matched set of all n inner spheres is detail 0 and stands in AssetHeader. Under
 // PenetrationSettings::pair_budget a query may answer from the coarser ones instead.
@@ -34,21 +33,7 @@
 // but the last of each level is full. Sections follow each other in this order without a gap but
 // the padding to 64 bytes, so that n and d alone give every offset (place_sections).
 //
-// The surface, the solid's for queries of spheres: triangles, a tree of balls over them, and
-// a grid that separates inside from outside.
-//
-//   SurfaceHeader
-//   level 0                           SurfaceBlock[m(0)]
-//   level k ≥ 1                       BallBlock[m(k)], Origin[m(k)]   balls around blocks below
-//   brick index                       uint32[bricks[0] · bricks[1] · bricks[2]], x runs fastest
-//   bricks                            CellBrick[brick_count]
-//   cell ends                         uint16 or uint32[cell_count], as list_bytes says
-//   cell triangles                    uint16 or uint32[entry_count]   16 · block + lane
-//
-// A cell's list starts where the previous cell's ends; a brick's first cell starts at
-// CellBrick::list.
-//
-// The mesh, the solid's surface with all its digits, for Measure::exact:
+// The mesh, the solid's boundary, for Measure::exact:
 //
 //   MeshHeader
 //   vertices                          double[3 · vertex_count]   x, y, z of each, unit frame
@@ -71,7 +56,7 @@
 namespace IST_API ist {
 
 inline constexpr std::uint32_t kFormatMajor = 0;
-inline constexpr std::uint32_t kFormatMinor = 5;
+inline constexpr std::uint32_t kFormatMinor = 6;
 inline constexpr char kAssetMagic[8] = {'I', 'S', 'T', 'R', 'E', 'E', '\r', '\n'};
 inline constexpr std::size_t kAssetAlignment = 64;
 inline constexpr std::uint32_t kWidth = 16;       ///< balls in a block
@@ -116,7 +101,7 @@ struct alignas(64) NodeBlock {
 static_assert(sizeof(NodeBlock) == 192);
 
 struct LevelHeader {
-  std::uint64_t blocks = 0;   ///< offset of BallBlock[count], of the surface's level 0 SurfaceBlock
+  std::uint64_t blocks = 0;   ///< offset of BallBlock[count]
   std::uint64_t origins = 0;  ///< offset of Origin[count]
   std::uint64_t nodes = 0;    ///< offset of NodeBlock[count]; 0 at level 0
   std::uint32_t count = 0;    ///< blocks at this level
@@ -149,59 +134,6 @@ struct DetailLevel {
   TreeHeader matched_tree;
 };
 static_assert(sizeof(DetailLevel) == 328);
-
-/// Up to sixteen triangles of the surface over up to sixteen vertices of their own.
-///
-/// All blocks together are a closed, oriented surface: a vertex that blocks share has the same
-/// floats in each.
-struct alignas(64) SurfaceBlock {
-  float x[kWidth], y[kWidth], z[kWidth];  ///< vertices, unit frame; unused ones repeat the first
-  std::uint8_t corner[3][kWidth];  ///< vertices of a triangle, counter-clockwise from outside; 0 if
-                                   ///< unused
-  std::uint32_t triangles;         ///< 1 … 16
-  std::uint32_t vertices;          ///< 3 … 16
-  std::uint32_t reserved[2];
-};
-static_assert(sizeof(SurfaceBlock) == 256);
-
-inline constexpr std::uint32_t kBrickWidth = 4;         ///< cells along an edge of a brick
-inline constexpr std::uint32_t kOutsideBrick = ~0u;     ///< brick index: no cell is inside
-inline constexpr std::uint32_t kInsideBrick = ~0u - 1;  ///< all cells are inside
-/// Position of a cell's reference point, in cell edges: off planes common in meshes.
-inline constexpr double kCellReference[3] = {0.5239, 0.4517, 0.5371};
-
-/// 4 × 4 × 4 cells, bit x + 4 y + 16 z.
-struct CellBrick {
-  std::uint64_t surface = 0;  ///< cells that a triangle meets, and perhaps others
-  std::uint64_t inside = 0;   ///< cells whose reference point is inside
-  std::uint32_t first = 0;    ///< surface cells of the bricks before
-  std::uint32_t list = 0;     ///< triangles in the cells of the bricks before
-};
-static_assert(sizeof(CellBrick) == 24);
-
-/// The solid's surface for queries of spheres, over floats: the mesh's own triangles or, if an
-/// error was requested, fewer near them.
-struct SurfaceHeader {
-  /// Unit frame, proven: this surface and the solid's lie within `error` of each other, and both
-  /// solids agree on every point further from them.
-  double error = 0;
-  double low[3] = {};             ///< lower corner of the grid, unit frame; outside it is outside
-  double cell = 0;                ///< edge of a cell, unit frame
-  std::uint32_t bricks[3] = {};   ///< along x, y, z
-  std::uint32_t brick_count = 0;  ///< bricks that hold surface, or cells of both kinds
-  std::uint32_t cell_count = 0;   ///< surface cells
-  std::uint32_t entry_count = 0;  ///< triangles of all surface cells
-  std::uint32_t triangle_count = 0;
-  std::uint32_t level_count = 0;  ///< ≥ 1; the last has one block
-  std::uint32_t list_bytes = 4;   ///< of a number in the cells' ends and triangles: 2 or 4
-  std::uint32_t reserved = 0;
-  std::uint64_t brick_index = 0;     ///< offset of uint32[bricks[0] · bricks[1] · bricks[2]]
-  std::uint64_t brick_data = 0;      ///< offset of CellBrick[brick_count]
-  std::uint64_t cell_ends = 0;       ///< offset of [cell_count]: from CellBrick::list
-  std::uint64_t cell_triangles = 0;  ///< offset of [entry_count]: 16 · block + lane
-  LevelHeader level[kMaxLevels];     ///< level 0: SurfaceBlock, above: BallBlock and Origin
-};
-static_assert(sizeof(SurfaceHeader) == 336);
 
 /// Up to sixteen triangles of the mesh over up to sixteen of its vertices.
 ///
@@ -245,11 +177,11 @@ struct MeshShell {
 };
 static_assert(sizeof(MeshShell) == 4);
 
-/// The solid's surface for Measure::exact: closed, oriented, with winding numbers of 0 and 1 only,
+/// The solid's boundary: closed, oriented, with winding numbers of 0 and 1 only,
 /// except for touching faces.
 struct MeshHeader {
-  /// Unit frame, proven: this surface and the solid's lie within it of each other. 0: the mesh's
-  /// own triangles.
+  /// Unit frame: the mesh and the solid's boundary lie within it of each other. 0: but for a mesh
+  /// that was made from a signed distance (kFlagPolygonised).
   double error = 0;
   /// Unit frame: bound on the displacement of a vertex by rounding.
   double rounding = 0;
@@ -318,9 +250,6 @@ struct alignas(64) AssetHeader {
   std::uint32_t measured_poses = 0;  ///< of all partners; 0: nothing was measured
   std::uint32_t search_stop = 0;     ///< StopReason of the search for the target
 
-  std::uint64_t surface = 0;       ///< offset of SurfaceHeader; 0: baked without one
-  double asked_surface_error = 0;  ///< [u] of surface and mesh; 0: the mesh's own triangles
-
   /// Unit frame, proven: the mesh in the solid's place and the solid lie within it
   /// (kFlagPolygonised).
   double polygonise_error = 0;
@@ -378,27 +307,6 @@ constexpr void place_tree(TreeHeader& tree, bool with_covers, std::uint64_t& end
   }
 }
 
-constexpr void place_surface(SurfaceHeader& surface, std::uint64_t& end) noexcept {
-  std::uint32_t count = surface.level[0].count;
-  surface.level_count = 0;
-  for (;; count = (count + kWidth - 1) / kWidth) {
-    LevelHeader& level = surface.level[surface.level_count];
-    level.count = count;
-    level.blocks =
-        surface.level_count == 0 ? take<SurfaceBlock>(end, count) : take<BallBlock>(end, count);
-    level.origins = surface.level_count == 0 ? 0 : take<Origin>(end, count);
-    level.nodes = 0;
-    ++surface.level_count;
-    if (count == 1) break;
-  }
-  surface.brick_index = take<std::uint32_t>(
-      end, std::uint64_t{surface.bricks[0]} * surface.bricks[1] * surface.bricks[2]);
-  surface.brick_data = take<CellBrick>(end, surface.brick_count);
-  const std::uint64_t width = surface.list_bytes;
-  surface.cell_ends = take<std::byte>(end, width * surface.cell_count);
-  surface.cell_triangles = take<std::byte>(end, width * surface.entry_count);
-}
-
 constexpr void place_mesh(MeshHeader& mesh, std::uint64_t& end) noexcept {
   mesh.vertices = take<double>(end, std::uint64_t{3} * mesh.vertex_count);
   mesh.shells = take<MeshShell>(end, mesh.shell_count);
@@ -426,11 +334,9 @@ constexpr std::uint64_t detail_spheres(std::uint64_t n, std::uint32_t i) noexcep
 }
 
 /// Sets every offset, count and the file size from `sphere_count` in [0, kMaxSpheres] and
-/// `detail_count`, whose sets must each have a sphere; `details` are those of the file. `surface`,
-/// if any, must have list_bytes and its counts: level[0].count, those of bricks, cells and entries.
-/// `mesh`, if any, must have those of vertices, shells, neighbours and level[0].count.
+/// `detail_count`, whose sets must each have a sphere; `details` are those of the file. `mesh`, if
+/// any, must have its counts: those of vertices, shells, neighbours and level[0].count.
 constexpr void place_sections(AssetHeader& header, DetailLevel* details,
-                              SurfaceHeader* surface = nullptr,
                               MeshHeader* mesh = nullptr) noexcept {
   const std::uint64_t n = header.sphere_count;
   std::uint64_t end = sizeof(AssetHeader);
@@ -448,8 +354,6 @@ constexpr void place_sections(AssetHeader& header, DetailLevel* details,
     details[i].matched_tree.sphere_count = static_cast<std::uint32_t>(m);
     detail::place_tree(details[i].matched_tree, false, end);
   }
-  header.surface = surface != nullptr ? detail::take<SurfaceHeader>(end, 1) : 0;
-  if (surface != nullptr) detail::place_surface(*surface, end);
   header.mesh = mesh != nullptr ? detail::take<MeshHeader>(end, 1) : 0;
   if (mesh != nullptr) detail::place_mesh(*mesh, end);
   header.file_bytes = end;

@@ -23,24 +23,21 @@ namespace IST_API ist {
 ///
 /// A mesh that counts volume twice is first resolved to the boundary of the set where its winding
 /// number is 1 or more (MeshState::resolved). If that fails, no mesh is kept
-/// (MeshState::unresolved), and no surface if the mesh reaches far into itself.
+/// (MeshState::unresolved).
 ///
-/// Throws Error if no sphere fits, on settings out of range, and if the requested surface error is
-/// below float precision.
+/// Throws Error if no sphere fits and on settings out of range.
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings = {},
            const ProgressCallback& progress = {});
 
-/// Makes a surface-only asset: the mesh, mass properties and bounds, without spheres and
-/// the surface that these need.
-/// Takes about as long as the import.
+/// Makes a surface-only asset: the mesh, mass properties and bounds, without spheres. Takes about
+/// as long as the import.
 ///
 /// It serves Measure::exact and mass_properties(); queries of spheres return QueryStatus::not_held.
 ///
-/// `threads`: 0 = all cores. The only stage of `progress` is "resolve". Throws Error if `wanted` is
-/// false, if the mesh counts volume twice and cannot be resolved, if the callback cancels, and as
-/// bake() does.
-Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings = {},
-                   unsigned threads = 0, const ProgressCallback& progress = {});
+/// `threads`: 0 = all cores. The only stage of `progress` is "resolve". Throws Error if the
+/// mesh counts volume twice and cannot be resolved, and if the callback cancels.
+Asset bake_surface(const ClosedMesh& mesh, unsigned threads = 0,
+                   const ProgressCallback& progress = {});
 
 /// Options of the mesh that is made in place of a solid, for calibration.
 struct PolygoniseSettings {

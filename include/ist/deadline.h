@@ -31,9 +31,8 @@ class Deadline {
   /// [µs] Zero, a negative value or NaN: no deadline, and no pair budget.
   explicit Deadline(double microseconds = 0) noexcept;
 
-  /// Sets the pair budget of the next query. SurfaceUse::automatic becomes never, since the time of
-  /// a query by the surface does not depend on the budget. SurfaceUse::always is not changed: set
-  /// it where spheres alone are too coarse (PairFit::needs_surface).
+  /// Sets the pair budget of the next query, and PenetrationSettings::spheres_only: meshes obey no
+  /// budget. Where spheres alone are too coarse (PairFit::needs_mesh), query without a deadline.
   void limit(PenetrationSettings& settings) const noexcept;
 
   /// Records the answer and the time of a query of the pair under this budget. An answer of NaN,

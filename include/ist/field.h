@@ -5,13 +5,11 @@
 #include <variant>
 
 #include <ist/api.h>
-#include <ist/tree_view.h>
 
 // Fields: shapes that a sphere tree collides with and that need no tree themselves: half-spaces,
-// primitives, terrains, distance grids, functions, and the surface of an asset. They are plain
-// views: nothing is copied or allocated, and memory they point to must outlive them. Distances are
-// positive inside the solid and negative outside, as those of Solid. Lengths are [u] in the field's
-// own frame.
+// primitives, terrains, distance grids and functions. They are plain views: nothing is copied or
+// allocated, and memory they point to must outlive them. Distances are positive inside the solid
+// and negative outside, as those of Solid. Lengths are [u] in the field's own frame.
 
 namespace IST_API ist {
 
@@ -88,13 +86,7 @@ struct FunctionField {
   double error = 0;               ///< [u] bound on the error of distances
 };
 
-/// The stored surface of an asset (TreeView::has_surface), without its spheres. Exact within
-/// TreeView::surface_error.
-struct MeshField {
-  TreeView tree;
-};
-
 using Field = std::variant<HalfSpaceField, BoxField, BallField, CapsuleField, CylinderField,
-                           HeightField, DistanceGridField, FunctionField, MeshField>;
+                           HeightField, DistanceGridField, FunctionField>;
 
 }  // namespace ist

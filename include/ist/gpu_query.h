@@ -86,7 +86,7 @@ struct GpuPenetrationSettings {
 };
 
 /// answers[i] = penetration(pairs[i]) as a finished sum, of two assets by lenses
-/// (SurfaceUse::never).
+/// (PenetrationSettings::spheres_only).
 ///
 /// Two assets: the volume is within 1e-6 of the sum in double. Gradients are within 1e-6 of the sum
 /// of the lenses' magnitudes, or of volume^(2/3) if that is more. Under a budget, and for copies of
@@ -94,7 +94,7 @@ struct GpuPenetrationSettings {
 ///
 /// An asset and a field, in either order: sums are in double. The volume is within 1e-9 of the
 /// CPU's, or 1e-15 of the asset's size³ if that is more; gradients likewise. node_visits counts
-/// opened nodes of the asset and of a mesh's surface.
+/// opened nodes of the asset.
 ///
 /// The bits are the same in every run and in any batch; they depend only on whether the workspace
 /// is for up to kFewGpuPairs or more.
@@ -125,7 +125,8 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint3
                       GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
 
 /// answers[i] and its patches = contact_patches(pairs[i]) of two assets by lenses
-/// (SurfaceUse::never), without limits: the contact condensed into at most `patches.most`.
+/// (PenetrationSettings::spheres_only), without limits: the contact condensed into at most
+/// `patches.most`.
 ///
 /// Patches are the same regions of the same tree as there, with the same ids, unless two divisions
 /// are equally good to a float's digits. Answers equal those of penetration_batch() to its

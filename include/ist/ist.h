@@ -42,8 +42,8 @@ enum {
   /* A limit or the workspace's capacity stopped the query. volume_min and volume_max still contain
    * the finished sum (IST_EXACT: the true volume). */
   IST_BUDGET_EXHAUSTED = 1,
-  /* Finished, but the predicted error exceeds relative_error: an asset has no mesh or a simplified
-   * one, or a pair budget or coincident copies left coarser spheres. */
+  /* Finished, but the predicted error exceeds relative_error: an asset has no mesh or one that errs
+   * more, or a pair budget or coincident copies left coarser spheres. */
   IST_ERROR_EXCEEDED = 2,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
    * 1e60 : 1 apart, or a field's number or an enum out of range. */
@@ -55,8 +55,7 @@ enum {
   IST_NO_MEMORY = -6,
   IST_CANNOT_READ = -7, /* the file; errno may say why */
   /* A solid lacks what the measure needs: IST_EXACT needs the meshes of both (a field has none),
-   * the others need spheres, IST_SURFACE_ALWAYS the surface of the coarser one. All numbers of the
-   * answer are NaN. */
+   * the others need spheres. All numbers of the answer are NaN. */
   IST_NOT_HELD = -15,
   IST_NO_DURATION = -14, /* ist_impact_settings_t::duration is 0 */
   IST_NOT_BAKED = -16,   /* ist_bake() (ist_bake.h): its message says why */
@@ -119,22 +118,18 @@ enum {
   IST_MESH_NONE = 0,
   IST_MESH_OWN = 1,
   IST_MESH_RESOLVED = 2,
-  IST_MESH_SIMPLIFIED = 3,
+  IST_MESH_POLYGONISED = 3, /* made from a signed distance */
   IST_MESH_UNRESOLVED = 4
 };
 
 typedef struct ist_tree_info {
   uint32_t size;
-  uint32_t has_surface; /* 1: the asset stores the solid's surface, which makes queries of spheres
-                         exact */
-  uint64_t spheres;     /* count; 0: a surface alone, without spheres to query */
-  double volume;        /* [u³] of the solid */
-  double coverage;      /* [0, 1] share of the volume in inner spheres */
-  double protrusion;    /* [u] bound on how far matched spheres stick out of the solid */
-  double surface_error; /* [u] the stored surface and the solid's lie within this of each other */
-  uint32_t surface_triangles; /* of that surface */
-  uint32_t details;           /* levels of detail of the matched spheres: 0 is the finest */
-  uint32_t mesh_triangles;    /* of the mesh kept for exact queries; 0: there is none */
+  uint32_t details;        /* levels of detail of the matched spheres: 0 is the finest */
+  uint64_t spheres;        /* count; 0: a mesh alone, without spheres to query */
+  double volume;           /* [u³] of the solid */
+  double coverage;         /* [0, 1] share of the volume in inner spheres */
+  double protrusion;       /* [u] bound on how far matched spheres stick out of the solid */
+  uint32_t mesh_triangles; /* of the mesh kept for exact queries; 0: there is none */
   ist_mesh_state_t mesh_state;
   double mesh_error;    /* [u] the mesh's surface and the solid's lie within this of each other */
   double counted_twice; /* [u³] volume that the input mesh counts more than once */
@@ -233,14 +228,13 @@ typedef struct ist_ball_set {
 ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* set,
                                 ist_ball_t* balls, size_t capacity, size_t* count);
 
-/* The surface that an asset holds, or the mesh of a surface alone: closed, oriented, triangles
- * counter-clockwise from outside. Parts of it repeat shared vertices, with the same bits. */
+/* The mesh that an asset keeps: closed, oriented, triangles counter-clockwise from outside. */
 typedef struct ist_surface {
   uint32_t size;
   double (*vertices)[3];    /* [u] [vertex_capacity] in the asset's own frame */
   uint32_t (*triangles)[3]; /* [triangle_capacity] three vertices each */
   size_t vertex_capacity, triangle_capacity;
-  size_t vertex_count, triangle_count; /* answer: total counts; 0 without a surface */
+  size_t vertex_count, triangle_count; /* answer: total counts; 0 without a mesh */
 } ist_surface_t;
 
 /* Writes as many as fit. An array may be null if its capacity is 0. */
@@ -269,8 +263,7 @@ enum {
   IST_CYLINDER = 5,
   IST_HEIGHTS = 6,
   IST_DISTANCE_GRID = 7,
-  IST_FUNCTION = 8,
-  IST_MESH = 9
+  IST_FUNCTION = 8
 };
 
 /* A sample of a field. */
@@ -322,10 +315,6 @@ typedef struct ist_field {
       const void* context; /* passed to `sample` */
       double error;        /* [u] bound on the error of distances */
     } function;
-    /* the stored surface of an asset, without its spheres */
-    struct {
-      const ist_tree_t* tree;
-    } mesh;
     double reserved[16];
   } as;
 } ist_field_t;
@@ -366,15 +355,15 @@ ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b
 
 /* --- Settings: a null pointer means the defaults, all 0 except `size` ------------------------ */
 
-typedef int32_t ist_surface_use_t;
-enum { IST_SURFACE_AUTOMATIC = 0, IST_SURFACE_NEVER = 1, IST_SURFACE_ALWAYS = 2 };
-
 /* PenetrationSettings. IST_EXACT obeys max_visits only. If that stops it, the answer is that of the
  * matched spheres (NaN if there are none), with bounds of the true volume. */
 typedef struct ist_penetration_settings {
   uint32_t size;
   ist_measure_t measure;
-  ist_surface_use_t surface;
+  /* IST_MATCHED, not 0: spheres answer even where they are too coarse for two solids of unlike
+   * sizes, and may be wrong by any factor (ist_get_pair_fit). 0: there the meshes do, if both keep
+   * one. */
+  uint32_t spheres_only;
   uint32_t pair_budget; /* count of sphere pairs to spend; 0: no limit, as in all that follow */
   uint32_t max_visits;  /* count of node pairs opened */
   /* The caller's number of this pair of solids; 0: none. Calls with one number and workspace are
@@ -483,7 +472,7 @@ ist_status_t ist_penetration(const ist_placed_t* a, const ist_placed_t* b,
                              ist_penetration_t* answer);
 
 /* Removes the volume that protruding spheres add where flat faces meet. `whole` is the answer
- * of ist_penetration() by lenses (IST_SURFACE_NEVER), and may be the same struct as `answer`. */
+ * of ist_penetration() with spheres_only, and may be the same struct as `answer`. */
 ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_placed_t* a,
                                     const ist_placed_t* b, ist_penetration_t* answer);
 
@@ -500,7 +489,7 @@ typedef struct ist_deadline {
 /* [µs] 0, a negative value or NaN: no deadline, and no pair budget. */
 ist_status_t ist_deadline_make(double microseconds, ist_deadline_t* deadline);
 
-/* Sets the pair budget of the next query; IST_SURFACE_AUTOMATIC becomes IST_SURFACE_NEVER. */
+/* Sets the pair budget of the next query, and spheres_only: meshes obey no budget. */
 ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
                                 ist_penetration_settings_t* settings);
 
@@ -530,9 +519,9 @@ typedef struct ist_pair_fit {
   double grain_a, grain_b; /* [u] the spheres do not resolve finer features */
   double ratio;            /* ≥ 1, coarser grain over the finer */
   uint32_t a_is_coarser;   /* 0 or 1, as are the others */
-  uint32_t has_surface;    /* the coarser asset stores its surface */
-  uint32_t needs_surface;  /* volumes and forces by spheres alone are misleading */
-  uint32_t fits;           /* has_surface or not needs_surface */
+  uint32_t has_mesh;       /* both assets keep their meshes */
+  uint32_t needs_mesh;     /* volumes and forces by spheres alone are misleading */
+  uint32_t fits;           /* has_mesh or not needs_mesh */
 } ist_pair_fit_t;
 
 /* Needs no workspace: takes nanoseconds. */
@@ -750,7 +739,7 @@ typedef struct ist_impact_settings {
   uint32_t max_visits; /* count of node pairs visited; 0: no limit */
   double duration;     /* [T] > 0: the interval is [0, duration] */
   double tolerance;    /* [u] 0: a thousandth of the smaller solid's bounding radius, or ten
-                          times the error of the surfaces if that is more */
+                          times the error of the meshes if that is more */
 } ist_impact_settings_t;
 
 /* TimeOfImpact */

@@ -48,17 +48,6 @@ enum class Device : std::uint32_t {
   cuda,  ///< throws Error if gpu_available() is false
 };
 
-/// What an asset stores of its solid's boundary: the mesh, which Measure::exact needs, and the
-/// surface, which makes the other measures exact where spheres are too coarse.
-struct SurfaceSettings {
-  bool wanted = true;  ///< false: neither mesh nor surface
-  /// [u] Allowed distance from the mesh's surface: as few triangles as that allows. 0: all of the
-  /// mesh's.
-  double error = 0;
-  double share = 0;  ///< [0, 1) the same as a share of the longest side of the mesh's bounds, if
-                     ///< `error` is 0
-};
-
 /// Limits of a packing, and its options. The first limit met stops it.
 struct PackingSettings {
   /// Count, met exactly unless another limit is met first; 0 = no limit.
@@ -75,7 +64,9 @@ struct PackingSettings {
   unsigned threads = 0;               ///< 0 = all cores; never changes the result
   Device device = Device::automatic;  ///< a Solid that is not a mesh is always packed on the CPU
   GpuSettings gpu = {};               ///< if `device` is a GPU
-  SurfaceSettings surface = {};       ///< for an asset; pack() ignores it
+  /// The asset stores the mesh, which Measure::exact, distances of surfaces, rays and times of
+  /// impact need. pack() ignores it.
+  bool keep_mesh = true;
 };
 
 /// Certified, non-overlapping spheres inside a solid, in insertion order.

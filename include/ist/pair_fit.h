@@ -12,12 +12,12 @@ struct PairFit {
   double grain_a = 0, grain_b = 0;
   double ratio = 1;          ///< ≥ 1, coarser grain over the finer
   bool a_is_coarser = true;  ///< or both are equal
-  bool has_surface = true;   ///< the coarser asset stores its surface (TreeView::has_surface)
-  /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. The coarser
-  /// one's surface helps, if it is stored and SurfaceUse allows it.
-  bool needs_surface = false;
+  bool has_mesh = true;      ///< both assets store their meshes (TreeView::has_mesh)
+  /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. With both meshes
+  /// Measure::matched goes over to these (PenetrationSettings::spheres_only).
+  bool needs_mesh = false;
 
-  bool fits() const noexcept { return has_surface || !needs_surface; }
+  bool fits() const noexcept { return has_mesh || !needs_mesh; }
 };
 
 /// Takes nanoseconds. For empty trees, and scales that are not > 0, all members have their

@@ -29,7 +29,10 @@ namespace IST_API ist {
 /// and the smaller solid's.
 struct PenetrationSettings {
   Measure measure = Measure::matched;
-  SurfaceUse surface = SurfaceUse::automatic;  ///< matched measure only
+  /// Matched measure only: spheres answer even where they are too coarse for the contact of two
+  /// solids of unlike sizes, and may be wrong by any factor (<ist/pair_fit.h>). For loops that must
+  /// end in a bounded time: the exact measure obeys no pair budget.
+  bool spheres_only = false;
 
   /// Count of sphere pairs to spend; two trees in the matched measure only (the inner one has no
   /// levels of detail).
@@ -41,8 +44,8 @@ struct PenetrationSettings {
   /// costs.
   std::uint32_t pair_budget = 0;
 
-  /// Count of node pairs opened: a hard limit, whatever the error of the answer. Pairs of trees are
-  /// opened largest bounds first, trees against a surface in the order of the tree.
+  /// Count of node pairs opened: a hard limit, whatever the error of the answer. Pairs are
+  /// opened largest bounds first.
   std::uint32_t max_visits = 0;
 
   /// Accepted relative error of the volume, such as 0.005 for 0.5 %; two trees in the matched
@@ -150,8 +153,8 @@ struct Penetration {
   Eigen::Vector3d contact_normal = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
-  /// Non-empty lenses summed, spheres tested against triangles of a surface, and spheres that lie
-  /// wholly in the other solid. With Measure::exact: crossing triangles.
+  /// Non-empty lenses summed, spheres tested against a field, and spheres that lie wholly in the
+  /// other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
   /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
   /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
@@ -165,8 +168,8 @@ struct Penetration {
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified
-  /// [u] upper bound, certified. If simplified meshes overlap, it is their error
-  /// (MeshHeader::error).
+  /// [u] upper bound, certified. If meshes that were made from signed
+  /// distances overlap, it is their error (MeshHeader::error).
   double distance_max = 0;
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero();  ///< [u] on A's surface or spheres, world
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();  ///< [u] on B's surface or spheres, world
@@ -212,7 +215,7 @@ class Workspace {
 };
 
 /// A capacity that suffices for two solids at any pose: penetration() and contact_patches() by
-/// spheres and surfaces, separation() and overlap() never exhaust it. Poses are ignored, scales
+/// spheres alone, separation() by them and overlap() never exhaust it. Poses are ignored, scales
 /// are not. For several pairs take the largest.
 ///
 /// The bound is proven from the balls of both trees and is three to five times the need of the
@@ -230,10 +233,10 @@ std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 
 /// Volume, wrench and centroid of the overlap.
 ///
-/// By spheres the volume is a sum of lenses, or the sum of the exact parts of the finer tree's
-/// spheres inside the other's surface, as PenetrationSettings::surface selects. The gradients of a
-/// finished query are those of the returned volume. Copies of one asset at nearly the same pose are
-/// evaluated as unlike levels of detail, since the sum over coincident equal spheres is too large.
+/// By spheres the volume is a sum of lenses. Between solids whose spheres are of unlike sizes it
+/// goes over smoothly into that of their meshes. The gradients of a finished query are those of the
+/// returned volume. Copies of one asset at nearly the same pose are evaluated as unlike levels of
+/// detail, since the sum over coincident equal spheres is too large.
 ///
 /// With a field, the volume is the sum over the asset's spheres of the part inside the field.
 /// volume_min and volume_max include the field's error. max_visits applies; pair_budget has no
@@ -254,18 +257,20 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 /// gradient to within 15 %: use it for contacts, not where energy must be conserved. volume_min is
 /// lowered to contain the new volume.
 ///
-/// `whole`: the answer of penetration() for this pair by lenses (SurfaceUse::never), in the matched
-/// measure, without a pair budget. Takes a few nanoseconds.
+/// `whole`: the answer of penetration() for this pair by lenses
+/// (PenetrationSettings::spheres_only), in the matched measure, without a pair budget. Takes a few
+/// nanoseconds.
 Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
                                const PlacedTree& b) noexcept;
 
 /// Distance, witness points, and a certified interval for the solids.
 ///
 /// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The
-/// interval is as wide as rounding and the error of simplified meshes. It is zero if the surfaces
-/// cross or one solid contains the other. Otherwise it is the distance of the inner spheres, exact
-/// to about 1e-6 of the objects' size, and all zero once these overlap. A stopped query returns the
-/// nearest points that it found; its interval is still certified. Batches on the GPU
+/// interval is as wide as rounding and the meshes' error (TreeView::mesh_error). It is zero if the
+/// surfaces cross or one solid contains the other. Otherwise it is the distance of the inner
+/// spheres, exact to about 1e-6 of the objects' size, and all zero once these overlap. A stopped
+/// query returns the nearest points that it found; its interval is still certified. Batches on the
+/// GPU
 /// (<ist/gpu_query.h>) always use the inner spheres. The distance from a field is that of the
 /// asset's inner spheres, certified as far as the field's distances are: see each field.
 ///

@@ -45,7 +45,7 @@ enum class ImpactStatus : std::uint32_t {
   impact = 1,
   /// They stay clear up to `time`. A later contact can be neither shown nor ruled out: the error of
   /// the solids or of rounding exceeds the requested tolerance. The error of a solid is
-  /// TreeView::surface_error; without a surface it is how far cover balls stick out, 1 to 10 % of
+  /// TreeView::mesh_error; without a mesh it is how far cover balls stick out, 1 to 10 % of
   /// the size.
   unresolved = 2,
   overlapping = 3,       ///< they meet at the start: surfaces cross, or one solid contains the
@@ -63,7 +63,7 @@ struct ImpactSettings {
 
   /// [u] An impact is reported when the gap is between a half of this and this. Zero, a negative
   /// value or NaN: a thousandth of the smaller solid's bounding radius (of the asset's, if the
-  /// other is a field), or ten times the error of the assets' surfaces if that is more.
+  /// other is a field), or ten times the error of the assets' meshes if that is more.
   ///
   /// Solids that start nearer have an impact only if they approach. Over several calls they may
   /// come nearer than a half of this, but never to zero.
@@ -96,7 +96,7 @@ struct TimeOfImpact {
 /// A time up to which two moving solids stay clear of each other. Conservative advancement: `time`
 /// is a proof at any speed, not a sample.
 ///
-/// A solid is represented by the surface in its asset (TreeView::has_surface), or else by the cover
+/// A solid is represented by the mesh in its asset (TreeView::has_mesh), or else by the cover
 /// balls of its inner spheres.
 ///
 /// With a field, it is certified as far as the field's distances are: see each field. Height

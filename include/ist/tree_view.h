@@ -42,11 +42,11 @@ inline constexpr std::uint32_t kTrialPartners = 6;
 
 /// The state of an asset's mesh.
 enum class MeshState : std::uint32_t {
-  none = 0,        ///< none was requested
-  own = 1,         ///< all triangles of the mesh that was baked
-  resolved = 2,    ///< volume that the mesh counted twice was cut away
-  simplified = 3,  ///< other triangles near the solid: TreeView::mesh_error() is the bound
-  unresolved = 4,  ///< no mesh: it counts volume twice (TreeView::counted_twice)
+  none = 0,         ///< none was requested
+  own = 1,          ///< all triangles of the mesh that was baked
+  resolved = 2,     ///< volume that the mesh counted twice was cut away
+  polygonised = 3,  ///< made from a signed distance; TreeView::mesh_error() bounds its error
+  unresolved = 4,   ///< no mesh: it counts volume twice (TreeView::counted_twice)
 };
 
 /// Errors of penetration volumes, measured by bake_to_error() on trial poses: by class of overlap
@@ -87,11 +87,6 @@ class TreeView {
   double coverage() const noexcept;    ///< [0, 1] share of the volume in inner spheres
   double protrusion() const noexcept;  ///< [u] bound on how far matched spheres stick out of the
                                        ///< solid
-  /// Whether the asset stores the solid's surface, with which spheres are intersected exactly.
-  bool has_surface() const noexcept;
-  /// [u] The stored surface and the solid's lie within this of each other; 0 without one.
-  double surface_error() const noexcept;
-  std::uint32_t surface_triangles() const noexcept;  ///< of that surface; 0 without one
   /// Whether the asset stores the solid's mesh, which Measure::exact needs. An asset with a mesh
   /// and no spheres is a surface alone: queries of spheres return QueryStatus::not_held.
   bool has_mesh() const noexcept;

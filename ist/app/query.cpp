@@ -124,30 +124,17 @@ void check_settings(const QueryOptions& options) {
   if (settings.measure != Measure::matched) {
     if (settings.pair_budget != 0) no_effect("--pair-budget");
     if (settings.relative_error != 0) no_effect("--error");
-    if (exact ? settings.surface != SurfaceUse::automatic : settings.surface == SurfaceUse::always)
-      no_effect("--surface");
+    if (settings.spheres_only) no_effect("--spheres-only");
   }
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
         "--measure", "exact needs the meshes of two assets, and A is a field: " + options.a +
                          "; omit the option, or pass an .ist file of the same shape");
-  if (settings.surface == SurfaceUse::never)
-    throw CLI::ValidationError(
-        "--surface", "never cannot be combined with " + options.a +
-                         ", a field without spheres; omit the option, or pass an .ist file");
-  for (const auto& [option, given] : {std::pair("--pair-budget", settings.pair_budget != 0),
+  for (const auto& [option, given] : {std::pair("--spheres-only", settings.spheres_only),
+                                      std::pair("--pair-budget", settings.pair_budget != 0),
                                       std::pair("--error", settings.relative_error != 0)})
     if (given) throw CLI::ValidationError(option, "has no effect where A is a field: " + options.a);
-}
-
-/// Throws Error if the surface that --surface always asks for is not there.
-void require_surface(const std::string& path, const TreeView& tree) {
-  if (!tree.has_surface())
-    throw Error(
-        path +
-        ": has no surface, which --surface always needs; bake it again with --surface all, or "
-        "query with --surface auto");
 }
 
 /// Throws Error if an asset does not hold what the measure asks.
@@ -173,15 +160,16 @@ void require_held(const std::string& path, const TreeView& tree, Measure measure
 void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
                     const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
-  if (settings.measure != Measure::matched || settings.surface != SurfaceUse::automatic) return;
+  if (settings.measure != Measure::matched || settings.spheres_only) return;
   for (const PoseRow& row : rows) {
     const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
     if (fit.fits()) continue;
     spdlog::warn(
-        "{}: its spheres are {:.2g} times as coarse as those of {}, and it has no surface: volumes "
-        "and forces may be far off. Bake it again with --surface all",
+        "{}: its spheres are {:.2g} times as coarse as those of {}, and {} has no mesh: volumes "
+        "and "
+        "forces may be far off. Bake it again with --surface all",
         fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
-        fit.a_is_coarser ? options.asset_b : options.a);
+        fit.a_is_coarser ? options.asset_b : options.a, a.has_mesh() ? options.asset_b : options.a);
     return;
   }
 }
@@ -201,10 +189,6 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   if (!surfaces) {
     require_held(options.a, a.view(), measure);
     require_held(options.asset_b, b.view(), measure);
-  }
-  if (options.settings.penetration.surface == SurfaceUse::always) {
-    require_surface(options.a, a.view());
-    require_surface(options.asset_b, b.view());
   }
   warn_of_misfit(a.view(), b.view(), rows, options);
   std::vector<Answer> answers = answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
@@ -269,18 +253,11 @@ void add_query(CLI::App& app) {
           "lower bound; exact: the kept meshes of both assets, the true volume with bounds")
       ->check(CLI::IsMember({"matched", "inner", "exact"}))
       ->default_str("matched");
-  command
-      ->add_option_function<std::string>(
-          "--surface",
-          [options](const std::string& name) {
-            options->settings.penetration.surface = name == "never"    ? SurfaceUse::never
-                                                    : name == "always" ? SurfaceUse::always
-                                                                       : SurfaceUse::automatic;
-          },
-          "When to overlap spheres with the other asset's surface instead of its spheres; auto: if "
-          "its spheres are too coarse; never; always. Matched measure only")
-      ->check(CLI::IsMember({"auto", "never", "always"}))
-      ->default_str("auto");
+  command->add_flag(
+      "--spheres-only", options->settings.penetration.spheres_only,
+      "Sum spheres even where they are too coarse for solids of unlike sizes, and may "
+      "be wrong by any factor; otherwise the kept meshes answer there. Matched measure "
+      "only");
   add_whole(command, "--pair-budget", options->settings.penetration.pair_budget,
             "Use the level of detail that needs about this many sphere pairs; 0 = the finest. "
             "Matched measure only");

@@ -161,7 +161,7 @@ std::vector<CoverSphere> baked_spheres(const ClosedMesh& mesh, std::size_t count
   settings.seed = options.cover.seed;
   settings.threads = options.cover.threads;
   settings.device = Device::cpu;
-  settings.surface.wanted = false;
+  settings.keep_mesh = false;
   const Asset asset = bake(mesh, settings, progress);
   std::vector<CoverSphere> spheres;
   for (const ExportedSphere& s : exported_spheres(asset.view(), 0))

@@ -156,10 +156,9 @@ std::string row(const JobResult& r) {
   std::string out = fmt::format("<tr class={}><td>{}<td>{}<td>{}", name_of(r.status), image(r),
                                 xml_text(r.name), name_of(r.status));
   out += fmt::format(
-      "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}", done ? grouped(r.spheres) : "",
+      "<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}<td>{}", done ? grouped(r.spheres) : "",
       number(r.coverage, 100), number(r.volume), number(r.protrusion),
-      done && r.has_surface ? number(r.surface_error) : "", done ? xml_text(r.mesh_state) : "",
-      r.error ? fmt::format("{:.2g}", 100 * *r.error) : "",
+      done ? xml_text(r.mesh_state) : "", r.error ? fmt::format("{:.2g}", 100 * *r.error) : "",
       r.confidence ? fmt::format("{:.2f}", *r.confidence) : "", fmt::format("{:.2f}", r.seconds));
   return out + fmt::format("<td class=t>{}</tr>\n", remarks);
 }
@@ -213,9 +212,8 @@ std::string summary_page(const Summary& summary, std::span<const JobResult* cons
       "<p>{1} assets: {2}\n{3}<p><input placeholder=\"filter this page\">\n",
       xml_text(summary.manifest), grouped(summary.results.size()), counts_in_words(summary), pages);
   out += "<table><thead><tr><th><th class=t>name<th class=t>status";
-  for (const char* const head :
-       {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "surface error [u]", "mesh",
-        "error [%]", "confidence", "time [s]"})
+  for (const char* const head : {"spheres", "covered [%]", "volume [u³]", "protrusion [u]", "mesh",
+                                 "error [%]", "confidence", "time [s]"})
     out += fmt::format("<th>{}", head);
   out += "<th class=t>remarks</tr></thead><tbody>\n";
   for (const JobResult* const result : results) out += row(*result);

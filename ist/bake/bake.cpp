@@ -167,7 +167,7 @@ void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header)
   header.ball_radius = (radius + beyond) * (1 + 0x1p-49) * frame.scale();
 }
 
-AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress) {
   AssetArrays arrays;
@@ -185,11 +185,11 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSu
           arrays.inner_tree =
               tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
         }}});
-  // Where the host's threads are idle, they make the surface and the moments from here on;
-  // elsewhere the packing, which is the first to ask, computes the moments, and the surface follows
+  // Where the host's threads are idle, they lay out the mesh and compute the moments from here on;
+  // elsewhere the packing, which is the first to ask, computes the moments, and the mesh follows
   // the covers.
   if (backend.leaves_threads_idle()) {
-    surface.start();
+    kept.start();
     host.add([&] { solid.unit_moments(); });
   }
 
@@ -242,10 +242,10 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSu
 
   Stage stage("tree", progress);
   stage.step(count, 0);
-  surface.start();
+  kept.start();
   if (levels) levels->wait([&] { stage.step(count, 0); });
   host.finish();
-  keep(surface.wait([&] { stage.step(count, 0.5); }), arrays);
+  keep(kept.wait([&] { stage.step(count, 0.5); }), arrays);
   stage.step(count, 1);
   return arrays;
 }
@@ -261,26 +261,23 @@ AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid) {
   return header;
 }
 
-void keep(const KeptSurface& kept, AssetArrays& arrays) {
-  arrays.surface = kept.surface;
+void keep(const KeptMesh& kept, AssetArrays& arrays) {
   arrays.mesh = kept.mesh;
   arrays.header.mesh_state = static_cast<std::uint32_t>(kept.state);
   arrays.header.counted_twice = kept.counted_twice;
-  arrays.header.asked_surface_error = kept.asked_error;
 }
 
-Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress) {
-  return Asset(asset_bytes(bake_arrays(mesh, solid, surface, backend, settings, progress)),
-               mesh.name);
+  return Asset(asset_bytes(bake_arrays(mesh, solid, kept, backend, settings, progress)), mesh.name);
 }
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress) {
   const auto backend = make_backend(solid, settings.device, settings.gpu);
-  SharedSurface surface(solid, resolution, settings.surface, settings.threads);
-  return bake_solid(mesh, solid, surface, *backend, settings, progress);
+  SharedMesh kept(solid, resolution, settings.keep_mesh, settings.threads);
+  return bake_solid(mesh, solid, kept, *backend, settings, progress);
 }
 
 Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
@@ -293,18 +290,14 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   });
 }
 
-Asset bake_surface(const ClosedMesh& mesh, const SurfaceSettings& settings, unsigned threads,
-                   const ProgressCallback& progress) {
-  packing::check_settings(settings);
-  if (!settings.wanted)
-    throw Error(mesh.name + ": a surface alone needs a surface; set surface.wanted");
+Asset bake_surface(const ClosedMesh& mesh, unsigned threads, const ProgressCallback& progress) {
   return thread_arena(threads).execute([&] {
     const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved);
     AssetArrays arrays;
     arrays.header = describe_solid(resolved.mesh, solid);
     describe_bounds(solid, 0, arrays.header);
-    keep(keep_surface(solid, resolved.resolution, settings, false), arrays);
+    keep(keep_mesh(solid, resolved.resolution), arrays);
     if (!arrays.mesh)
       throw Error(mesh.name +
                   ": parts of the mesh overlap, so its surface alone does not bound a solid. " +

@@ -166,20 +166,14 @@ Asset bake_field(const Solid& solid, const PackingSettings& settings,
   PolygonisedBackend backend(solid, mesh_solid, made.error);
   Resolution as_made;  // the mesh is near the solid as it is
   if (mesh.report.meets_itself) as_made.how = Resolution::How::unresolved;
-  SharedSurface surface(mesh_solid, as_made, settings.surface, settings.threads);
-  AssetArrays arrays = bake_arrays(mesh, mesh_solid, surface, backend, settings, progress);
+  SharedMesh kept(mesh_solid, as_made, settings.keep_mesh, settings.threads);
+  AssetArrays arrays = bake_arrays(mesh, mesh_solid, kept, backend, settings, progress);
   const double scale = mesh_solid.frame().scale();
-  // Surface and mesh are the mesh's, and that is near the solid.
-  if (arrays.surface != nullptr) {
-    SurfaceArrays of_solid = *arrays.surface;
-    of_solid.header.error += made.error / scale;
-    arrays.surface = std::make_shared<const SurfaceArrays>(std::move(of_solid));
-  }
   if (arrays.mesh != nullptr) {
     MeshArrays of_solid = *arrays.mesh;
-    of_solid.header.error += made.error / scale;
+    of_solid.header.error = made.error / scale;
     arrays.mesh = std::make_shared<const MeshArrays>(std::move(of_solid));
-    arrays.header.mesh_state = static_cast<std::uint32_t>(MeshState::simplified);
+    arrays.header.mesh_state = static_cast<std::uint32_t>(MeshState::polygonised);
   }
   const double off = std::abs(mesh_solid.volume() - solid.volume()) + solid.volume_error();
   arrays.header.flags |= kFlagPolygonised;

@@ -4,23 +4,23 @@
 #include <ist/bake.h>
 
 #include "bake/asset/asset_writer.h"
-#include "bake/kept_surface.h"
+#include "bake/kept_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"
 
 namespace ist {
 
-/// bake() of a mesh whose solid, surface and backend are at hand, on the threads of the current
+/// bake() of a mesh whose solid, kept mesh and backend are at hand, on the threads of the current
 /// arena. The settings have been checked; where they run is the backend's affair.
-Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
+Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                  SolidBackend& backend, const PackingSettings& settings,
                  const ProgressCallback& progress);
 
-/// The same with surface and backend as the settings ask for.
+/// The same with mesh and backend as the settings ask for.
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolution& resolution,
                  const PackingSettings& settings, const ProgressCallback& progress);
 
-/// Frame, mesh, mass and what was found of the surface: all of a header that needs no spheres.
+/// Frame, hash and mass of the mesh: all of a header that needs no spheres.
 AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid);
 
 /// Volume, centre of mass and inertia.
@@ -29,11 +29,11 @@ void describe_mass(const MeshMoments& moments, AssetHeader& header);
 /// Box and ball around the mesh, each `beyond` further out, unit frame.
 void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header);
 
-/// Puts the surface into an asset.
-void keep(const KeptSurface& kept, AssetArrays& arrays);
+/// Puts the mesh into an asset.
+void keep(const KeptMesh& kept, AssetArrays& arrays);
 
 /// Everything of that asset but its bytes.
-AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedSurface& surface,
+AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
                         SolidBackend& backend, const PackingSettings& settings,
                         const ProgressCallback& progress);
 

@@ -110,8 +110,7 @@ class TargetBake {
         most_(settings.max_spheres == 0 ? kMostCounted : settings.max_spheres),
         watch_(progress, settings.time_limit),
         solid_(resolved_),
-        surface_(solid_, resolved_.resolution, settings.surface, settings.threads,
-                 settings.time_limit),
+        kept_(solid_, resolved_.resolution, settings.keep_mesh, settings.threads),
         backend_(make_backend(solid_, settings.device, settings.gpu)) {}
 
   TargetedAsset run() {
@@ -146,7 +145,7 @@ class TargetBake {
     of_size.max_spheres = spheres;
     of_size.time_limit = best_ ? 0 : watch_.time_left();
     try {
-      return bake_solid(mesh_, solid_, surface_, *backend_, of_size,
+      return bake_solid(mesh_, solid_, kept_, *backend_, of_size,
                         best_ ? watch_.strict() : watch_.patient());
     } catch (const Error&) {
       watch_.throw_if_cancelled();
@@ -164,7 +163,7 @@ class TargetBake {
                   resolved_.resolution.reason + " Bake it to a number of spheres, or wrap it");
     if (baked.mesh_state() == MeshState::own || baked.mesh_state() == MeshState::resolved)
       return baked;
-    if (!own_mesh_) own_mesh_ = bake_surface(mesh_, {}, settings_.threads);
+    if (!own_mesh_) own_mesh_ = bake_surface(mesh_, settings_.threads);
     return own_mesh_->view();
   }
 
@@ -318,7 +317,7 @@ class TargetBake {
   const std::size_t most_;
   Watch watch_;
   const MeshSolid solid_;
-  SharedSurface surface_;
+  SharedMesh kept_;
   const std::unique_ptr<SolidBackend> backend_;
   std::vector<TrialPose> poses_;                 ///< near ones, then those of all classes
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there

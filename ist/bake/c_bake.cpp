@@ -36,9 +36,8 @@ ist_status_t ist_bake(const double* vertices, std::size_t vertex_count,
     PackingSettings packing;
     packing.threads = wanted.threads;
     if (wanted.spheres > 0) packing.max_spheres = wanted.spheres;
-    const Asset asset = wanted.surface_only != 0
-                            ? bake_surface(closed, packing.surface, wanted.threads)
-                            : bake(closed, packing);
+    const Asset asset =
+        wanted.surface_only != 0 ? bake_surface(closed, wanted.threads) : bake(closed, packing);
     const std::size_t size = asset.bytes().size();
     HookedArray<std::byte> bytes = {static_cast<std::byte*>(take_memory({}, size, kAssetAlignment)),
                                     {{}, size, kAssetAlignment}};

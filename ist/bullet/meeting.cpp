@@ -101,19 +101,18 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.clearance = 0;
   ContactSettings query = settings.query;
   query.pair_id = pair_id_;
-  ContactPatches found = contact_patches(a, b, query, workspace(), room);
-  if (first_ != nullptr && second_ != nullptr) {
-    if (found.penetration.status == QueryStatus::not_held && query.surface == SurfaceUse::always) {
-      query.surface = SurfaceUse::automatic;
-      found = contact_patches(a, b, query, workspace(), room);
-    }
-    if (found.penetration.volume_max <= 0) {
-      // A lower bound suffices: the first few nodes give one.
-      constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
-      contact.clearance = separation(a, b, kGlance, workspace()).distance_min;
-      for (const Shape* const shape : {first_, second_})
-        contact.clearance -= shape->scale() * shape->tree().protrusion();
-    }
+  const auto keeps_mesh = [](const Shape* shape) {
+    return shape != nullptr && shape->tree().has_mesh();
+  };
+  if (query.measure == Measure::exact && !(keeps_mesh(first_) && keeps_mesh(second_)))
+    query.measure = Measure::matched;
+  const ContactPatches found = contact_patches(a, b, query, workspace(), room);
+  if (first_ != nullptr && second_ != nullptr && found.penetration.volume_max <= 0) {
+    // A lower bound suffices: the first few nodes give one.
+    constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
+    contact.clearance = separation(a, b, kGlance, workspace()).distance_min;
+    for (const Shape* const shape : {first_, second_})
+      contact.clearance -= shape->scale() * shape->tree().protrusion();
   }
   if (std::isnan(found.penetration.volume)) {
     warn(

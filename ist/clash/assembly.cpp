@@ -179,7 +179,7 @@ Made make(const ClashShape& shape, const MeshSettings& closing) {
     const ClosedMesh closed = close_as_asked(shape.mesh(), shape.name, closing);
     out.notes = closed.report.notes;
     // One thread: many shapes are made at once.
-    out.asset = std::make_shared<const Asset>(bake_surface(closed, {}, 1));
+    out.asset = std::make_shared<const Asset>(bake_surface(closed, 1));
   } catch (const Error& error) {
     out.fault = error.what();
   }

@@ -121,10 +121,7 @@ const char* why_missed(StopReason stop) {
   }
 }
 
-/// The file ends with surface and mesh.
-std::uint64_t surface_bytes(const AssetHeader& h) {
-  return h.surface == 0 ? 0 : (h.mesh != 0 ? h.mesh : h.file_bytes) - h.surface;
-}
+/// The file ends with the mesh.
 std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
 
 nlohmann::ordered_json mesh_json(const TreeView& tree) {
@@ -142,17 +139,10 @@ std::string describe_mesh(const TreeView& tree) {
   const char* const whose = tree.mesh_state() == MeshState::own ? "all of the mesh"
                             : tree.mesh_state() == MeshState::resolved
                                 ? "of the union of the mesh's parts"
-                                : "simplified";
+                                : "made from a signed distance";
   return fmt::format("{} triangles, {}, within {:.4g} u of the solid's surface, {} bytes",
                      grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
                      grouped(mesh_bytes(tree.header())));
-}
-
-nlohmann::ordered_json surface_json(const TreeView& tree) {
-  return {{"triangles", tree.surface_triangles()},
-          {"bytes", surface_bytes(tree.header())},
-          {"error", tree.has_surface() ? nlohmann::ordered_json(tree.surface_error())
-                                       : nlohmann::ordered_json(nullptr)}};
 }
 
 nlohmann::ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -240,11 +230,6 @@ std::string describe_asset(const TreeView& tree) {
          fmt::format("{} spheres, protrusion {:.4g} u", grouped(detail.matched_tree.sphere_count),
                      detail.protrusion * scale));
   }
-  line("surface", tree.has_surface()
-                      ? fmt::format("{} triangles within {:.4g} u of the solid's, {} bytes",
-                                    grouped(tree.surface_triangles()), tree.surface_error(),
-                                    grouped(surface_bytes(h)))
-                      : "none");
   line("mesh", describe_mesh(tree));
   if (!alone)
     line(
@@ -316,14 +301,12 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
         {"grid_refinements", h.asked_grid_refinements},
         {"grid_rounds", h.asked_grid_rounds},
         {"seed", h.asked_seed},
-        {"surface_error", h.asked_surface_error},
         {"error", h.asked_error},
         {"at_overlap", h.asked_at_overlap}}},
       {"predicted", predicted_json(h)},
       {"inner_tree", tree_json(h.inner_tree, scale)},
       {"matched_tree", tree_json(h.matched_tree, scale)},
       {"details", details_json(h, scale)},
-      {"surface", surface_json(tree)},
       {"kept_mesh", mesh_json(tree)},
   };
   json.update(mass_json(tree));

@@ -10,7 +10,7 @@ namespace ist {
 
 /// What an asset must be, or it fails. The bytes of an asset do not depend on it.
 struct Demands {
-  bool surface = false;   ///< it holds its surface, for queries of spheres and exact ones
+  bool surface = false;   ///< it holds its mesh, for exact queries
   double coverage = 0;    ///< at least; share of the solid's volume
   double confidence = 0;  ///< at least; of a mesh that had to be closed
 };

@@ -29,8 +29,6 @@ struct JobResult {
   std::uint64_t bytes = 0, spheres = 0;
   double coverage = 0;                        ///< share of the solid's volume
   double volume = 0, protrusion = 0;          ///< as TreeView has them
-  double surface_error = 0;                   ///< TreeView::surface_error()
-  bool has_surface = false;                   ///< TreeView::has_surface()
   std::string mesh_state;                     ///< name_of(TreeView::mesh_state())
   std::uint64_t mesh_triangles = 0;           ///< kept for exact queries
   double mesh_error = 0, counted_twice = 0;   ///< as TreeView has them

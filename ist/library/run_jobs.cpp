@@ -65,8 +65,6 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
   result.coverage = tree.coverage();
   result.volume = tree.volume();
   result.protrusion = tree.protrusion();
-  result.surface_error = tree.surface_error();
-  result.has_surface = tree.has_surface();
   result.mesh_state = name_of(tree.mesh_state());
   result.mesh_triangles = tree.mesh_triangles();
   result.mesh_error = tree.mesh_error();
@@ -98,9 +96,7 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
 void check_demands(const Job& job, const CacheEntry& entry) {
   const TreeView& tree = entry.asset.view();
   const Demands& demands = job.demands;
-  const bool lacks_surface = !tree.has_surface() && tree.sphere_count() > 0;
-  if (demands.surface &&
-      (lacks_surface || tree.mesh_triangles() == 0 || tree.mesh_state() == MeshState::unresolved))
+  if (demands.surface && !tree.has_mesh())
     throw Error(
         fmt::format("{}: require-surface: the asset holds no surface to query; its mesh is "
                     "'{}'. Repair the mesh, and keep it with surface = \"all\"",

@@ -36,8 +36,6 @@ void for_each_field(Result& result, const Visit& visit) {
   visit("coverage", result.coverage, kIfDone);
   visit("volume", result.volume, kIfDone, kLater);
   visit("protrusion", result.protrusion, kIfDone, kLater);
-  visit("has_surface", result.has_surface, kIfDone, kLater);
-  visit("surface_error", result.surface_error, kIfDone, kLater);
   visit("mesh_state", result.mesh_state, kIfDone, kLater);
   visit("mesh_triangles", result.mesh_triangles, kIfDone, kLater);
   visit("mesh_error", result.mesh_error, kIfDone, kLater);

@@ -14,61 +14,40 @@
 #include "query/descent/descent.h"
 #include "query/descent/workspace.h"
 #include "query/detail/detail_blend.h"
+#include "query/detail/unlike_sizes.h"
 #include "query/detail/wanted_error.h"
 #include "query/exact_penetration.h"
-#include "query/field/pair_overlap.h"
 #include "query/solid_queries.h"
 
 namespace ist {
 namespace {
 
-/// Contact patches of two trees, by the method that penetration() takes.
-class PairPatches {
+/// Contact patches of two trees by lenses.
+class LensPatches {
  public:
-  PairPatches(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
-              const TreeHeader& tree_b, const RelativePose& pose, SurfaceUse use,
-              Workspace::Impl& scratch)
-      : a_(a),
-        b_(b),
-        pose_(pose),
+  LensPatches(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+              const TreeHeader& tree_b, const RelativePose& pose, Workspace::Impl& scratch)
+      : pose_(pose),
         scratch_(scratch),
         tree_a_(a.tree.header(), tree_a),
         tree_b_(b.tree.header(), tree_b),
-        both_(a, tree_a, b, tree_b, pose, scratch),
-        use_(use),
-        method_(pair_method(a, tree_a, b, tree_b, pose, use)) {}
+        of_b_(divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
+                        tree_b_.header->root[3] * pose.a_from_b.scale)) {}
 
   /// The whole contact, sorted into the workspace's bins.
   Penetration sum(const DescentLimits& limits) {
-    if (lacks_surface(method_, use_)) return not_held<Penetration>();
     ContactBins& bins = scratch_.contact;
-    if (!method_.lenses) {
-      start_probed();
-      return whole_ = both_.by_surface(method_.b_probes, limits, &bins);
-    }
-    of_b_ = divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
-                      tree_b_.header->root[3] * pose_.a_from_b.scale);
     bins.start(of_b_ ? tree_b_ : tree_a_, of_b_);
     Descent descent(tree_a_, tree_b_, pose_, limits, scratch_, &bins);
     descent.run();
     filled_ = bins.collect(descent.precision());
-    const Penetration lenses = descent.penetration();
-    const SurfaceWeight weight = surface_weight(method_, lenses, pose_.unit3());
-    const std::optional<DescentLimits> left = PairOverlap::left_by(lenses, limits);
-    // The patches are those of the larger part.
-    probed_ = left && weight.weight >= 0.5;
-    if (probed_) start_probed();
-    whole_ = weight.most == 0 ? lenses
-             : left ? both_.with_surface(method_, lenses, weight, *left, probed_ ? &bins : nullptr)
-                    : both_.without_surface(method_, lenses);
-    return whole_;
+    return whole_ = descent.penetration();
   }
 
   const Penetration& whole() const { return whole_; }
 
   /// The patches of what was summed, which add up to it.
   std::size_t write(std::span<ContactPatch> patches) {
-    if (!method_.lenses || probed_) return write_probed(patches);
     const double radius =
         of_b_ ? tree_b_.header->root[3] * pose_.a_from_b.scale : tree_a_.header->root[3];
     return write_patches({scratch_.contact, filled_, pose_, radius}, whole_, patches);
@@ -80,40 +59,12 @@ class PairPatches {
   }
 
  private:
-  /// Bins for the spheres that probe.
-  void start_probed() { scratch_.contact.start(method_.b_probes ? tree_b_ : tree_a_, true); }
-
-  /// The patches of the spheres that probed.
-  std::size_t write_probed(std::span<ContactPatch> patches) {
-    const std::uint32_t filled = scratch_.contact.collect(Precision::float64);
-    if (method_.b_probes)
-      return write_patches(
-          {scratch_.contact, filled, pose_, tree_b_.header->root[3] * pose_.a_from_b.scale}, whole_,
-          patches);
-    // A's spheres probe B: the patches come as pushes on A.
-    const std::optional<RelativePose> turned = relative_pose(b_, a_);
-    if (!turned) return 0;
-    Penetration whole = whole_;
-    turn_over(b_.pose, a_.pose, whole);
-    const std::size_t count = write_patches(
-        {scratch_.contact, filled, *turned, tree_a_.header->root[3] * turned->a_from_b.scale},
-        whole, patches);
-    turn_over(a_.pose, b_.pose, patches.first(count));
-    return count;
-  }
-
-  const PlacedTree& a_;
-  const PlacedTree& b_;
   const RelativePose& pose_;
   Workspace::Impl& scratch_;
   const SphereTree tree_a_, tree_b_;
-  PairOverlap both_;
-  const SurfaceUse use_;
-  const PairMethod method_;
+  const bool of_b_;
   Penetration whole_;
   std::uint32_t filled_ = 0;
-  bool of_b_ = false;
-  bool probed_ = false;  ///< the bins are those of the spheres that probed
 };
 
 /// The patches of the part of a blend with the largest weight: a pair of levels, or the exact
@@ -124,10 +75,8 @@ class ChosenPart final : public LargestPart {
              Workspace& workspace, std::span<ContactPatch> patches)
       : a_(a), b_(b), pose_(pose), inner_(inner), workspace_(workspace), patches_(patches) {}
 
-  Penetration level(const DetailPair& pair, SurfaceUse use,
-                    const DescentLimits& limits) noexcept override {
-    levels.emplace(a_, tree_of(a_, pair.a), b_, tree_of(b_, pair.b), pose_,
-                   inner_ ? SurfaceUse::never : use, *workspace_.impl());
+  Penetration level(const DetailPair& pair, const DescentLimits& limits) noexcept override {
+    levels.emplace(a_, tree_of(a_, pair.a), b_, tree_of(b_, pair.b), pose_, *workspace_.impl());
     return levels->sum(limits);
   }
 
@@ -137,7 +86,7 @@ class ChosenPart final : public LargestPart {
   }
 
   // One of these at most:
-  std::optional<PairPatches> levels;
+  std::optional<LensPatches> levels;
   std::optional<ContactPatches> parts;  ///< of the exact measure
 
  private:
@@ -159,20 +108,36 @@ class ChosenPart final : public LargestPart {
 ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
-  if (settings.measure == Measure::exact || (by_error(settings) && lack_spheres(a, b))) {
+  const std::optional<RelativePose> pose = relative_pose(a, b);
+  const PairMethod method = pair_method(a, b, settings, pose);
+  if (!method.spheres) {
     ContactPatches found = exact_patches(a, b, settings, workspace, patches, {}, true).contact;
     found.penetration = with_error_status(found.penetration, settings);
     return found;
   }
   if (lack_spheres(a, b)) return not_held<ContactPatches>();
-  const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
   const bool inner = settings.measure == Measure::inner;
   ChosenPart chosen(a, b, *pose, inner, workspace, patches);
-  const bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
+  bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
   result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &chosen)
-                              : chosen.level(DetailPair(), settings.surface, limits_of(settings));
+                              : chosen.level(DetailPair(), limits_of(settings));
+  const ExactWeight weight = exact_weight(method, result.penetration, pose->unit3());
+  if (weight.most > 0) {
+    blends = true;
+    const auto left = left_for_exact(settings, result.penetration.node_visits);
+    if (!left) {
+      result.penetration = without_exact(a, b, result.penetration);
+    } else if (weight.weight >= 0.5) {  // the patches are those of the larger part
+      chosen.levels.reset();
+      result.penetration = blended(result.penetration, chosen.exact(*left), weight, pose->unit3());
+    } else {
+      result.penetration =
+          blended(result.penetration, exact_penetration(a, b, *left, *pose, workspace), weight,
+                  pose->unit3());
+    }
+  }
   if (std::isnan(result.penetration.volume)) return result;
   if (!chosen.parts && !chosen.levels) return result;
   result.count = chosen.parts ? chosen.parts->count : chosen.levels->write(patches);

@@ -40,7 +40,7 @@ Deadline::Deadline(double microseconds) noexcept {
 void Deadline::limit(PenetrationSettings& settings) const noexcept {
   if (deadline_ == 0) return;
   settings.pair_budget = static_cast<std::uint32_t>(budget_);
-  if (settings.surface == SurfaceUse::automatic) settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
 }
 
 void Deadline::record(const Penetration& answer, double microseconds) noexcept {

@@ -174,6 +174,7 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
   const auto by_spheres = [&] {
     PenetrationSettings others = settings;
     others.measure = Measure::matched;
+    others.spheres_only = true;
     others.relative_error = 0;
     return penetration(a, b, others, workspace);
   };
@@ -197,6 +198,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     const auto by_spheres = [&] {
       ContactSettings others = settings;
       others.measure = Measure::matched;
+      others.spheres_only = true;
       others.relative_error = 0;
       return find_patches(a, b, others, workspace, patches);
     };

@@ -5,48 +5,25 @@
 #include "query/field/field_descent.h"
 #include "query/field/gap_search.h"
 #include "query/field/meeting_search.h"
-#include "query/field/mesh_shape.h"
-#include "query/field/surface_descent.h"
 #include "query/field/with_shape.h"
 #include "query/solid_queries.h"
 
 namespace ist {
 namespace {
 
-const MeshField* mesh_of(const PlacedField& placed) noexcept {
-  return std::get_if<MeshField>(&placed.field);
-}
-
-/// Of a mesh field in its asset's unit frame, of all others in their own.
-std::optional<RelativePose> pose_of(const PlacedField& a, const PlacedTree& b) noexcept {
-  if (const MeshField* const mesh = mesh_of(a)) {
-    if (!mesh->tree.has_surface()) return std::nullopt;
-    return relative_pose(PlacedTree{mesh->tree, a.pose, a.scale}, b);
-  }
-  return relative_pose(a.pose, a.scale, b);
-}
-
 /// `tree`: of B, which bins refer to.
 Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTree& tree,
                       const DescentLimits& limits, Workspace& workspace,
                       ContactBins* bins) noexcept {
-  const std::optional<RelativePose> pose = pose_of(a, b);
+  const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (bins != nullptr) bins->start(tree, true);
-  const auto run = [&](auto& descent) {
-    descent.run();
-    return descent.penetration();
-  };
-  if (const MeshField* const mesh = mesh_of(a)) {
-    const SurfaceTree surface = surface_tree(mesh->tree);
-    SurfaceDescent descent(surface, tree, *pose, limits, *workspace.impl(), bins);
-    return run(descent);
-  }
   return with_shape(
       a.field,
       [&](auto& shape) {
         FieldDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
-        return run(descent);
+        descent.run();
+        return descent.penetration();
       },
       invalid_input<Penetration>);
 }
@@ -63,7 +40,7 @@ Penetration find_penetration(const PlacedField& a, const PlacedTree& b,
 Separation find_separation(const PlacedField& a, const PlacedTree& b,
                            const SeparationSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<Separation>();
-  const std::optional<RelativePose> pose = pose_of(a, b);
+  const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
   const auto search = [&](auto& shape) {
@@ -71,25 +48,17 @@ Separation find_separation(const PlacedField& a, const PlacedTree& b,
     const bool farther = settings.max_distance > 0 && gap.distance_min > settings.max_distance;
     return farther ? farther_than(settings.max_distance) : gap;
   };
-  if (const MeshField* const mesh = mesh_of(a)) {
-    MeshShape shape(*mesh);
-    return search(shape);
-  }
   return with_shape(a.field, search, invalid_input<Separation>);
 }
 
 Overlapping find_overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return Overlapping::unknown;
-  const std::optional<RelativePose> pose = pose_of(a, b);
+  const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
   const SphereTree tree = sphere_tree(b.tree, Measure::inner);
   const auto search = [&](auto& shape) {
     return FieldMeetingSearch(shape, tree, *pose, *workspace.impl()).run();
   };
-  if (const MeshField* const mesh = mesh_of(a)) {
-    MeshShape shape(*mesh);
-    return search(shape);
-  }
   return with_shape(a.field, search, [] { return Overlapping::unknown; });
 }
 
@@ -103,7 +72,7 @@ ContactPatches find_patches(const PlacedField& a, const PlacedTree& b,
   const SphereTree tree = sphere_tree(b.tree, settings.measure);
   result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);
   if (result.penetration.status == QueryStatus::invalid_input) return result;
-  const std::optional<RelativePose> pose = pose_of(a, b);
+  const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose) return result;
   const double radius = tree.header->root[3] * pose->a_from_b.scale;
   result.count = write_patches({bins, bins.collect(Precision::float64), *pose, radius},

@@ -35,7 +35,7 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace
 
 /// C's functions refuse other numbers too.
 bool are_known(const PenetrationSettings& settings) noexcept {
-  return settings.measure <= Measure::exact && settings.surface <= SurfaceUse::always;
+  return settings.measure <= Measure::exact;
 }
 
 const Pose& pose_of(const PlacedSolid& solid) noexcept {

@@ -226,7 +226,7 @@ RayHit shape_hit(Shape& shape, const SolidFrame& frame, const OwnRay& ray) noexc
   }
 }
 
-/// A field that is no asset's, at a place.
+/// A field at a place.
 class PlacedShape {
  public:
   explicit PlacedShape(const PlacedField& placed) noexcept
@@ -288,8 +288,6 @@ auto with_solid(const PlacedTree& placed, const Use& use) noexcept {
 }
 template <class Use>
 auto with_solid(const PlacedField& placed, const Use& use) noexcept {
-  if (const MeshField* const mesh = std::get_if<MeshField>(&placed.field))
-    return use(PlacedMesh({mesh->tree, placed.pose, placed.scale}));
   return use(PlacedShape(placed));
 }
 

@@ -1,16 +1,16 @@
 #include <ist/time_of_impact.h>
 
 #include "query/base/no_answer.h"
+#include "query/exact/mesh_queries.h"
 #include "query/field/with_shape.h"
 #include "query/impact/field_search.h"
 #include "query/impact/pair_search.h"
-#include "query/probe/membership.h"
 #include "query/solid_queries.h"
 
 namespace ist {
 namespace {
 
-// Where no tolerance is asked for: of the smaller solid's bounding radius, and of the surfaces'
+// Where no tolerance is asked for: of the smaller solid's bounding radius, and of the meshes'
 // errors, which may be what is left of an impact's gap at either end.
 constexpr double kTolerance = 1e-3;
 constexpr double kErrors = 10;
@@ -32,10 +32,10 @@ double bounding_radius(const PlacedTree& placed) noexcept {
   return placed.tree.header().inner_tree.root[3];
 }
 
-/// Whether one solid holds a part of the other without their surfaces meeting there.
+/// Whether one solid holds a part of the other without their meshes meeting there.
 bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) noexcept {
-  return (a.surface() != nullptr && holds_part(*a.surface(), b, pose.a_from_b)) ||
-         (b.surface() != nullptr && holds_part(*b.surface(), a, pose.b_from_a));
+  return (a.mesh() != nullptr && holds_part(*a.mesh(), b, pose.a_from_b)) ||
+         (b.mesh() != nullptr && holds_part(*b.mesh(), a, pose.b_from_a));
 }
 
 }  // namespace
@@ -49,8 +49,7 @@ TimeOfImpact find_impact(const PlacedTree& a, const PlacedTree& b, const Motions
   if (hold(side_a, side_b, frame->start)) return overlap();
   const double smaller =
       std::min(bounding_radius(a) * frame->a.unit, bounding_radius(b) * frame->b.unit);
-  const double errors =
-      side_a.surface_error() * frame->a.unit + side_b.surface_error() * frame->b.unit;
+  const double errors = side_a.mesh_error() * frame->a.unit + side_b.mesh_error() * frame->b.unit;
   ImpactLoop loop(*frame, tolerance_of(settings, smaller, errors, frame->unit), settings,
                   *workspace.impl());
   return PairSearch(*frame, side_a, side_b, loop).run();
@@ -59,15 +58,11 @@ TimeOfImpact find_impact(const PlacedTree& a, const PlacedTree& b, const Motions
 TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
   if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
-  if (const MeshField* const mesh = std::get_if<MeshField>(&a.field)) {
-    if (!mesh->tree.has_surface()) return invalid_input<TimeOfImpact>();
-    return find_impact(PlacedTree{mesh->tree, a.pose, a.scale}, b, motions, settings, workspace);
-  }
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
   const ImpactSide side(b.tree);
   const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit,
-                                        side.surface_error() * frame->b.unit, frame->unit);
+                                        side.mesh_error() * frame->b.unit, frame->unit);
   return with_shape(
       a.field,
       [&]<class Shape>(Shape& shape) {
@@ -75,7 +70,8 @@ TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motion
           // All of it is inside B, if its middle is and the surfaces do not meet.
           double middle[3];
           frame->start.b_from_a.apply({0, 0, 0}, middle);
-          if (side.surface() != nullptr && inside_surface(*side.surface(), middle, 0))
+          if (side.mesh() != nullptr &&
+              is_inside({*side.mesh()}, {middle[0], middle[1], middle[2]}))
             return overlap();
         }
         ImpactLoop loop(*frame, tolerance, settings, *workspace.impl());

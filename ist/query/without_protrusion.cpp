@@ -8,7 +8,7 @@
 #include <ist/asset_layout.h>
 #include "query/base/relative_pose.h"
 #include "query/base/smooth_step.h"
-#include "query/field/pair_overlap.h"
+#include "query/detail/unlike_sizes.h"
 
 namespace ist {
 namespace {
@@ -82,11 +82,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
     return;
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose) return;
-  // What meets a surface is exact.
-  if (pair_method(a, a.tree.header().matched_tree, b, b.tree.header().matched_tree, *pose,
-                  settings.surface)
-          .surface)
-    return;
+  if (pair_method(a, b, settings, pose).exact) return;
   const double skin = skin_of(a, b);
   const auto is_light = [&](const ContactPatch& patch) {
     return patch.volume < kDeepOverlap * (skin * patch.area);

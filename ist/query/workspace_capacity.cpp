@@ -5,14 +5,13 @@
 #include <cmath>
 #include <vector>
 
-#include "query/asset/surface_tree.h"
+#include "query/asset/sphere_tree.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/descent.h"
 #include "query/descent/open_runs.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_chain.h"
-#include "query/field/surface_descent.h"
 
 namespace ist {
 namespace {
@@ -27,12 +26,6 @@ Balls balls_of(const SphereTree& tree, int level, double scale) {
     balls[i].r *= scale;
   }
   return balls;
-}
-
-double largest(const Balls& balls) {
-  double r = 0;
-  for (const NodeBall& ball : balls) r = std::max(r, ball.r);
-  return r;
 }
 
 /// A ball of `radius` meets no more of the balls than this, wherever it lies: the most that come as
@@ -105,13 +98,6 @@ class Capacity {
     add_trees({a, b, pose}, a.top, b.top);
   }
 
-  /// Of a SurfaceDescent.
-  void add_surface(const SurfaceTree& surface, const SphereTree& probes, const RelativePose& pose) {
-    const TreeHeader header = ball_header(surface);
-    const SphereTree balls = ball_tree(surface, header);
-    add_surface({balls, probes, pose}, balls.top, probes.top);
-  }
-
   std::size_t value() const { return capacity_; }
 
  private:
@@ -125,23 +111,12 @@ class Capacity {
     if (level_a <= 0 && level_b <= 0) return;
     --(opens_a(trees.a, level_a, trees.b, level_b, trees.pose.a_from_b.scale) ? level_a : level_b);
     add_trees(trees, level_a, level_b);
-    add_stage(trees, level_a, level_b, level_b);
+    add_stage(trees, level_a, level_b);
   }
 
-  void add_surface(const Trees& trees, int level_a, int level_b) {
-    if (level_a <= kSphereLevel && level_b <= 0) return;
-    const int opened_b = level_b;
-    --(opens_surface(trees.a, level_a, trees.b, level_b, trees.pose.a_from_b.scale) ? level_a
-                                                                                    : level_b);
-    add_surface(trees, level_a, level_b);
-    add_stage(trees, level_a, level_b, opened_b);
-  }
-
-  /// `opened_b`: of B's node whose partners are all opened together, if it is not `level_b`.
-  void add_stage(const Trees& trees, int level_a, int level_b, int opened_b) {
+  void add_stage(const Trees& trees, int level_a, int level_b) {
     const std::size_t count_a = trees.a.count(level_a), count_b = trees.b.count(level_b);
-    const bool groups = opened_b != level_b;
-    const std::size_t most = count_a * count_b + kWidth * (groups ? count_a : 1);
+    const std::size_t most = count_a * count_b + kWidth;
     if (most <= capacity_) return;
     const double scale = trees.pose.a_from_b.scale;
     const double roots = trees.a.header->root[3] + scale * trees.b.header->root[3];
@@ -149,11 +124,8 @@ class Capacity {
     const double blur = distance_error(
         precision_for(trees.a.root(), trees.b.root(), trees.pose.a_from_b.scale), 32 * roots);
     const Balls a = balls_of(trees.a, level_a, 1), b = balls_of(trees.b, level_b, scale);
-    std::size_t group = 1;
-    if (groups)
-      group = std::min(count_a, most_met(a, largest(balls_of(trees.b, opened_b, scale)) + blur));
     const std::size_t pairs = std::min(most_pairs(a, b, blur), most_pairs(b, a, blur));
-    capacity_ = std::max(capacity_, std::min(most, pairs + kWidth * group));
+    capacity_ = std::max(capacity_, std::min(most, pairs + kWidth));
   }
 
   std::size_t capacity_ = kWidth * OpenRuns::kMostVisits;
@@ -168,7 +140,6 @@ RelativePose scales_of(const std::optional<RelativePose>& pose) {
 std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
   const PlacedTree still_a{a.tree, {}, a.scale}, still_b{b.tree, {}, b.scale};
   const RelativePose a_from_b = scales_of(relative_pose(still_a, still_b));
-  const RelativePose b_from_a = scales_of(relative_pose(still_b, still_a));
   Capacity capacity;
   if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return capacity.value();
   const AssetHeader &header_a = a.tree.header(), &header_b = b.tree.header();
@@ -186,36 +157,15 @@ std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
     add(matched_tree(header_a, pair.a), matched_tree(header_b, other));
     add(matched_tree(header_a, other), matched_tree(header_b, pair.a));
   }
-  const auto add_surface = [&](const PlacedTree& owner, const AssetHeader& prober,
-                               const RelativePose& pose) {
-    if (!owner.tree.has_surface()) return;
-    const SurfaceTree surface = surface_tree(owner.tree);
-    capacity.add_surface(surface, {prober, prober.inner_tree}, pose);
-    for (std::uint32_t i = 0; i <= prober.detail_count; ++i)
-      capacity.add_surface(surface, {prober, matched_tree(prober, i)}, pose);
-  };
-  add_surface(a, header_b, a_from_b);
-  add_surface(b, header_a, b_from_a);
   return capacity.value();
 }
 
 std::size_t capacity_of(const PlacedField& a, const PlacedTree& b) {
-  const MeshField* const mesh = std::get_if<MeshField>(&a.field);
-  if (mesh != nullptr && !mesh->tree.has_surface())
-    throw Error("workspace_capacity: the asset of a mesh field keeps no surface");
-  const PlacedTree still{b.tree, {}, b.scale};
-  const RelativePose pose =
-      scales_of(mesh != nullptr ? relative_pose(PlacedTree{mesh->tree, {}, a.scale}, still)
-                                : relative_pose(Pose{}, a.scale, still));
+  scales_of(relative_pose(Pose{}, a.scale, PlacedTree{b.tree, {}, b.scale}));
   Capacity capacity;
   if (b.tree.sphere_count() == 0) return capacity.value();
-  for (const Measure measure : {Measure::matched, Measure::inner}) {
-    const SphereTree tree = sphere_tree(b.tree, measure);
-    if (mesh != nullptr)
-      capacity.add_surface(surface_tree(mesh->tree), tree, pose);
-    else
-      capacity.add_count(tree.count(0));
-  }
+  for (const Measure measure : {Measure::matched, Measure::inner})
+    capacity.add_count(sphere_tree(b.tree, measure).count(0));
   return capacity.value();
 }
 

@@ -44,21 +44,17 @@ std::optional<BodyBox::Turned> BodyBox::of(const Field& field) noexcept {
         Eigen::Vector3d(grid->size[0] - 1.0, grid->size[1] - 1.0, grid->size[2] - 1.0);
     return Turned{grid->origin + half, half};
   }
-  if (const auto* mesh = std::get_if<MeshField>(&field)) {
-    const Bounds own = bounds(mesh->tree);
-    return Turned{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
-  }
   return std::nullopt;
 }
 
 BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
-  double error = 0;  // of the surface
+  double error = 0;  // of the mesh
   if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
     const Bounds own = bounds(tree->tree);
     box_ = Turned{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
     scale_ = tree->scale;
     sticks_out_ = tree->scale * tree->tree.protrusion();
-    error = tree->scale * tree->tree.surface_error();
+    error = tree->scale * tree->tree.mesh_error();
     empty_ = tree->tree.empty();
   } else {
     const auto& field = std::get<PlacedField>(solid.placed);

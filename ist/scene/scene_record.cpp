@@ -145,7 +145,7 @@ template <class Io>
 void pass(Io& io, SceneRule& rule) {
   io.choice(rule.answer, SceneAnswer::impact);
   io.choice(rule.penetration.measure, Measure::exact);
-  io.choice(rule.penetration.surface, SurfaceUse::always);
+  io.number(rule.penetration.spheres_only);
   io.number(rule.penetration.pair_budget);
   io.number(rule.penetration.max_visits);
   io.number(rule.penetration.relative_error);
@@ -198,10 +198,6 @@ void pass(Io& io, DistanceGridField& field) {
 template <class Io>
 void pass(Io&, FunctionField&) {
   fail("a function of the caller's cannot be recorded");
-}
-template <class Io>
-void pass(Io& io, MeshField& field) {
-  io.tree(field.tree);
 }
 
 template <class Io, class Variant>

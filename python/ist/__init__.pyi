@@ -22,7 +22,6 @@ _Column = NDArray[np.float64]
 _Count = NDArray[np.uint32]
 _SphereMeasure = Literal["matched", "inner"]
 _Measure = Literal["matched", "inner", "exact"]
-_SurfaceUse = Literal["automatic", "never", "always"]
 _Grid = Literal["banded", "uniform", "explicit", "implicit", "hybrid"]
 _Scale = float | ArrayLike  # a factor, or (3,) of each axis
 _Device = Literal["auto", "cpu", "cuda"]
@@ -174,28 +173,26 @@ class Asset:
     volume: Final[float]  # [u³]
     coverage: Final[float]  # [0, 1]
     protrusion: Final[float]  # [u]
-    has_surface: Final[bool]
-    surface_error: Final[float]  # [u]
     mesh_triangles: Final[int]  # 0: it holds no mesh
     mesh_error: Final[float]  # [u]
-    mesh_state: Final[Literal["none", "own", "resolved", "simplified", "unresolved"]]
+    mesh_state: Final[Literal["none", "own", "resolved", "polygonised", "unresolved"]]
     counted_twice: Final[float]  # [u³]
 
 def bake(
     mesh: ClosedMesh | _OpenMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
     min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
-    seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str | float = "all",
+    seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str = "all",
     scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_surface(
-    mesh: ClosedMesh | _OpenMesh, *, surface: str | float = "all", scale: _Scale = 1.0,
+    mesh: ClosedMesh | _OpenMesh, *, scale: _Scale = 1.0,
     threads: int = 0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
 def bake_to_error(
     mesh: ClosedMesh | _OpenMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
     max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
     time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
-    threads: int = 0, device: _Device = "auto", surface: str | float = "all",
+    threads: int = 0, device: _Device = "auto", surface: str = "all",
     scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> TargetedAsset: ...
 def check(
@@ -236,10 +233,6 @@ class DistanceGridField(Field):
     def __init__(
         self, distances: ArrayLike, *, origin: ArrayLike, spacing: float, error: float = 0.0
     ) -> None: ...
-
-@final
-class MeshField(Field):
-    def __init__(self, asset: Asset) -> None: ...
 
 @final
 class SolidRows: ...
@@ -305,7 +298,7 @@ class Scene:
         self, group_a: int = 0, group_b: int = 0, *,
         answer: Literal["nothing", "boxes", "overlap", "penetration"] = "penetration",
         measure: _Measure = "matched",
-        surface: _SurfaceUse = "automatic", margin: float = 0.0,
+        spheres_only: bool = False, margin: float = 0.0,
         pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0,
     ) -> None: ...
     def exclude(self, a: int, b: int) -> None: ...
@@ -332,8 +325,8 @@ class PairFit:
     grain_b: Final[float]  # [u]
     ratio: Final[float]  # ≥ 1
     a_is_coarser: Final[bool]
-    has_surface: Final[bool]
-    needs_surface: Final[bool]
+    has_mesh: Final[bool]
+    needs_mesh: Final[bool]
     fits: Final[bool]
 
 class Plot:
@@ -433,7 +426,7 @@ class TimeOfImpact:
 def penetration(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
-    scale_gradients: bool = False, measure: _Measure = "matched", surface: _SurfaceUse = "automatic",
+    scale_gradients: bool = False, measure: _Measure = "matched", spheres_only: bool = False,
     pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
     threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
 ) -> Penetration: ...  # of solids on a GPU gpu.Penetration
@@ -457,7 +450,7 @@ def contains(
 def contact_patches(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
-    max_patches: int = 8, measure: _Measure = "matched", surface: _SurfaceUse = "automatic",
+    max_patches: int = 8, measure: _Measure = "matched", spheres_only: bool = False,
     pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0, pair_id: int = 0,
     threads: int = 0, wanted: Sequence[str] | None = None, out: Any = None, stream: Any = None,
 ) -> ContactPatches: ...  # of solids on a GPU gpu.ContactPatches

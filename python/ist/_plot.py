@@ -106,7 +106,7 @@ def _part(solid, pose, scale):
     else:
         if solid.sphere_count:
             spheres = solid.spheres()
-        if solid.has_surface or solid.mesh_triangles:
+        if solid.mesh_triangles:
             vertices, triangles = solid.surface()
     turn = scale * _rotation(pose[:4]).T
     return {"vertices": vertices @ turn + pose[4:], "triangles": triangles,

@@ -27,7 +27,7 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.A
         Field with each Asset.
     scales: (k,) or (w, k) > 0; None: 1. Their gradient is a difference of two queries: accurate to
         2e-4, at three times the cost.
-    settings: measure, surface, pair_budget, threads, … of ist.penetration.
+    settings: measure, spheres_only, pair_budget, threads, … of ist.penetration.
 
     Returns an array (n,) or (w, n) of the dtype of `poses`. Pairs with an invalid pose or scale,
     or with a solid that lacks what the measure needs, are NaN, and so are their gradients.

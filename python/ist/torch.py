@@ -30,10 +30,10 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
         Field with each Asset.
     scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is a difference of two
         queries, 0.05 % of the scale to either side: accurate to 2e-4, at three times the cost.
-    settings: measure, surface, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
+    settings: measure, spheres_only, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
         gradient lacks the estimated part. With measure="exact" volumes and gradients are the true
         ones. A GPU takes measure ("matched", "inner") and pair_budget. It gives the CPU's answers for
-        surface="never", of two Assets also by default.
+        spheres_only=True, of two Assets also by default.
 
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs with an invalid pose
     or scale, or with a solid that lacks what the measure needs, are NaN, and so are their gradients;

@@ -440,18 +440,7 @@ bool near(double a, double b, double size) { return std::fabs(a - b) <= 1e-9 * (
 /// Positive outside. A point is in the geom's own frame, and the answers too.
 ist_surface_point_t find_nearest(const Instance& solid, const mjtNum x[3]) {
   ist_surface_point_t answer = {};
-  ist_status_t status = ist_closest_point(&solid.local, x, 1, &answer, sizeof answer);
-  if (status == IST_NOT_HELD) {
-    ist_field_t surface = {};
-    surface.size = sizeof surface;
-    surface.kind = IST_MESH;
-    surface.as.mesh.tree = solid.local.tree;
-    ist_placed_t placed = solid.local;
-    placed.tree = nullptr;
-    placed.field = &surface;
-    status = ist_closest_point(&placed, x, 1, &answer, sizeof answer);
-  }
-  if (status >= 0) return answer;
+  if (ist_closest_point(&solid.local, x, 1, &answer, sizeof answer) >= 0) return answer;
   complain_once("ist.solid: a solid has no mesh: neither rays nor cloths meet it");
   answer.distance = 2e6;  // MuJoCo takes 1e6 for a miss
   return answer;

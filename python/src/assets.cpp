@@ -68,11 +68,11 @@ PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
   return {asset.view(), take_pose(pose, scale), scale};
 }
 
-/// What is kept of the mesh, as the command line takes it; a number is as good as its text.
-SurfaceSettings surface_settings(const py::object& given) {
-  const std::optional<SurfaceSettings> surface = parse_surface(text_of(given));
-  if (!surface) throw Error("surface: '" + text_of(given) + "' is not one of " + kSurfaceMeaning);
-  return *surface;
+/// Whether the mesh is kept, as the command line takes it.
+bool keeps_mesh(const py::object& given) {
+  const std::optional<bool> keeps = parse_surface(text_of(given));
+  if (!keeps) throw Error("surface: '" + text_of(given) + "' is not " + kSurfaceMeaning);
+  return *keeps;
 }
 
 constexpr const char* kSettingsDoc = R"(
@@ -87,8 +87,8 @@ grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
 seed: breaks ties.
 threads: 0: all cores. The result does not depend on it.
 device: 'auto', 'cpu' or 'cuda'. The result does not depend on it.
-surface: surface kept in the asset: 'all' triangles of the mesh, 'none', or as few as
-    stay within a length of it: a number [u], or a share of its longest side as '0.1%'.
+surface: surface kept in the asset: 'all', the mesh, or 'none'. Simplify the mesh first for a smaller
+    one.
 scale: as for close_mesh(). [u] is the unit of the scaled mesh.
 progress: called with a Progress on this thread; False cancels: packing then keeps its spheres,
     other stages raise Error. An exception that it raises is passed on.
@@ -162,7 +162,7 @@ void add_bake(py::module_& module, const char* name, const char* doc, std::size_
         settings.seed = seed;
         settings.threads = threads;
         settings.device = named(device, "device", kDevices);
-        settings.surface = surface_settings(surface);
+        settings.keep_mesh = keeps_mesh(surface);
         return offline(
             [=, closed = closed_of(mesh, scale)](const ProgressCallback& callback) {
               return bake(*closed, settings, callback, given...);
@@ -215,17 +215,16 @@ void add_bakes(py::module_& module) {
       py::arg("at_overlap") = ErrorTarget().at_overlap);
   module.def(
       "bake_surface",
-      [](const py::object& given, const py::object& surface, const py::object& scale,
-         unsigned threads, const py::object& progress) {
+      [](const py::object& given, const py::object& scale, unsigned threads,
+         const py::object& progress) {
         return offline(
-            [mesh = closed_of(given, scale), settings = surface_settings(surface),
-             threads](const ProgressCallback& callback) {
-              return bake_surface(*mesh, settings, threads, callback);
+            [mesh = closed_of(given, scale), threads](const ProgressCallback& callback) {
+              return bake_surface(*mesh, threads, callback);
             },
             progress);
       },
-      py::arg("mesh"), py::kw_only(), py::arg("surface") = "all", py::arg("scale") = 1.0,
-      py::arg("threads") = 0, py::arg("progress") = py::none(),
+      py::arg("mesh"), py::kw_only(), py::arg("scale") = 1.0, py::arg("threads") = 0,
+      py::arg("progress") = py::none(),
       "Bakes a surface-only asset: the mesh, mass and bounds, without spheres, for exact "
       "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
       "of bake().\nRaises Error if parts of the mesh overlap and cannot be resolved.");
@@ -329,12 +328,6 @@ void add_assets(py::module_& module) {
           "protrusion", [](const Asset& self) { return self.view().protrusion(); },
           "[u] bound on how far matched spheres stick out of the solid.")
       .def_prop_ro(
-          "has_surface", [](const Asset& self) { return self.view().has_surface(); },
-          "Whether the asset stores the solid's surface.")
-      .def_prop_ro(
-          "surface_error", [](const Asset& self) { return self.view().surface_error(); },
-          "[u] largest distance between that surface and the solid's.")
-      .def_prop_ro(
           "mesh_triangles", [](const Asset& self) { return self.view().mesh_triangles(); },
           "Number of triangles of the kept mesh, for exact queries; 0: none.")
       .def_prop_ro(
@@ -342,7 +335,7 @@ void add_assets(py::module_& module) {
           "[u] largest distance between the kept mesh's surface and the solid's.")
       .def_prop_ro(
           "mesh_state", [](const Asset& self) { return name_of(self.view().mesh_state()); },
-          "'own', 'resolved', 'simplified', 'none', or 'unresolved' (its parts overlap).")
+          "'own', 'resolved', 'polygonised', 'none', or 'unresolved' (its parts overlap).")
       .def_prop_ro(
           "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
           "[u³] volume that the input mesh counts more than once.");

@@ -68,7 +68,7 @@ py::object clash(const py::object& given, const py::object& poses, const py::obj
       } else {
         baked.push_back(offline(
             [closed = closed_of(mesh, py::float_(1.0)), threads](const ProgressCallback& progress) {
-              return std::make_shared<const Asset>(bake_surface(*closed, {}, threads, progress));
+              return std::make_shared<const Asset>(bake_surface(*closed, threads, progress));
             }));
         part.solid.tree = baked.back()->view();
       }

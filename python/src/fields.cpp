@@ -192,18 +192,6 @@ void add_fields(py::module_& module) {
            "distances: (points along z, y, x) [u]; a float32 array in C order is not copied.\n"
            "origin: (3,) [u] of the first point. spacing: [u] > 0.\n"
            "error: [u] largest error of the interpolated distance.");
-  add_kind<MeshField>(module, "MeshField",
-                      "The surface in an asset, without its spheres. Exact within "
-                      "Asset.surface_error.")
-      .def(py::new_([](const py::object& asset) {
-             const TreeView tree = tree_of(asset, "asset");
-             if (!tree.has_surface())
-               throw Error("asset: holds no surface; bake it with surface='all'");
-             py::dict arguments;
-             arguments["asset"] = asset;
-             return OwnedKind<MeshField>(MeshField{tree}, std::move(arguments));
-           }),
-           py::arg("asset"), "asset: an Asset that has a surface.");
 }
 
 }  // namespace ist::python

@@ -74,7 +74,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
     answers->scale_gradient.write(i, gradient.b);
     answers->scale_gradient_a.write(i, gradient.a);
   });
-  refuse_unanswered(rows, answers->status, {settings.measure, settings.surface});
+  refuse_unanswered(rows, answers->status, settings.measure);
   return answers;
 }
 
@@ -90,28 +90,28 @@ scale_gradients: fill scale_gradient and scale_gradient_a, at three times the co
 measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the true volume) or
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; max_visits is its only limit).
-surface: 'automatic', 'never' or 'always': whether an asset's surface is used. No effect with 'exact'.
-    On a GPU 'automatic' is 'never' for two Assets.
+spheres_only: 'matched' alone: spheres answer even where they are too coarse for the contact of two
+    Assets of unlike sizes, and may be wrong by any factor (pair_fit). False: there the meshes do, if
+    both hold theirs. On a GPU spheres always answer.
 pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
     'matched'. The query uses the cheapest level of detail, or the exact measure, whose predicted
     error is smaller, blended smoothly. Over random poses about 19 of 20 errors are smaller, half are
     below a third. 0: all spheres. Status error_exceeded: the predicted error is larger, since an
-    Asset has no mesh or a simplified one, a pair_budget is set, or copies of an Asset coincide.
+    Asset has no mesh or one that errs more, a pair_budget is set, or copies of an Asset coincide.
 pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps
     of one motion: 'exact' keeps nearby triangles from step to step and returns the same answers
     faster.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
-quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure or `surface` needs, or
-both are Fields. For one pose ValueError or ist.Error is raised instead.
+quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure needs, or both
+are Fields. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there;
 unsupported arguments raise. A GPU takes the measures 'matched' and 'inner', and pair_budget.
-Two Assets are summed as with surface='never': where spheres are too coarse for a contact, the CPU's
-'automatic' differs. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within
+Two Assets are summed as with spheres_only=True. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within
 1e-9 of the CPU's. The bits are the same in every run, whatever else is in the batch.
 Arrays are of any framework, in that device's memory and in C order: poses (n, 7) and scales (n,)
 float64, indices uint32 or int32. They are read by __dlpack__ or __cuda_array_interface__, never
@@ -161,7 +161,7 @@ void add_class(py::module_& module) {
   add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
-             "(n,) uint32, lenses summed and spheres overlapped with a surface; with "
+             "(n,) uint32, lenses summed and spheres overlapped with a Field; with "
              "measure='exact' intersecting triangles.");
   add_pickling(type);
 }
@@ -186,11 +186,11 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
   write_pose_gradient(row.a.pose, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
 }
 
-ContactSettings contact_settings(const std::string& measure, const std::string& surface,
+ContactSettings contact_settings(const std::string& measure, bool spheres_only,
                                  std::uint32_t pair_budget, std::uint32_t max_visits,
                                  double relative_error, std::uint32_t pair_id) {
   return {named(measure, "measure", kMeasures),
-          named(surface, "surface", kSurfaceUses),
+          spheres_only,
           pair_budget,
           max_visits,
           take_limit(relative_error, "relative_error"),
@@ -202,7 +202,7 @@ void add_penetration(py::module_& module) {
   add_pair_query(
       module, "penetration",
       +[](const GivenPair& pair, bool scale_gradients, const std::string& measure,
-          const std::string& surface, std::uint32_t pair_budget, std::uint32_t max_visits,
+          bool spheres_only, std::uint32_t pair_budget, std::uint32_t max_visits,
           double relative_error, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
           const py::object& out, const py::object& stream) -> py::object {
         const GivenOutput given{wanted, out, stream};
@@ -210,7 +210,6 @@ void add_penetration(py::module_& module) {
           refuse_given("not on a GPU", {{"scale_gradients", scale_gradients},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          named(surface, "surface", kGpuSurfaceUses);
           const GpuPenetrationSettings settings{named(measure, "measure", kGpuMeasures),
                                                 pair_budget};
           return ask<GpuPenetrations>(
@@ -222,11 +221,11 @@ void add_penetration(py::module_& module) {
         refuse_output(given);
         return py::cast(answer(
             pair.rows(),
-            contact_settings(measure, surface, pair_budget, max_visits, relative_error, pair_id),
+            contact_settings(measure, spheres_only, pair_budget, max_visits, relative_error, pair_id),
             scale_gradients, threads));
       },
       py::arg("scale_gradients") = false, py::arg("measure") = "matched",
-      py::arg("surface") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("spheres_only") = false, py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
       py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
       py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
       kDoc);

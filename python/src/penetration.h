@@ -22,16 +22,9 @@ inline constexpr std::pair<const char*, Measure> kMeasures[] = {
 /// What a GPU's batches answer.
 inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", Measure::matched},
                                                                    {"inner", Measure::inner}};
-inline constexpr std::pair<const char*, SurfaceUse> kSurfaceUses[] = {
-    {"automatic", SurfaceUse::automatic},
-    {"never", SurfaceUse::never},
-    {"always", SurfaceUse::always}};
-/// Of two Assets a GPU sums lenses alone.
-inline constexpr std::pair<const char*, SurfaceUse> kGpuSurfaceUses[] = {
-    {"automatic", SurfaceUse::never}, {"never", SurfaceUse::never}};
 
 /// Keywords that penetrations and contact patches share.
-ContactSettings contact_settings(const std::string& measure, const std::string& surface,
+ContactSettings contact_settings(const std::string& measure, bool spheres_only,
                                  std::uint32_t pair_budget, std::uint32_t max_visits,
                                  double relative_error, std::uint32_t pair_id);
 

@@ -86,7 +86,7 @@ py::tuple surface_of(const Asset& asset) {
   surface.size = sizeof surface;
   if (ist_tree_view(bytes.data(), bytes.size(), &tree) != IST_OK ||
       ist_tree_get_surface(&tree, &surface) != IST_OK || surface.triangle_count == 0)
-    throw Error("the asset holds no surface; bake it with surface='all'");
+    throw Error("the asset holds no mesh; bake it with surface='all'");
   const Column<double, 3> vertices({surface.vertex_count});
   const Column<std::uint32_t, 3> triangles({surface.triangle_count});
   surface.vertices = reinterpret_cast<double(*)[3]>(vertices.row(0));
@@ -129,7 +129,7 @@ Returns Lenses: an ellipsoid of the radius and the thickness about the centre re
       py::arg("scales_a") = py::none(),
       R"(Removes the volume that protruding spheres add where flat faces meet.
 
-whole: the answer of penetration() at these poses by lenses, surface='never', in the matched measure
+whole: the answer of penetration() at these poses with spheres_only=True, in the matched measure
     without a pair budget.
 
 The result is zero across a gap of a fifth of a mean sphere radius or more. Between this gap and a
@@ -146,10 +146,10 @@ Returns a Penetration.)");
       .def_ro("grain_b", &PairFit::grain_b, "[u] likewise.")
       .def_ro("ratio", &PairFit::ratio, "≥ 1, the coarser grain over the finer.")
       .def_ro("a_is_coarser", &PairFit::a_is_coarser, "Or both are equal.")
-      .def_ro("has_surface", &PairFit::has_surface, "Whether the coarser asset holds its surface.")
-      .def_ro("needs_surface", &PairFit::needs_surface,
+      .def_ro("has_mesh", &PairFit::has_mesh, "Whether both assets hold their meshes.")
+      .def_ro("needs_mesh", &PairFit::needs_mesh,
               "Whether volumes and forces by spheres alone are misleading.")
-      .def_prop_ro("fits", &PairFit::fits, "has_surface, or not needs_surface.");
+      .def_prop_ro("fits", &PairFit::fits, "has_mesh, or not needs_mesh.");
   module.def("pair_fit", &fit_of, py::arg("a"), py::arg("b"), py::kw_only(), py::arg("scale") = 1.0,
              py::arg("scale_a") = 1.0,
              "Whether the sizes of two Assets suit each other, whatever their poses: a PairFit.\n\n"

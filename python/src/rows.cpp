@@ -221,7 +221,7 @@ std::string fault_of(const Row& row, const char* name) {
               : std::string(name) + ": sizes or distances are more than 1e60 : 1 apart";
 }
 
-void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
+void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked) {
   if (!rows.shape().empty()) return;
   const Row row = rows.at(0);
   if (status == QueryStatus::invalid_input) {
@@ -232,7 +232,7 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
   for (const Side* const side : {&row.b, &row.a}) {
     const TreeView* const tree = side->tree();
     const std::string name = side == &row.a ? "a" : "b";
-    if (asked.measure != Measure::exact) {
+    if (asked != Measure::exact) {
       if (tree != nullptr && tree->sphere_count() == 0)
         throw Error(name +
                     ": is a surface alone, without spheres; use penetration() with "
@@ -243,10 +243,6 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked) {
       throw Error(name + ": has no mesh, which measure='exact' needs; bake it with surface='all'");
     }
   }
-  throw Error(
-      "surface='always': the asset of coarser spheres holds no surface; bake it with "
-      "surface='all', "
-      "or query with surface='automatic'");
 }
 
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted) {

@@ -90,18 +90,12 @@ class Rows {
   void sort_by_asset();
 };
 
-/// What of a solid is asked.
-struct Asked {
-  Measure measure = Measure::matched;
-  SurfaceUse surface = SurfaceUse::automatic;
-};
-
 /// Nobody looks at the status of one pose. Where that is all there is, throws Error, with the way
 /// out, if a solid does not hold what was asked, and ValueError that names the argument if it is
 /// invalid.
-void refuse_unanswered(const Rows& rows, QueryStatus status, Asked asked = {});
+void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked = Measure::matched);
 inline void refuse_unanswered(const Rows& rows, const Column<std::uint32_t>& status,
-                              Asked asked = {}) {
+                              Measure asked = Measure::matched) {
   if (rows.shape().empty()) refuse_unanswered(rows, QueryStatus{*status.row(0)}, asked);
 }
 

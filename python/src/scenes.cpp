@@ -229,18 +229,18 @@ void add_scenes(py::module_& module) {
       .def(
           "set_rule",
           [](PyScene& self, std::uint32_t group_a, std::uint32_t group_b, const std::string& answer,
-             const std::string& measure, const std::string& surface, double margin,
+             const std::string& measure, bool spheres_only, double margin,
              std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error) {
             SceneRule rule;
             rule.answer = named(answer, "answer", kAnswers);
             rule.margin = take_limit(margin, "margin");
             rule.penetration =
-                contact_settings(measure, surface, pair_budget, max_visits, relative_error, 0);
+                contact_settings(measure, spheres_only, pair_budget, max_visits, relative_error, 0);
             self.scene.set_rule(group_a, group_b, rule);
           },
           py::arg("group_a") = 0, py::arg("group_b") = 0, py::kw_only(),
           py::arg("answer") = "penetration", py::arg("measure") = "matched",
-          py::arg("surface") = "automatic", py::arg("margin") = 0.0, py::arg("pair_budget") = 0,
+          py::arg("spheres_only") = false, py::arg("margin") = 0.0, py::arg("pair_budget") = 0,
           py::arg("max_visits") = 0, py::arg("relative_error") = 0.0,
           "How bodies of two groups are asked: 'penetration' (as ist.penetration has it), "
           "'overlap' "

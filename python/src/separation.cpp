@@ -73,7 +73,7 @@ std::unique_ptr<Patches> patches(const Rows& rows, std::size_t each,
     answers->write(
         i, row, contact_patches(row.a.placed(), row.b.placed(), settings, workspace, found), found);
   });
-  refuse_unanswered(rows, answers->penetration->status, {settings.measure, settings.surface});
+  refuse_unanswered(rows, answers->penetration->status, settings.measure);
   return answers;
 }
 
@@ -264,7 +264,7 @@ void add_separation(py::module_& module) {
   add_pair_query(
       module, "contact_patches",
       +[](const GivenPair& pair, std::size_t max_patches, const std::string& measure,
-          const std::string& surface, std::uint32_t pair_budget, std::uint32_t max_visits,
+          bool spheres_only, std::uint32_t pair_budget, std::uint32_t max_visits,
           double relative_error, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
           const py::object& out, const py::object& stream) -> py::object {
         const GivenOutput given{wanted, out, stream};
@@ -272,7 +272,6 @@ void add_separation(py::module_& module) {
           refuse_given("not on a GPU", {{"pair_budget", pair_budget != 0},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          named(surface, "surface", kGpuSurfaceUses);
           const Measure which = named(measure, "measure", kGpuMeasures);
           if (max_patches < 1 || max_patches > kMostGpuPatches)
             throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
@@ -292,11 +291,11 @@ void add_separation(py::module_& module) {
         if (max_patches < 1) throw value_error("max_patches: 0; wanted 1 or more");
         return py::cast(patches(
             pair.rows(), max_patches,
-            contact_settings(measure, surface, pair_budget, max_visits, relative_error, pair_id),
+            contact_settings(measure, spheres_only, pair_budget, max_visits, relative_error, pair_id),
             threads));
       },
       py::arg("max_patches") = kUsualPatches, py::arg("measure") = "matched",
-      py::arg("surface") = "automatic", py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
+      py::arg("spheres_only") = false, py::arg("pair_budget") = 0, py::arg("max_visits") = 0,
       py::arg("relative_error") = 0.0, py::arg("pair_id") = 0, py::arg("threads") = 0,
       py::arg("wanted") = py::none(), py::arg("out") = py::none(), py::arg("stream") = py::none(),
       kPatchesDoc);

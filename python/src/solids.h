@@ -21,7 +21,7 @@ struct OwnedField {
 /// What may stand first in a query: a view. Whoever asks holds the Python object meanwhile.
 using Solid = std::variant<TreeView, Field>;
 
-/// Its surface for queries of spheres, (vertices, triangles); Error where there is none.
+/// Its mesh, (vertices, triangles); Error where there is none.
 py::tuple surface_of(const Asset& asset);
 
 /// Of an Asset or a Field, else TypeError. `name`: of the argument.

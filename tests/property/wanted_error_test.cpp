@@ -266,7 +266,7 @@ TEST_F(WantedErrors, SimplifiedMeshesSayWhereTheyExceedIt) {
   with_spheres.max_spheres = 100;
   const Asset packed = bake(closed(torus_mesh(0.35, 0.14, 200, 100), "ring"), with_spheres);
   for (const Asset* asset : {&alone, &packed})
-    ASSERT_EQ(asset->view().mesh_state(), MeshState::simplified);
+    ASSERT_EQ(asset->view().mesh_state(), MeshState::polygonised);
   ContactPatch patches[6];
   for (const Asset* asset : {&alone, &packed}) {
     int asked = 0;

@@ -43,7 +43,6 @@ class HostBatch {
   void run_fields(const gpu::SolidPairs& asked, unsigned seed);
   gpu::TriangleRoom triangle_room();
   /// The kernels of triangle_kernels.cu.
-  template <class Kind>
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed);
 
   HostSolids solids_;

@@ -118,8 +118,7 @@ void HostBatch::run_fields(const gpu::SolidPairs& asked, unsigned seed) {
     by_team(seed, [&](const auto& team) {
       gpu::sum_field_pair(team, batch, gpu::listed_pair(batch, gpu::kSmooth, k), *memory);
     });
-  sum_rounds<gpu::FacetKind>(batch, seed);
-  sum_rounds<gpu::MeshKind>(batch, seed);
+  sum_rounds(batch, seed);
 }
 
 gpu::TriangleRoom HostBatch::triangle_room() {
@@ -129,33 +128,31 @@ gpu::TriangleRoom HostBatch::triangle_room() {
   return {queries_.data(), parts_.data(), words_.data(), query_room, part_room, word_room};
 }
 
-template <class Kind>
 void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
-  const auto walks = std::make_unique<typename Kind::WalkMemory>();
-  const auto sums = std::make_unique<gpu::SumMemory<Kind>>();
-  const auto whole = std::make_unique<gpu::WholeMemory<Kind>>();
-  const std::uint32_t listed = field_counters.listed[Kind::kGroup];
+  const auto walks = std::make_unique<gpu::FacetWalkMemory>();
+  const auto sums = std::make_unique<gpu::FacetSumMemory>();
+  const auto whole = std::make_unique<gpu::FacetWholeMemory>();
+  const std::uint32_t listed = field_counters.listed[gpu::kFacets];
   std::uint32_t first = 0;
   for (std::uint32_t n = 0; n < most_rounds && first < listed; ++n, ++rounds) {
-    gpu::TriangleRound& round = gpu::round_of<Kind>(batch, n);
+    gpu::TriangleRound& round = gpu::round_of(batch, n);
     round = {first, 0, 0, 0, 0};
-    const std::uint32_t count = gpu::pairs_from<Kind>(batch, first);
-    for (std::uint32_t k = 0; k < count; ++k) gpu::place_query<Kind>(batch, k, first + k);
+    const std::uint32_t count = gpu::pairs_from(batch, first);
+    for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
     for (; round.walked < count && gpu::goes_on(batch, round, 1); ++round.walked)
-      by_team(seed, [&](const auto& team) {
-        gpu::walk_query<Kind>(team, batch, round, round.walked, *walks);
-      });
+      by_team(seed,
+              [&](const auto& team) { gpu::walk_query(team, batch, round, round.walked, *walks); });
     for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
-      by_team(seed, [&](const auto& team) { gpu::sum_part<Kind>(team, batch, k, *sums); });
+      by_team(seed, [&](const auto& team) { gpu::sum_part(team, batch, k, *sums); });
     for (std::uint32_t k = 0; k < round.walked; ++k) gpu::answer_query(batch, k);
     if (round.walked == 0) throw std::logic_error("a round has no room for a pair");
-    first = gpu::end_of<Kind>(batch, round);
+    first = gpu::end_of(batch, round);
   }
-  const std::uint32_t large = field_counters.large[Kind::kGroup];
+  const std::uint32_t large = field_counters.large;
   for (std::uint32_t k = 0; k < large + (listed - first); ++k) {
     const std::uint32_t at = k < large ? k : first + (k - large);
     by_team(seed, [&](const auto& team) {
-      gpu::sum_whole_query<Kind>(team, batch, gpu::listed_pair(batch, Kind::kGroup, at), *whole);
+      gpu::sum_whole_query(team, batch, gpu::listed_pair(batch, gpu::kFacets, at), *whole);
     });
   }
 }

@@ -115,7 +115,7 @@ TEST(KeptMesh, IsSimplifiedWithinAnErrorOnRequest) {
   std::uint32_t last = 0;
   for (const SurfaceSettings& surface : {within(0.05), within(0, 0.005), within(2e-3)}) {
     const Asset asset = bake(ball, few_spheres(surface));
-    EXPECT_EQ(asset.view().mesh_state(), MeshState::simplified);
+    EXPECT_EQ(asset.view().mesh_state(), MeshState::polygonised);
     EXPECT_EQ(asset.view().mesh_triangles(), asset.view().surface_triangles());
     EXPECT_LE(
         asset.view().mesh_error(),
@@ -187,7 +187,7 @@ TEST(KeptMesh, OfASolidByItsDistanceIsTheOneInItsPlace) {
   meshing.cells = 24;
   const auto ball = make_ball(Point::Zero(), 1);
   const Asset asset = bake(*ball, few_spheres(), {}, meshing);
-  EXPECT_EQ(asset.view().mesh_state(), MeshState::simplified);
+  EXPECT_EQ(asset.view().mesh_state(), MeshState::polygonised);
   EXPECT_GE(asset.view().mesh_error(),
             std::ldexp(asset.view().header().polygonise_error, asset.view().header().exponent));
   for (const Invariant& one : check(asset, *ball)) EXPECT_EQ(one.violations, 0u) << one.name;

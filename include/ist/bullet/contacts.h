@@ -31,8 +31,8 @@ struct Settings {
   };
   Response response = Response::solver;
   std::size_t patches = 8;  ///< [1, kPatches] per contact
-  /// `always` where flat faces meet. Assets without a surface (TreeView::has_surface) use lenses.
-  ContactSettings query{.surface = SurfaceUse::always};
+  /// Where an asset keeps no mesh (TreeView::has_mesh), by matched spheres.
+  ContactSettings query{.measure = Measure::exact};
 
   /// law.stiffness [force/u³] is the pressure over depth, for both responses. The solver steps the
   /// springs implicitly, so any stiffness is stable; it uses nothing else of the law. For the

@@ -19,19 +19,6 @@ class SectionWriter {
     if (count > 0) std::memcpy(bytes_.data() + offset, values.data(), count * sizeof(T));
   }
 
-  /// Of two or four bytes each.
-  void write(std::uint64_t offset, const std::vector<std::uint32_t>& values, std::uint64_t count,
-             std::uint32_t width) {
-    if (width == 4) return write(offset, values, count);
-    std::vector<std::uint16_t> narrow(values.size());
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      narrow[i] = static_cast<std::uint16_t>(values[i]);
-      if (narrow[i] != values[i])
-        throw Error("asset: a number of the surface's lists is too large");
-    }
-    write(offset, narrow, count);
-  }
-
   void write(const TreeHeader& header, const TreeArrays& tree) {
     const std::uint64_t lanes = std::uint64_t{kWidth} * header.level[0].count;
     write(header.sphere_index, tree.sphere_index, lanes);
@@ -43,22 +30,6 @@ class SectionWriter {
       write(level.origins, tree.levels[k].origins, level.count);
       write(level.nodes, tree.levels[k].nodes, k > 0 ? level.count : 0);
     }
-  }
-
-  void write(const SurfaceHeader& header, const SurfaceArrays& surface) {
-    write(header.level[0].blocks, surface.blocks, header.level[0].count);
-    if (surface.levels.size() + 1 != header.level_count)
-      throw Error("asset: the surface has a wrong number of levels");
-    for (std::uint32_t k = 1; k < header.level_count; ++k) {
-      const LevelHeader& level = header.level[k];
-      write(level.blocks, surface.levels[k - 1].blocks, level.count);
-      write(level.origins, surface.levels[k - 1].origins, level.count);
-    }
-    write(header.brick_index, surface.brick_index,
-          std::uint64_t{header.bricks[0]} * header.bricks[1] * header.bricks[2]);
-    write(header.brick_data, surface.bricks, header.brick_count);
-    write(header.cell_ends, surface.cell_ends, header.cell_count, header.list_bytes);
-    write(header.cell_triangles, surface.cell_triangles, header.entry_count, header.list_bytes);
   }
 
   void write(const MeshHeader& header, const MeshArrays& mesh) {
@@ -89,21 +60,11 @@ void fill_scalars(TreeHeader& header, const TreeArrays& tree) {
 std::uint32_t count_of_blocks(std::size_t blocks) {
   constexpr std::size_t kMostBlocks = std::size_t{1} << 4 * (kMaxLevels - 1);
   if (blocks < 1 || blocks > kMostBlocks)
-    throw Error("asset: a surface must hold at least one triangle and at most 16^6 blocks of them");
+    throw Error("asset: a mesh must hold at least one triangle and at most 16^6 blocks of them");
   return static_cast<std::uint32_t>(blocks);
 }
 
-/// The header of a surface with the counts that place_sections asks for.
-SurfaceHeader placeable(const SurfaceArrays& arrays) {
-  SurfaceHeader header = arrays.header;
-  header.level[0].count = count_of_blocks(arrays.blocks.size());
-  header.brick_count = static_cast<std::uint32_t>(arrays.bricks.size());
-  header.cell_count = static_cast<std::uint32_t>(arrays.cell_ends.size());
-  header.entry_count = static_cast<std::uint32_t>(arrays.cell_triangles.size());
-  return header;
-}
-
-/// The same of a mesh.
+/// The header of a mesh with the counts that place_sections asks for.
 MeshHeader placeable(const MeshArrays& arrays) {
   MeshHeader header = arrays.header;
   header.level[0].count = count_of_blocks(arrays.blocks.size());
@@ -113,11 +74,10 @@ MeshHeader placeable(const MeshArrays& arrays) {
   return header;
 }
 
-/// A surface alone has no spheres, and nothing that is made of them.
+/// A mesh alone has no spheres, and nothing that is made of them.
 bool holds_enough(const AssetArrays& arrays) {
   const std::uint64_t spheres = arrays.inner_spheres.size();
-  if (spheres == 0) return arrays.mesh != nullptr && arrays.surface == nullptr;
-  return spheres <= kMaxSpheres;
+  return spheres == 0 ? arrays.mesh != nullptr : spheres <= kMaxSpheres;
 }
 
 }  // namespace
@@ -133,12 +93,9 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     throw Error("asset: the last level of detail has no spheres");
   std::vector<DetailLevel> details(arrays.details.size());
   std::memcpy(header.magic, kAssetMagic, sizeof(kAssetMagic));
-  SurfaceHeader surface;
-  if (arrays.surface) surface = placeable(*arrays.surface);
   MeshHeader mesh;
   if (arrays.mesh) mesh = placeable(*arrays.mesh);
-  place_sections(header, details.data(), arrays.surface ? &surface : nullptr,
-                 arrays.mesh ? &mesh : nullptr);
+  place_sections(header, details.data(), arrays.mesh ? &mesh : nullptr);
   fill_scalars(header.inner_tree, arrays.inner_tree);
   fill_scalars(header.matched_tree, arrays.matched_tree);
   for (std::size_t i = 0; i < details.size(); ++i) {
@@ -161,10 +118,6 @@ std::vector<std::byte> asset_bytes(const AssetArrays& arrays) {
     const TreeHeader& tree = details[i].matched_tree;
     writer.write(details[i].matched_spheres, arrays.details[i].matched_spheres, tree.sphere_count);
     writer.write(tree, arrays.details[i].matched_tree);
-  }
-  if (arrays.surface) {
-    writer.write(header.surface, std::vector<SurfaceHeader>{surface}, 1);
-    writer.write(surface, *arrays.surface);
   }
   if (arrays.mesh) {
     writer.write(header.mesh, std::vector<MeshHeader>{mesh}, 1);

@@ -35,18 +35,7 @@ struct DetailArrays {
   TreeArrays matched_tree;
 };
 
-/// The solid's surface for queries as it will lie in the file.
-struct SurfaceArrays {
-  SurfaceHeader header;  ///< offsets and counts of arrays are filled in by writing
-  std::vector<SurfaceBlock> blocks;
-  std::vector<TreeLevelArrays> levels;  ///< balls around blocks, from level 1 up; no nodes
-  std::vector<std::uint32_t> brick_index;
-  std::vector<CellBrick> bricks;
-  std::vector<std::uint32_t> cell_ends;  ///< this and the next as wide as the header says
-  std::vector<std::uint32_t> cell_triangles;
-};
-
-/// The solid's surface with all its digits as it will lie in the file.
+/// The solid's mesh as it will lie in the file.
 struct MeshArrays {
   MeshHeader header;  ///< error and rounding; offsets and counts are filled in by writing
   std::vector<double> vertices;  ///< [3 · vertices] unit frame
@@ -65,9 +54,8 @@ struct AssetArrays {
   std::vector<Sphere> matched_spheres;  ///< the same length
   TreeArrays inner_tree;
   TreeArrays matched_tree;
-  std::vector<DetailArrays> details;             ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
-  std::shared_ptr<const SurfaceArrays> surface;  ///< null: none
-  std::shared_ptr<const MeshArrays> mesh;        ///< null: none
+  std::vector<DetailArrays> details;       ///< the i-th from 1 of ⌊n / 4^i⌋ spheres
+  std::shared_ptr<const MeshArrays> mesh;  ///< null: none
 };
 
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "bake/check/check_kept_mesh.h"
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_surface.h"
 #include "bake/check/check_tally.h"
 #include "bake/check/checked_mesh.h"
 #include "mesh/mesh_moments.h"
@@ -188,23 +188,17 @@ class DistanceSolid final : public CheckedSolid {
   Eigen::AlignedBox3d bounds_;
 };
 
-Bounding bounding_of(const MeshSolid& solid) {
-  if (solid.meets_itself()) return Bounding::parts;
-  return solid.may_overlap() ? Bounding::shells : Bounding::all;
-}
-
 /// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
 /// certified against; `surface`: what matched spheres are calibrated by; of a mesh's asset they are
 /// the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
                                  const CheckedSolid& solid, const CheckedMesh& surface,
-                                 const UnitFrame& frame, const MeshMoments& moments,
-                                 const Bounding bounding) {
+                                 const UnitFrame& frame, const MeshMoments& moments) {
   std::vector<Invariant> all;
   all.push_back(check_frame(asset, frame));
   append(all, check_mass(asset, moments, solid));
   append(all, check_bounds(asset, surface));
-  append(all, check_kept_mesh(asset, mesh, frame, surface, bounding));
+  append(all, check_kept_mesh(asset, mesh, frame, surface));
   if (asset.sphere_count == 0) return all;
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
@@ -216,7 +210,6 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
-  append(all, check_surface(asset, surface, bounding));
   return all;
 }
 
@@ -227,8 +220,7 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
   const CheckedMesh surface(mesh, solid.frame());
-  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments(),
-                   bounding_of(solid));
+  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments());
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {
@@ -244,7 +236,7 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
   MeshMoments moments = moments_near(mesh.arrays(), mesh.unit_moments(), made.error / scale);
   moments.volume_error += off / scale / scale / scale;
   return check_all(asset, closed, DistanceSolid(solid, mesh.frame()),
-                   CheckedMesh(closed, mesh.frame()), mesh.frame(), moments, bounding_of(mesh));
+                   CheckedMesh(closed, mesh.frame()), mesh.frame(), moments);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "bake/check/check_surface.h"
+#include "bake/check/check_kept_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <ist/tree_view.h>
 
 #include "bake/check/check_tally.h"
-#include "bake/kept_surface.h"
+#include "bake/kept_mesh.h"
 
 namespace ist {
 namespace {
@@ -19,9 +19,9 @@ using Point = Eigen::Vector3d;
 using Edge = std::array<std::uint32_t, 2>;
 
 /// A mesh of an asset, block by block.
-class KeptMesh {
+class MeshOfAsset {
  public:
-  KeptMesh(const AssetHeader& asset, const MeshHeader& mesh)
+  MeshOfAsset(const AssetHeader& asset, const MeshHeader& mesh)
       : header(mesh),
         blocks(at<MeshBlock>(asset, mesh.level[0].blocks)),
         count(mesh.level[0].count),
@@ -137,7 +137,7 @@ Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double roun
 }
 
 /// Every edge is run as often one way as the other.
-Invariant closed(const KeptMesh& mesh) {
+Invariant closed(const MeshOfAsset& mesh) {
   std::vector<std::pair<Edge, int>> runs;
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t l = 0; l < mesh.blocks[b].triangles; ++l)
@@ -157,7 +157,7 @@ Invariant closed(const KeptMesh& mesh) {
 }
 
 /// Triangles of a block hang together.
-Invariant blocks(const KeptMesh& mesh) {
+Invariant blocks(const MeshOfAsset& mesh) {
   Tally tally;
   for (std::size_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];
@@ -171,7 +171,7 @@ Invariant blocks(const KeptMesh& mesh) {
 
 /// A block's list names all blocks that share a vertex with it, and no other; at a vertex of more
 /// than kMostAround blocks enough of them for all to hang together.
-Invariant neighbours(const KeptMesh& mesh) {
+Invariant neighbours(const MeshOfAsset& mesh) {
   std::vector<std::vector<std::uint32_t>> around(mesh.header.vertex_count);
   for (std::uint32_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i)
@@ -220,7 +220,7 @@ Invariant neighbours(const KeptMesh& mesh) {
 }
 
 /// How far a block's vertices reach out of a box; ≤ 0: not at all.
-double out_of(const KeptMesh& mesh, std::size_t b, const Point& low, const Point& high) {
+double out_of(const MeshOfAsset& mesh, std::size_t b, const Point& low, const Point& high) {
   double most = -HUGE_VAL;
   for (std::uint32_t i = 0; i < mesh.blocks[b].vertices; ++i) {
     const Point p = mesh.vertex(mesh.blocks[b].vertex[i]);
@@ -229,7 +229,7 @@ double out_of(const KeptMesh& mesh, std::size_t b, const Point& low, const Point
   return most;
 }
 
-Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
+Invariant boxes(const AssetHeader& asset, const MeshOfAsset& mesh) {
   Tally sum;
   std::size_t number = 0;
   for (std::uint32_t k = 1; k < mesh.header.level_count; ++k) {
@@ -253,7 +253,7 @@ Invariant boxes(const AssetHeader& asset, const KeptMesh& mesh) {
 }
 
 /// Blocks that hang together are a shell, and there are no others.
-Invariant shells(const KeptMesh& mesh) {
+Invariant shells(const MeshOfAsset& mesh) {
   LaneGroups groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
@@ -273,20 +273,20 @@ Invariant shells(const KeptMesh& mesh) {
 }  // namespace
 
 std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
-                                       const UnitFrame& frame, const CheckedMesh& surface,
-                                       Bounding bounding) {
+                                       const UnitFrame& frame, const CheckedMesh& surface) {
   if (asset.mesh == 0) return {};
-  const KeptMesh mesh(asset, *at<MeshHeader>(asset, asset.mesh));
-  std::vector<Invariant> out;
-  if (static_cast<MeshState>(asset.mesh_state) != MeshState::simplified) {
-    out.push_back(same_triangles(mesh.triangles(), surface.triangles()));
-    out.push_back(rounding(baked, frame, mesh.header.rounding));
-  } else {
-    out = check_near("kept mesh", CheckedMesh(mesh.triangles()), boundary_of(surface, bounding),
-                     mesh.header.error, bounding);
-  }
-  append(out, {closed(mesh), blocks(mesh), neighbours(mesh), boxes(asset, mesh), shells(mesh)});
-  return out;
+  const MeshOfAsset mesh(asset, *at<MeshHeader>(asset, asset.mesh));
+  Tally error;
+  error.add(std::fabs(mesh.header.error - asset.polygonise_error), 0);
+  return {same_triangles(mesh.triangles(), surface.triangles()),
+          rounding(baked, frame, mesh.header.rounding),
+          error.named("mesh error",
+                      "difference of the mesh's error and the solid's polygonisation, unit frame"),
+          closed(mesh),
+          blocks(mesh),
+          neighbours(mesh),
+          boxes(asset, mesh),
+          shells(mesh)};
 }
 
 }  // namespace ist

@@ -138,7 +138,7 @@ Asset box_surface(const Vector3d& half) {
                              (corner & 4) != 0 ? half.z() : -half.z()});
   mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
                     {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  return bake_surface(close_mesh(std::move(mesh), "box"), {}, 1);
+  return bake_surface(close_mesh(std::move(mesh), "box"), 1);
 }
 
 Shape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,

@@ -97,26 +97,20 @@ Setting grid() {
           [](BakeSettings settings) { return std::string(name_of(settings.packing.grid)); }};
 }
 
-std::string show_surface(const SurfaceSettings& surface) {
-  if (!surface.wanted) return "none";
-  if (surface.error > 0) return fmt::to_string(surface.error);
-  return surface.share > 0 ? fmt::format("{}%", 100 * surface.share) : "all";
-}
-
 Setting surface() {
   return {"surface",
-          "all|none|ERROR",
+          "all|none",
           kSurfaceMeaning,
           "all",
-          "Surface kept in the asset: all triangles of the mesh, none, or as few as stay within "
-          "ERROR of it. ERROR is in [u] or a share of the longest side, e.g. 0.1%",
-          SettingKind::text,
+          "Surface kept in the asset: the mesh, or none. Simplify the mesh before the bake for a "
+          "smaller one",
+          SettingKind::choice,
           [](BakeSettings& settings, const std::string& text) {
-            const std::optional<SurfaceSettings> surface = parse_surface(text);
-            if (surface) settings.packing.surface = *surface;
-            return surface.has_value();
+            const std::optional<bool> keep = parse_surface(text);
+            if (keep) settings.packing.keep_mesh = *keep;
+            return keep.has_value();
           },
-          [](BakeSettings settings) { return show_surface(settings.packing.surface); }};
+          [](BakeSettings settings) { return settings.packing.keep_mesh ? "all" : "none"; }};
 }
 
 template <class Of>
@@ -288,7 +282,7 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
 std::optional<SettingFault> surface_only_fault(const BakeSettings& settings,
                                                const std::set<std::string>& own,
                                                const std::string& prefix) {
-  if (!settings.packing.surface.wanted)
+  if (!settings.packing.keep_mesh)
     return SettingFault{"surface-only", "contradicts " + prefix + "surface none"};
   for (const Setting& setting : settings_list()) {
     if (setting.name == "surface") break;  // what stands before it, is of packing
@@ -343,18 +337,8 @@ std::string describe_exactly(const BakeSettings& settings) {
   return text;
 }
 
-std::optional<SurfaceSettings> parse_surface(const std::string& text) {
-  SurfaceSettings surface;
-  surface.wanted = text != "none";
-  if (text == "all" || text == "none") return surface;
-  const bool is_share = text.ends_with('%');
-  const Range range = {.least = 0,
-                       .most = is_share ? 1 : std::numeric_limits<double>::infinity(),
-                       .without_least = true,
-                       .without_most = is_share};
-  if (!take_number(text, range, is_share, is_share ? surface.share : surface.error))
-    return std::nullopt;
-  return surface;
+std::optional<bool> parse_surface(const std::string& text) {
+  return text == "all" || text == "none" ? std::optional(text == "all") : std::nullopt;
 }
 
 const char* name_of(GridMode mode) noexcept {
@@ -369,8 +353,8 @@ const char* name_of(MeshState state) noexcept {
       return "own";
     case MeshState::resolved:
       return "resolved";
-    case MeshState::simplified:
-      return "simplified";
+    case MeshState::polygonised:
+      return "polygonised";
     case MeshState::unresolved:
       return "unresolved";
     default:

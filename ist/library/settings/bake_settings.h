@@ -87,9 +87,8 @@ inline constexpr std::pair<const char*, GridMode> kGridModes[] = {
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(MeshState state) noexcept;
 
-/// "all", "none", or how far the surface may be off: 0.5, or 0.1% of the size. Nothing for others.
-std::optional<SurfaceSettings> parse_surface(const std::string& text);
-inline constexpr const char* kSurfaceMeaning =
-    "all, none, a finite number above 0, or a share above 0% and below 100%";
+/// Whether "all" or "none"; nothing for others.
+std::optional<bool> parse_surface(const std::string& text);
+inline constexpr const char* kSurfaceMeaning = "one of all, none";
 
 }  // namespace ist

@@ -8,7 +8,6 @@
 #include "query/asset/content_hash.h"
 #include "query/asset/sound_mass.h"
 #include "query/asset/sound_mesh.h"
-#include "query/asset/sound_surface.h"
 #include "query/asset/sound_values.h"
 
 namespace ist {
@@ -75,29 +74,9 @@ bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMax
   return std::memcmp(a, b, sizeof(a)) == 0;
 }
 
-/// As sound_sections, of the surface, which is laid out too; `expected` has been without one.
-bool sound_surface_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
-                            SurfaceHeader& surface) noexcept {
-  if (header.surface != expected.file_bytes ||
-      header.file_bytes < expected.file_bytes + sizeof(SurfaceHeader))
-    return false;
-  const SurfaceHeader& found = *at<SurfaceHeader>(header, header.surface);
-  if (!sound_surface_counts(found)) return false;
-  std::copy_n(found.bricks, 3, surface.bricks);
-  surface.brick_count = found.brick_count;
-  surface.cell_count = found.cell_count;
-  surface.entry_count = found.entry_count;
-  surface.list_bytes = found.list_bytes;
-  surface.level[0].count = found.level[0].count;
-  place_sections(expected, details, &surface);
-  return surface.level_count == found.level_count && same_levels(surface.level, found.level) &&
-         surface.brick_index == found.brick_index && surface.brick_data == found.brick_data &&
-         surface.cell_ends == found.cell_ends && surface.cell_triangles == found.cell_triangles;
-}
-
-/// As sound_surface_sections, of the mesh; `surface`: laid out before it, null if there is none.
-bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, DetailLevel* details,
-                         SurfaceHeader* surface) noexcept {
+/// As sound_sections, of the mesh, which is laid out too; `expected` has been without one.
+bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
+                         DetailLevel* details) noexcept {
   if (header.mesh != expected.file_bytes ||
       header.file_bytes < expected.file_bytes + sizeof(MeshHeader))
     return false;
@@ -108,7 +87,7 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, Detai
   mesh.shell_count = found.shell_count;
   mesh.neighbour_count = found.neighbour_count;
   mesh.level[0].count = found.level[0].count;
-  place_sections(expected, details, surface, &mesh);
+  place_sections(expected, details, &mesh);
   return mesh.level_count == found.level_count && same_levels(mesh.level, found.level) &&
          mesh.vertices == found.vertices && mesh.shells == found.shells &&
          mesh.neighbours == found.neighbours;
@@ -116,14 +95,13 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected, Detai
 
 /// An asset holds spheres, or a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
-  if (header.sphere_count == 0)
-    return header.mesh != 0 && header.surface == 0 && header.detail_count == 0;
+  if (header.sphere_count == 0) return header.mesh != 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&
          detail_spheres(header.sphere_count, header.detail_count) >= 1;
 }
 
-/// Offsets and counts are a function of the counts of spheres and details and those of the surface
-/// and the mesh: nothing else is accepted.
+/// Offsets and counts are a function of the counts of spheres and details and those of the mesh:
+/// nothing else is accepted.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (!sound_counts(header)) return false;
   AssetHeader expected;
@@ -136,12 +114,7 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
            a.sphere_count == b.sphere_count && a.level_count == b.level_count &&
            same_levels(a.level, b.level);
   };
-  SurfaceHeader surface;
-  if (header.surface != 0 && !sound_surface_sections(header, expected, details, surface))
-    return false;
-  if (header.mesh != 0 &&
-      !sound_mesh_sections(header, expected, details, header.surface != 0 ? &surface : nullptr))
-    return false;
+  if (header.mesh != 0 && !sound_mesh_sections(header, expected, details)) return false;
   if (expected.file_bytes != bytes || expected.details != header.details) return false;
   const DetailLevel* const found = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i)
@@ -158,7 +131,7 @@ bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
 bool sound_state(const AssetHeader& header) noexcept {
   const auto state = static_cast<MeshState>(header.mesh_state);
   if (header.mesh == 0) return state == MeshState::none || state == MeshState::unresolved;
-  return state == MeshState::own || state == MeshState::resolved || state == MeshState::simplified;
+  return state == MeshState::own || state == MeshState::resolved || state == MeshState::polygonised;
 }
 
 bool sound_values(const AssetHeader& header) noexcept {
@@ -175,8 +148,6 @@ bool sound_values(const AssetHeader& header) noexcept {
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
   if (!is_finite_sum(header.measured_error) || header.worst_partner >= kTrialPartners) return false;
-  if (header.surface != 0 && !sound_surface(header, *at<SurfaceHeader>(header, header.surface)))
-    return false;
   if (!is_finite_sum(header.counted_twice) || !sound_state(header)) return false;
   if (header.mesh != 0 && !sound_mesh(header, *at<MeshHeader>(header, header.mesh))) return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
@@ -228,18 +199,6 @@ double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : hea
 
 double TreeView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
-}
-
-bool TreeView::has_surface() const noexcept { return header_ != nullptr && header_->surface != 0; }
-
-double TreeView::surface_error() const noexcept {
-  return has_surface()
-             ? std::ldexp(at<SurfaceHeader>(*header_, header_->surface)->error, header_->exponent)
-             : 0;
-}
-
-std::uint32_t TreeView::surface_triangles() const noexcept {
-  return has_surface() ? at<SurfaceHeader>(*header_, header_->surface)->triangle_count : 0;
 }
 
 bool TreeView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }

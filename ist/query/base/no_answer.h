@@ -20,13 +20,11 @@ inline bool lacks_spheres(const TreeView& tree) noexcept {
   return !tree.empty() && tree.sphere_count() == 0;
 }
 inline bool lacks_spheres(const PlacedTree& placed) noexcept { return lacks_spheres(placed.tree); }
-inline bool lacks_spheres(const PlacedField& placed) noexcept {
-  const MeshField* const mesh = std::get_if<MeshField>(&placed.field);
-  return mesh != nullptr && lacks_spheres(mesh->tree);
-}
-template <class Solid>
-bool lack_spheres(const Solid& a, const PlacedTree& b) noexcept {
+inline bool lack_spheres(const PlacedTree& a, const PlacedTree& b) noexcept {
   return lacks_spheres(a) || lacks_spheres(b);
+}
+inline bool lack_spheres(const PlacedField&, const PlacedTree& b) noexcept {
+  return lacks_spheres(b);
 }
 
 /// `why`: not_held or invalid_input.

@@ -168,8 +168,8 @@ ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_
   fit->grain_b = found.grain_b;
   fit->ratio = found.ratio;
   fit->a_is_coarser = found.a_is_coarser ? 1 : 0;
-  fit->has_surface = found.has_surface ? 1 : 0;
-  fit->needs_surface = found.needs_surface ? 1 : 0;
+  fit->has_mesh = found.has_mesh ? 1 : 0;
+  fit->needs_mesh = found.needs_mesh ? 1 : 0;
   fit->fits = found.fits() ? 1 : 0;
   return IST_OK;
 }

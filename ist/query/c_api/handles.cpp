@@ -123,13 +123,10 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   TreeView view;
   const ist_status_t status = view_of(tree, view);
   if (status != IST_OK) return status;
-  info->has_surface = view.has_surface() ? 1 : 0;
   info->spheres = view.sphere_count();
   info->volume = view.volume();
   info->coverage = view.coverage();
   info->protrusion = view.protrusion();
-  info->surface_error = view.surface_error();
-  info->surface_triangles = view.surface_triangles();
   info->details = info->spheres == 0 ? 0 : view.header().detail_count + 1;
   static_assert(IST_MESH_UNRESOLVED == static_cast<int>(ist::MeshState::unresolved));
   info->mesh_triangles = view.mesh_triangles();
@@ -192,7 +189,7 @@ ist_status_t ist_deadline_limit(const ist_deadline_t* deadline,
   if (status != IST_OK) return status;
   deadline_in(*deadline).limit(limited);
   settings->pair_budget = limited.pair_budget;
-  settings->surface = static_cast<ist_surface_use_t>(limited.surface);
+  settings->spheres_only = limited.spheres_only ? 1 : 0;
   return IST_OK;
 }
 

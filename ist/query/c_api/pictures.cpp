@@ -6,7 +6,6 @@
 
 #include "query/asset/mesh_parts.h"
 #include "query/asset/sphere_tree.h"
-#include "query/asset/surface_tree.h"
 #include "query/c_api/structs.h"
 
 // What an asset holds, number by number, for who cannot read its layout; and lenses.
@@ -71,24 +70,6 @@ ist_status_t get_balls(const TreeView& view, const ist_ball_set_t& set, ist_ball
   return IST_OK;
 }
 
-void get_surface(const TreeView& view, ist_surface_t& out) noexcept {
-  const SurfaceTree surface = surface_tree(view);
-  const OwnFrame frame(view.header());
-  for (std::uint32_t b = 0; b < surface.level[0].count; ++b) {
-    const SurfaceBlock& block = surface.blocks[b];
-    const std::size_t first = out.vertex_count;
-    for (std::uint32_t v = 0; v < block.vertices; ++v, ++out.vertex_count)
-      if (out.vertex_count < out.vertex_capacity)
-        frame.place({block.x[v], block.y[v], block.z[v]}, out.vertices[out.vertex_count]);
-    for (std::uint32_t t = 0; t < block.triangles; ++t, ++out.triangle_count)
-      if (out.triangle_count < out.triangle_capacity)
-        for (int k = 0; k < 3; ++k)
-          out.triangles[out.triangle_count][k] =
-              static_cast<std::uint32_t>(first + block.corner[k][t]);
-  }
-}
-
-/// The kept mesh of an asset of a surface alone.
 void get_mesh(const TreeView& view, ist_surface_t& out) noexcept {
   const MeshParts mesh(view.header(), *at<MeshHeader>(view.header(), view.header().mesh));
   const OwnFrame frame(view.header());
@@ -147,8 +128,7 @@ ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface
     return IST_NULL_POINTER;
   ist::TreeView view;
   status = view_of(tree, view);
-  if (status == IST_OK && (view.has_surface() || view.has_mesh()))
-    (view.has_surface() ? get_surface : get_mesh)(view, *surface);
+  if (status == IST_OK && view.has_mesh()) get_mesh(view, *surface);
   return status;
 }
 

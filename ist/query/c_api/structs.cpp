@@ -4,11 +4,9 @@ namespace ist::c_api {
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept {
   if (given == nullptr) return IST_OK;
   if (given->size != sizeof *given) return IST_WRONG_SIZE;
-  if (given->measure < IST_MATCHED || given->measure > IST_EXACT ||
-      given->surface < IST_SURFACE_AUTOMATIC || given->surface > IST_SURFACE_ALWAYS)
-    return IST_INVALID_INPUT;
+  if (given->measure < IST_MATCHED || given->measure > IST_EXACT) return IST_INVALID_INPUT;
   settings.measure = static_cast<Measure>(given->measure);
-  settings.surface = static_cast<SurfaceUse>(given->surface);
+  settings.spheres_only = given->spheres_only != 0;
   settings.pair_budget = given->pair_budget;
   settings.max_visits = given->max_visits;
   settings.relative_error = given->relative_error;
@@ -88,12 +86,6 @@ ist_status_t read(const ist_field_t& given, Field& field) noexcept {
       if (given.as.function.sample == nullptr) return IST_NULL_POINTER;
       field = FunctionField{sample, &given, given.as.function.error};
       return IST_OK;
-    case IST_MESH: {
-      MeshField mesh;
-      const ist_status_t status = view_of(given.as.mesh.tree, mesh.tree);
-      field = mesh;
-      return status;
-    }
     default:
       return IST_INVALID_INPUT;
   }

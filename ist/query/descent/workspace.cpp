@@ -27,7 +27,6 @@ Workspace::Impl::Impl(std::size_t wanted, const MemoryHooks& hooks)
       waiting(hooked_array<WaitingPair>(memory, kWaiting)),
       leaves(hooked<LeafScratch>(memory)),
       masks(hooked_array<std::uint16_t>(memory, capacity)),
-      patches(hooked<PatchCache>(memory)),
       contact(memory),
       exact(capacity, memory) {}
 

@@ -11,7 +11,6 @@
 #include "query/contact/contact_bins.h"
 #include "query/exact/exact_scratch.h"
 #include "query/kernel/placed_blocks.h"
-#include "query/probe/patch_cache.h"
 
 namespace ist {
 
@@ -50,7 +49,6 @@ struct [[gnu::visibility("hidden")]] Workspace::Impl {
   HookedArray<WaitingPair> waiting;  ///< [kWaiting] a stack
   Hooked<LeafScratch> leaves;
   HookedArray<std::uint16_t> masks;  ///< children of a pair's node that meet the other one
-  Hooked<PatchCache> patches;
   ContactBins contact;
   ExactScratch exact;
 #ifndef NDEBUG

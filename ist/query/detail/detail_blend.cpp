@@ -8,8 +8,8 @@
 #include "query/base/solid_bounds.h"
 #include "query/detail/coincident.h"
 #include "query/detail/detail_chain.h"
+#include "query/detail/unlike_sizes.h"
 #include "query/detail/wanted_error.h"
-#include "query/field/pair_overlap.h"
 #include "query/kernel/look_kernel.h"
 
 namespace ist {
@@ -38,12 +38,11 @@ class DetailQueries {
   bool sorts() const noexcept { return largest_ != nullptr; }
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
-  /// the finest level is taken anyway. By lenses alone if it only chooses levels by their cost.
+  /// the finest level is taken anyway.
   Penetration coarse_estimate(const DetailPair& pair) noexcept {
     DescentLimits limits = limits_left();
     limits.keep_rounding = true;
-    return counted(by_error(settings_) ? overlap(pair).by(method_of(pair), limits)
-                                       : overlap(pair).by_lenses(limits));
+    return counted(sum(pair, limits));
   }
 
   /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
@@ -65,8 +64,7 @@ class DetailQueries {
 
   /// Whether asking a pair of levels is no more than its coarse estimate.
   bool is_estimate(const DetailPair& pair, bool most) const noexcept {
-    return !(most && sorts()) && (has_exact_ || coincidence_weight_of(pair).weight == 0) &&
-           (by_error(settings_) || !method_of(pair).surface);
+    return !(most && sorts()) && (has_exact_ || coincidence_weight_of(pair).weight == 0);
   }
 
   /// The exact measure within what is left of the visits.
@@ -98,23 +96,6 @@ class DetailQueries {
   }
 
  private:
-  PairMethod method_of(const DetailPair& pair, SurfaceUse use) const noexcept {
-    return pair_method(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
-                       pose_, use);
-  }
-
-  /// The exact measure stands in where surfaces would help out lenses.
-  SurfaceUse use_of(const DetailPair& pair) const noexcept {
-    return has_exact_ && settings_.surface == SurfaceUse::automatic &&
-                   method_of(pair, SurfaceUse::automatic).lenses
-               ? SurfaceUse::never
-               : settings_.surface;
-  }
-
-  PairMethod method_of(const DetailPair& pair) const noexcept {
-    return method_of(pair, use_of(pair));
-  }
-
   /// Nothing but the roots is looked at once visits are spent.
   DescentLimits limits_left() const noexcept {
     DescentLimits limits = limits_of(settings_);
@@ -122,9 +103,9 @@ class DetailQueries {
     return limits;
   }
 
-  PairOverlap overlap(const DetailPair& pair) const noexcept {
-    return {placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b),
-            pose_,     *workspace_.impl()};
+  Penetration sum(const DetailPair& pair, const DescentLimits& limits) const noexcept {
+    return lens_sum(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b), pose_,
+                    limits, *workspace_.impl());
   }
 
   Penetration counted(const Penetration& answer) noexcept {
@@ -136,8 +117,7 @@ class DetailQueries {
   Penetration descend(const DetailPair& pair, bool most, bool keep_rounding) noexcept {
     DescentLimits limits = limits_left();
     limits.keep_rounding = keep_rounding;
-    return counted(most && sorts() ? largest_->level(pair, use_of(pair), limits)
-                                   : overlap(pair).by(method_of(pair), limits));
+    return counted(most && sorts() ? largest_->level(pair, limits) : sum(pair, limits));
   }
 
   const PlacedTree& placed_a_;

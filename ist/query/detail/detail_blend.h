@@ -11,9 +11,8 @@ namespace ist {
 /// Sums the part of a blend with the largest weight, once: contact patches sort it into bins.
 class LargestPart {
  public:
-  /// A pair of levels, in place of PairOverlap::by().
-  virtual Penetration level(const DetailPair& pair, SurfaceUse use,
-                            const DescentLimits& limits) noexcept = 0;
+  /// A pair of levels, in place of lens_sum().
+  virtual Penetration level(const DetailPair& pair, const DescentLimits& limits) noexcept = 0;
   /// The exact measure, in place of penetration().
   virtual Penetration exact(const PenetrationSettings& settings) noexcept = 0;
 

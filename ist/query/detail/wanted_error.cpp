@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "query/base/smooth_step.h"
-#include "query/field/pair_overlap.h"
+#include "query/detail/unlike_sizes.h"
 
 namespace ist {
 namespace {
@@ -98,11 +98,8 @@ WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const Relativ
     const TreeHeader& wide_b = matched_tree(asset_b, coarser_b);
     coarser_[i] = detail_pair(coarser_a, LevelCost::of(wide_a), coarser_b, LevelCost::of(wide_b),
                               pose.a_from_b.scale);
-    const PairMethod method = pair_method(a, tree_a, b, tree_b, pose, settings.surface);
     const auto both = [&](double of_a, double of_b) {
-      return method.lenses     ? std::sqrt((of_a * of_a + of_b * of_b) / 2)
-             : method.b_probes ? of_b
-                               : of_a;
+      return std::sqrt((of_a * of_a + of_b * of_b) / 2);
     };
     wider_[i] = both(wide_a.mean_radius, wide_b.mean_radius * pose.a_from_b.scale) /
                     both(tree_a.mean_radius, tree_b.mean_radius * pose.a_from_b.scale) -

@@ -201,10 +201,11 @@ MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept
   return best;
 }
 
-MeshFoot nearest_on(const MeshTree& mesh, const Point& p) noexcept {
+MeshFoot nearest_on(const MeshTree& mesh, const Point& p, double limit) noexcept {
   // What is no further by more than roundings need not be looked at: far away all is as near.
   constexpr double kNearer = 1 - 4e-15;
   MeshFoot best;
+  best.squared = limit * limit;
   for (NodeStack stack(mesh); !stack.empty();) {
     const WaitingNode node = stack.pop();
     if (!(node.key < kNearer * best.squared)) continue;

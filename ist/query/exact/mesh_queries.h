@@ -46,13 +46,13 @@ struct MeshHit {
 /// Along the way from p to q, unit frame. Signs are exact: no way slips through an edge or vertex.
 MeshHit first_hit(const MeshTree& mesh, const exact::Point& p, const exact::Point& q) noexcept;
 
-/// The point of a mesh that is nearest to p, unit frame.
+/// The point of a mesh that is nearest to p, unit frame; none, if all are as far as `limit`.
 struct MeshFoot {
   double squared = HUGE_VAL;  ///< distance
   exact::Point at = {};
   std::uint32_t triangle = ~0u;  ///< 16 · block + lane; of equally near ones any
   exact::Point normal = {};      ///< outward, twice the area long
 };
-MeshFoot nearest_on(const MeshTree& mesh, const exact::Point& p) noexcept;
+MeshFoot nearest_on(const MeshTree& mesh, const exact::Point& p, double limit = HUGE_VAL) noexcept;
 
 }  // namespace ist

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "query/probe/surface_distance.h"
+#include "query/base/relative_pose.h"
+#include "query/exact/nearest_points.h"
 
 namespace ist {
 namespace {
@@ -115,7 +116,7 @@ double HeightShape::surface(double x, double y) noexcept {
 
 FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
   const double gap = x.z() - surface(x.x(), x.y());
-  const double at[3] = {x.x(), x.y(), x.z()};
+  const exact::Point at = {x.x(), x.y(), x.z()};
   Eigen::Vector3d point(x.x(), x.y(), x.z() - gap);
   double best2 = gap * gap;
   const std::int64_t last[2] = {std::int64_t{columns} - 2, std::int64_t{rows} - 2};
@@ -125,18 +126,19 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
         std::clamp(std::floor(x[k] / spacing[k]), 0.0, static_cast<double>(last[k])));
   const auto try_cell = [&](std::int64_t i, std::int64_t j) {
     if (i < 0 || j < 0 || i > last[0] || j > last[1]) return;
-    const auto corner = [&](std::int64_t a, std::int64_t b, double(&p)[3]) {
-      p[0] = static_cast<double>(a) * spacing[0];
-      p[1] = static_cast<double>(b) * spacing[1];
-      p[2] = height(a, b);
+    const auto corner = [&](std::int64_t a, std::int64_t b) {
+      return exact::Point{static_cast<double>(a) * spacing[0], static_cast<double>(b) * spacing[1],
+                          height(a, b)};
     };
-    double c[4][3], found[3];
-    corner(i, j, c[0]), corner(i + 1, j, c[1]), corner(i + 1, j + 1, c[2]), corner(i, j + 1, c[3]);
+    const exact::Point c[4] = {corner(i, j), corner(i + 1, j), corner(i + 1, j + 1),
+                               corner(i, j + 1)};
     for (const int other : {1, 2}) {
-      const double d2 = nearest_in_triangle(at, c[0], c[other], c[other + 1], found);
+      const exact::Point found =
+          nearest_on_triangle(at, exact::FlatTriangle(c[0], c[other], c[other + 1]));
+      const double d2 = dot(at - found, at - found);
       if (d2 >= best2) continue;
       best2 = d2;
-      point = Eigen::Vector3d(found[0], found[1], found[2]);
+      point = vector(found);
     }
   };
   // Ring by ring, as long as one may come nearer, all heights being within their bounds.

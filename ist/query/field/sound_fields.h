@@ -42,6 +42,5 @@ inline bool is_sound(const DistanceGridField& f) noexcept {
 inline bool is_sound(const FunctionField& f) noexcept {
   return f.sample != nullptr && is_extent(f.error);
 }
-inline bool is_sound(const MeshField& f) noexcept { return f.tree.has_surface(); }
 
 }  // namespace ist

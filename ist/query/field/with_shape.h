@@ -7,8 +7,7 @@
 
 namespace ist {
 
-/// Runs `use(shape)` with the field's shape; `refuse()` where its numbers are out of range, and for
-/// the surface of an asset, which is no shape.
+/// Runs `use(shape)` with the field's shape; `refuse()` where its numbers are out of range.
 template <class Use, class Refuse>
 auto with_shape(const Field& field, const Use& use, const Refuse& refuse) noexcept {
   const auto run = [&](auto shape) {

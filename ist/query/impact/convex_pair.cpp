@@ -4,7 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "query/probe/surface_distance.h"
+#include "query/base/relative_pose.h"
+#include "query/exact/nearest_points.h"
 
 namespace ist {
 namespace {
@@ -49,14 +50,10 @@ bool edge_crosses(const Vector3d& p, const Vector3d& q, const ConvexPiece& t) no
 
 Vector3d nearest_in_piece(const ConvexPiece& piece, const Vector3d& x) noexcept {
   if (piece.corners == 1) return piece.corner[0];
-  const auto numbers = [](const Vector3d& v, double(&out)[3]) {
-    for (int k = 0; k < 3; ++k) out[k] = v[k];
-  };
-  double at[3], c[3][3], found[3];
-  numbers(x, at);
-  for (int k = 0; k < 3; ++k) numbers(piece.corner[k], c[k]);
-  nearest_in_triangle(at, c[0], c[1], c[2], found);
-  return {found[0], found[1], found[2]};
+  const auto point = [](const Vector3d& v) { return exact::Point{v.x(), v.y(), v.z()}; };
+  const Vector3d* const c = piece.corner;
+  return vector(exact::nearest_on_triangle(
+      point(x), exact::FlatTriangle(point(c[0]), point(c[1]), point(c[2]))));
 }
 
 NearestPoints nearest_points(const ConvexPiece& a, const ConvexPiece& b) noexcept {

@@ -52,7 +52,7 @@ class FieldSearch {
       const NodeKey node = NodeKey::of(b);
       if (node.level != kSphereLevel) {
         look_at_node(node, at);
-      } else if (b_.surface() == nullptr) {
+      } else if (b_.mesh() == nullptr) {
         look_at_sphere(node, at);
       } else if constexpr (kConvex<Shape>) {
         look_at_triangle(node, at);

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "query/asset/sphere_tree.h"
-#include "query/asset/surface_tree.h"
 #include "query/base/relative_pose.h"
+#include "query/exact/mesh_tree.h"
 
 namespace ist {
 
@@ -26,8 +26,8 @@ struct PointHull {
   std::uint32_t count = 0;
 };
 
-/// What of a solid is looked at while it moves, as a tree of balls: the triangles of the surface in
-/// its asset, or the cover balls of its inner spheres. Unit frame.
+/// What of a solid is looked at while it moves, as a tree of balls: the triangles of its mesh or,
+/// where its asset keeps none, the cover balls of its inner spheres. Unit frame.
 ///
 /// A node is named by a level and a number, as in SphereTree; at kSphereLevel it is one triangle or
 /// sphere, and the node of the top level is the whole.
@@ -36,10 +36,10 @@ class ImpactSide {
   explicit ImpactSide(const TreeView& view) noexcept;
 
   /// Null if the asset has none.
-  const SurfaceTree* surface() const noexcept { return surface_ ? &*surface_ : nullptr; }
-  double surface_error() const noexcept { return error_; }
+  const MeshTree* mesh() const noexcept { return mesh_ ? &*mesh_ : nullptr; }
+  double mesh_error() const noexcept { return error_; }
 
-  int top() const noexcept { return surface_ ? surface_->top : spheres_.top; }
+  int top() const noexcept { return mesh_ ? mesh_->top : spheres_.top; }
 
   /// Nodes below a node, at most kWidth, whose numbers go on from kWidth · number.
   std::uint32_t children(int level, std::uint32_t number) const noexcept;
@@ -48,7 +48,7 @@ class ImpactSide {
   NodeBall ball(int level, std::uint32_t number) const noexcept;
 
   /// Whether a node is known by more than its ball: blocks of triangles, single ones, spheres.
-  bool has_hull(int level) const noexcept { return level <= (surface_ ? 0 : kSphereLevel); }
+  bool has_hull(int level) const noexcept { return level <= (mesh_ ? 0 : kSphereLevel); }
   /// What the solid has at a node lies within beyond(…) of this hull, the ball's centre if there is
   /// none.
   PointHull hull(int level, std::uint32_t number) const noexcept;
@@ -59,11 +59,11 @@ class ImpactSide {
 
  private:
   SphereTree spheres_;
-  std::optional<SurfaceTree> surface_;
-  double error_ = 0;  ///< of the surface
+  std::optional<MeshTree> mesh_;
+  double error_ = 0;  ///< of the mesh
 };
 
-/// Whether something of B lies inside A's surface, where B's own meets it nowhere.
-bool holds_part(const SurfaceTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
+/// Whether something of B lies inside A's mesh, where B's surface meets it nowhere.
+bool holds_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
 
 }  // namespace ist

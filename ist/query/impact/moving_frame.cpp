@@ -41,7 +41,11 @@ MovingBody body(const Pose& pose, double scale, const Motion& motion, const Asse
     body.centre[k] = std::ldexp(motion.about[k] - asset->centre[k], -asset->exponent);
   const TreeHeader& tree = asset->inner_tree;
   const Vector3d middle(tree.root[0], tree.root[1], tree.root[2]);
-  const double error = asset->surface != 0 ? at<SurfaceHeader>(*asset, asset->surface)->error : 0;
+  double error = 0;
+  if (asset->mesh != 0) {
+    const MeshHeader& mesh = *at<MeshHeader>(*asset, asset->mesh);
+    error = mesh.error + mesh.rounding;
+  }
   body.reach =
       body.unit * ((middle - body.centre).norm() + std::max(tree.root[3], tree.root_cover) + error);
   return body;
@@ -52,7 +56,7 @@ bool usable(const Motion& motion) noexcept {
          motion.about.allFinite();
 }
 
-/// `asset_a`: null for a field that is no mesh.
+/// `asset_a`: null for a field.
 std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const AssetHeader* asset_a,
                                     const PlacedTree& b, const std::optional<RelativePose>& start,
                                     const Motions& motions, double duration) noexcept {

@@ -74,7 +74,7 @@ Placement place(const MovingFrame& frame, double time) noexcept;
 /// Empty if poses or motions are not usable.
 std::optional<MovingFrame> moving_frame(const PlacedTree& a, const PlacedTree& b,
                                         const Motions& motions, double duration) noexcept;
-/// A's unit frame is its own, unless it is the surface of an asset.
+/// A's unit frame is its own.
 std::optional<MovingFrame> moving_frame(const PlacedField& a, const PlacedTree& b,
                                         const Motions& motions, double duration) noexcept;
 

@@ -5,86 +5,12 @@
 #include <hwy/foreach_target.h>
 
 #include "query/probe/feet-inl.h"
-#include "query/probe/sides.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], double radius) {
   return feet_of<false>(patch, centre, radius, nullptr, nullptr, nullptr);
-}
-
-std::uint32_t odd_ways_of(const SurfacePatch& patch, std::uint32_t triangles,
-                          const double (&start)[3], const ProbeBalls& balls, std::uint32_t wanted) {
-  const LaneTag<double> d;
-  using V = hn::Vec<decltype(d)>;
-  const V zero = hn::Zero(d);
-  double way[3];  // from the start to the balls' origin
-  for (int k = 0; k < 3; ++k) way[k] = balls.origin[k] - start[k];
-  std::uint32_t odd = 0;
-  for (; triangles != 0; triangles &= triangles - 1) {
-    const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles);
-    double p[3][3];
-    for (int c = 0; c < 3; ++c)
-      for (int k = 0; k < 3; ++k) p[c][k] = patch.corner[c][k][t] - start[k];
-    const double nx = patch.n[0][t], ny = patch.n[1][t], nz = patch.n[2][t];
-    const double h0 = -((p[0][0] * nx + p[0][1] * ny) + p[0][2] * nz);       // of the start
-    const double height = h0 + ((way[0] * nx + way[1] * ny) + way[2] * nz);  // of the origin
-    std::uint32_t above = 0;
-    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      const V h = hn::Set(d, height) + ((hn::Load(d, balls.x + lane) * hn::Set(d, nx) +
-                                         hn::Load(d, balls.y + lane) * hn::Set(d, ny)) +
-                                        hn::Load(d, balls.z + lane) * hn::Set(d, nz));
-      above |= mask_bits(d, h > zero) << lane;
-    }
-    const std::uint32_t across = (h0 > 0 ? ~above : above) & wanted;
-    if (across == 0) continue;
-    // Planes through the start and an edge: those of two triangles that share it are opposite,
-    // digit for digit. A way in the plane is taken for one that ends a little further along x,
-    // less along y, least along z; that is one way for all triangles, even around a corner.
-    std::uint32_t all = 0xffff, none = 0xffff;
-    for (int c = 0; c < 3; ++c) {
-      const double(&a)[3] = p[c];
-      const double(&b)[3] = p[(c + 1) % 3];
-      double normal[3];
-      cross(a, b, normal);
-      std::uint32_t left = 0;
-      if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0) {
-        // The start is in line with the edge: it is moved likewise, by still less.
-        for (std::size_t i = 0; i < kWidth; ++i) {
-          const double to[3] = {balls.x[i] + way[0], balls.y[i] + way[1], balls.z[i] + way[2]};
-          left |= passes_left_in_line(to, a, b) ? 1u << i : 0u;
-        }
-        all &= left;
-        none &= ~left;
-        if (((all | none) & across) == 0) break;
-        continue;
-      }
-      const bool tie = first_is_positive(normal);
-      const V plane[3] = {hn::Set(d, normal[0]), hn::Set(d, normal[1]), hn::Set(d, normal[2])};
-      for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-        const V x = hn::Load(d, balls.x + lane) + hn::Set(d, way[0]);
-        const V y = hn::Load(d, balls.y + lane) + hn::Set(d, way[1]);
-        const V z = hn::Load(d, balls.z + lane) + hn::Set(d, way[2]);
-        const V side = (x * plane[0] + y * plane[1]) + z * plane[2];
-        left |= mask_bits(d, tie ? side >= zero : side > zero) << lane;
-      }
-      all &= left;
-      none &= ~left;
-      if (((all | none) & across) == 0) break;
-    }
-    odd ^= (all | none) & across;
-  }
-  return odd;
-}
-
-std::uint32_t balls_near_of(const SurfacePatch& patch, std::uint32_t triangles,
-                            const ProbeBalls& balls) {
-  std::uint32_t near = 0;
-  for (; triangles != 0; triangles &= triangles - 1)
-    near |= feet_near<false>(patch, hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles), balls, nullptr,
-                             nullptr, nullptr);
-  return near;
 }
 
 void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
@@ -111,23 +37,6 @@ void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
     hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, balls.z + lane);
     hn::Store(hn::Max(load_as<double>(d, from.r + lane), hn::Zero(d)) * scale, d, balls.r + lane);
   }
-}
-
-std::uint32_t balls_within_of(const ProbeBalls& balls, const double (&point)[3], double distance) {
-  const LaneTag<double> d;
-  using V = hn::Vec<decltype(d)>;
-  const V px = hn::Set(d, point[0] - balls.origin[0]);
-  const V py = hn::Set(d, point[1] - balls.origin[1]);
-  const V pz = hn::Set(d, point[2] - balls.origin[2]);
-  std::uint32_t near = 0;
-  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const V x = hn::Load(d, balls.x + lane) - px;
-    const V y = hn::Load(d, balls.y + lane) - py;
-    const V z = hn::Load(d, balls.z + lane) - pz;
-    const V reach = hn::Load(d, balls.r + lane) + hn::Set(d, distance);
-    near |= mask_bits(d, ((x * x + y * y) + z * z) <= reach * reach) << lane;
-  }
-  return near;
 }
 
 void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
@@ -195,20 +104,7 @@ namespace ist {
 
 HWY_EXPORT(make_patch_of);
 HWY_EXPORT(near_of);
-HWY_EXPORT(odd_ways_of);
-HWY_EXPORT(balls_near_of);
-HWY_EXPORT(balls_within_of);
 HWY_EXPORT(place_probes_of);
-
-std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
-                           double distance) noexcept {
-  return HWY_DYNAMIC_DISPATCH(balls_within_of)(balls, point, distance);
-}
-
-std::uint32_t balls_near(const SurfacePatch& patch, std::uint32_t triangles,
-                         const ProbeBalls& balls) noexcept {
-  return HWY_DYNAMIC_DISPATCH(balls_near_of)(patch, triangles, balls);
-}
 
 void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
                   ProbeBalls& balls) noexcept {
@@ -220,26 +116,8 @@ std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3
   return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
 }
 
-std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles, const double (&start)[3],
-                       const ProbeBalls& balls, std::uint32_t wanted) noexcept {
-  return HWY_DYNAMIC_DISPATCH(odd_ways_of)(patch, triangles, start, balls, wanted);
-}
-
 void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
   HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
-}
-
-void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept {
-  TriangleCorners corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    for (std::size_t lane = 0; lane < kWidth; ++lane) {
-      const std::size_t v = block.corner[k][lane];
-      corners.x[k][lane] = static_cast<double>(block.x[v]);
-      corners.y[k][lane] = static_cast<double>(block.y[v]);
-      corners.z[k][lane] = static_cast<double>(block.z[v]);
-    }
-  }
-  make_patch(corners, patch);
 }
 
 }  // namespace ist

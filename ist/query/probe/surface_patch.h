@@ -29,8 +29,6 @@ struct alignas(64) TriangleCorners {
 
 void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept;
 
-void make_patch(const SurfaceBlock& block, SurfacePatch& patch) noexcept;
-
 /// The triangles that come near a ball, a bit each: all that reach it, and perhaps others.
 std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
                              double radius) noexcept;
@@ -46,20 +44,5 @@ struct alignas(64) ProbeBalls {
 /// centre of the node; balls that are not there get a radius of 0.
 void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
                   ProbeBalls& balls) noexcept;
-
-/// The balls that come within a distance of a point, a bit each, and perhaps others.
-std::uint32_t balls_within(const ProbeBalls& balls, const double (&point)[3],
-                           double distance) noexcept;
-
-/// The balls that one of the chosen triangles comes near, a bit each: all that it meets, and
-/// perhaps others.
-std::uint32_t balls_near(const SurfacePatch& patch, std::uint32_t triangles,
-                         const ProbeBalls& balls) noexcept;
-
-/// Which ways from `start`, in the surface's frame, to the centres of the `wanted` balls step
-/// through an odd number of the chosen triangles, a bit each. Triangles that share an edge agree on
-/// which of them a way goes through, whatever the rounding.
-std::uint32_t odd_ways(const SurfacePatch& patch, std::uint32_t triangles, const double (&start)[3],
-                       const ProbeBalls& balls, std::uint32_t wanted) noexcept;
 
 }  // namespace ist

@@ -19,12 +19,6 @@ void require(bool in_range, const char* name, double value, const char* range) {
 
 }  // namespace
 
-void check_settings(const SurfaceSettings& s) {
-  require(s.error >= 0 && std::isfinite(s.error), "surface.error", s.error,
-          "finite and not negative (0 = no bound)");
-  require(s.share >= 0 && s.share < 1, "surface.share", s.share, "in [0, 1) (0 = no bound)");
-}
-
 void check_settings(const PackingSettings& s) {
   require(s.max_spheres <= std::numeric_limits<std::uint32_t>::max() / 2, "max_spheres",
           static_cast<double>(s.max_spheres), "below 2^31 (0 = no limit)");
@@ -42,7 +36,6 @@ void check_settings(const PackingSettings& s) {
           "at most 1024 (0 = automatic)");
   require(s.grids.refinements <= kMostGridRefinements, "grids.refinements", s.grids.refinements,
           "at most 10 (negative = automatic)");
-  check_settings(s.surface);
   if (s.max_spheres == 0 && s.target_coverage >= 1 && s.min_radius <= 0 && s.time_limit <= 0)
     throw Error(
         "packing: no limit is set; set max_spheres, a target_coverage below 1, min_radius or "

@@ -8,7 +8,6 @@ namespace ist::packing {
 
 /// Throws Error, naming the setting, its value and its range, unless every setting is in range.
 void check_settings(const PackingSettings& settings);
-void check_settings(const SurfaceSettings& settings);
 
 /// What the settings mean in the unit frame of a solid; `scale`: [u] of one unit-frame unit. Throws
 /// Error if the solid has no volume.

@@ -1,15 +1,11 @@
-#include "bake/kept_surface.h"
-
-#include <tbb/parallel_invoke.h>
+#include "bake/kept_mesh.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <utility>
 
-#include "bake/surface/build_surface.h"
-#include "bake/surface/surface_patches.h"
+#include "bake/mesh/patches.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
@@ -44,7 +40,7 @@ struct Box {
 
 /// Patches in an order whose groups of 16, 256, … lie together.
 std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
-  std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface), true);
+  std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface));
   std::vector<std::array<float, 3>> middles(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Box box;
@@ -311,70 +307,22 @@ double estimate_counted_twice(const MeshSolid& solid) {
   return more > kNothing * solid.unit_volume() ? more : 0;
 }
 
-std::shared_ptr<const MeshArrays> own_mesh(const MeshSolid& solid) {
-  MeshArrays mesh = lay_out_mesh(solid.arrays());
-  mesh.header.rounding = solid.moved();
-  return std::make_shared<const MeshArrays>(std::move(mesh));
-}
-
-/// The triangles of a surface over the doubles that its floats are.
-std::shared_ptr<const MeshArrays> mesh_of(const BuiltSurface& surface) {
-  std::vector<double> vertices;
-  vertices.reserve(3 * surface.mesh.vertices.size());
-  for (const FloatMesh::Vertex& v : surface.mesh.vertices)
-    vertices.insert(vertices.end(), v.begin(), v.end());
-  MeshView view;
-  view.vertices = vertices.data();
-  view.triangles = surface.mesh.triangles.front().data();
-  view.vertex_count = static_cast<std::uint32_t>(surface.mesh.vertices.size());
-  view.triangle_count = static_cast<std::uint32_t>(surface.mesh.triangles.size());
-  MeshArrays mesh = lay_out_mesh(view);
-  mesh.header.error = surface.arrays.header.error;
-  return std::make_shared<const MeshArrays>(std::move(mesh));
-}
-
-std::optional<BuiltSurface> surface_in_time(const MeshSolid& solid, double error,
-                                            const WorkStop& stop) {
-  try {
-    return build_surface(solid, error, stop);
-  } catch (const WorkStop::Stopped&) {
-    return std::nullopt;
-  }
-}
-
 }  // namespace
 
-KeptSurface keep_surface(const MeshSolid& solid, const Resolution& resolution,
-                         const SurfaceSettings& settings, bool with_surface, const WorkStop& stop) {
-  KeptSurface kept;
-  if (!settings.wanted) return kept;
-  kept.asked_error =
-      settings.error > 0 ? settings.error : settings.share * solid.bounds().sizes().maxCoeff();
-  const double error = kept.asked_error / solid.frame().scale();
-  std::optional<BuiltSurface> surface;
-  const auto find_surface = [&] {
-    if (with_surface || error > 0) surface = surface_in_time(solid, error, stop);
-  };
-  const auto find_mesh = [&] {
-    using How = Resolution::How;
-    const double scale = solid.frame().scale();
-    if (resolution.how == How::resolved) {
-      kept.state = MeshState::resolved;
-      kept.counted_twice = resolution.counted_twice / (scale * scale * scale);
-    } else {
-      kept.counted_twice = estimate_counted_twice(solid);
-      kept.state = kept.counted_twice > 0 ? MeshState::unresolved : MeshState::own;
-    }
-    if (kept.state != MeshState::unresolved && error == 0) kept.mesh = own_mesh(solid);
-  };
-  tbb::parallel_invoke(find_surface, find_mesh);
-  if (kept.state != MeshState::unresolved && error > 0) {
-    const bool all = !surface || surface->own;
-    kept.mesh = all ? own_mesh(solid) : mesh_of(*surface);
-    if (!all) kept.state = MeshState::simplified;
+KeptMesh keep_mesh(const MeshSolid& solid, const Resolution& resolution) {
+  KeptMesh kept;
+  const double scale = solid.frame().scale();
+  if (resolution.how == Resolution::How::resolved) {
+    kept.state = MeshState::resolved;
+    kept.counted_twice = resolution.counted_twice / (scale * scale * scale);
+  } else {
+    kept.counted_twice = estimate_counted_twice(solid);
+    kept.state = kept.counted_twice > 0 ? MeshState::unresolved : MeshState::own;
   }
-  if (with_surface && surface)
-    kept.surface = std::make_shared<SurfaceArrays>(std::move(surface->arrays));
+  if (kept.state == MeshState::unresolved) return kept;
+  MeshArrays mesh = lay_out_mesh(solid.arrays());
+  mesh.header.rounding = solid.moved();
+  kept.mesh = std::make_shared<const MeshArrays>(std::move(mesh));
   return kept;
 }
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "bake/surface/float_mesh.h"
+#include "bake/mesh/float_mesh.h"
 
 namespace ist {
 
@@ -22,11 +22,10 @@ struct BlockPatch {
   }
 };
 
-/// Cuts a surface into patches that are full and compact: each grows from a triangle by neighbours
+/// Cuts a mesh into patches that are full and compact: each grows from a triangle by neighbours
 /// that add few vertices and lie near its middle; what is left in small pieces goes together where
-/// it is near, or, where patches are to be `connected`, where they share a vertex besides. Every
-/// triangle is in one patch. Deterministic.
-std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh, bool connected = false);
+/// it is near and shares a vertex. Every triangle is in one patch. Deterministic.
+std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh);
 
 /// An order of points in which neighbours are near each other: their box is halved across its
 /// longest side, again and again, so that every group of 16, 256, … from the start is compact. Ties

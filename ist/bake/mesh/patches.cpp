@@ -1,4 +1,4 @@
-#include "bake/surface/surface_patches.h"
+#include "bake/mesh/patches.h"
 
 #include <algorithm>
 #include <array>
@@ -229,9 +229,8 @@ std::vector<std::uint32_t> united(const BlockPatch& a, const BlockPatch& b) {
   return all;
 }
 
-/// Joins patches that are not full to others near them in space, `connected`: by a vertex.
-std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> patches,
-                               bool connected) {
+/// Joins patches that are not full to others near them that share a vertex.
+std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> patches) {
   std::vector<FloatPoint> middles(patches.size());
   std::vector<double> radii(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
@@ -250,7 +249,7 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
       if (patch.triangles.size() + other.triangles.size() > kWidth) continue;
       const std::vector<std::uint32_t> vertices = united(patch, other);
       if (vertices.size() > kWidth) continue;
-      if (connected && vertices.size() == patch.vertices.size() + other.vertices.size()) continue;
+      if (vertices.size() == patch.vertices.size() + other.vertices.size()) continue;
       const double radius = extent_of(mesh, vertices).radius;
       if (radius < best && radius <= kJoinedRadius * std::max(radii[order[i]], radii[order[j]])) {
         best = radius;
@@ -270,8 +269,8 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
 
 }  // namespace
 
-std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh, bool connected) {
-  return joined(mesh, Growth(mesh).all(), connected);
+std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh) {
+  return joined(mesh, Growth(mesh).all());
 }
 
 }  // namespace ist
