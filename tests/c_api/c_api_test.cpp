@@ -424,7 +424,7 @@ TEST_F(OracleRows, LensesSumToTheVolume) {
     const auto [a, b] = testing::placed(row, 1000);
     for (const Measure measure : {Measure::matched, Measure::inner}) {
       const Penetration whole =
-          penetration(a, b, {.measure = measure, .surface = SurfaceUse::never}, workspace_);
+          penetration(a, b, {.measure = measure, .spheres_only = true}, workspace_);
       std::vector<OverlapLens> lenses(1 << 16);
       const LensSettings settings{.measure = measure};
       const OverlapLenses found = overlap_lenses(a, b, settings, lenses);
@@ -480,7 +480,7 @@ TEST(CApi, PatchesWithoutProtrusion) {
   const ist_placed_t c_a = placed_in_c(tree, a), c_b = placed_in_c(tree, b);
   Workspace workspace;
   ContactPatch patches[16];
-  const ContactSettings settings{.surface = SurfaceUse::never};
+  const ContactSettings settings{.spheres_only = true};
   const std::size_t count = contact_patches(a, b, settings, workspace, patches).count;
   double before = 0, after = 0;
   std::vector<ist_contact_patch_t> c_room(count);
