@@ -219,8 +219,9 @@ class TargetBake {
     while (candidate.errors.size() < poses_.size()) {
       if (!next()) return false;
       const TrialPose& pose = poses_[candidate.errors.size()];
-      const double volume =
-          penetration({tree, {}, 1}, {tree, pose.b_in_a, pose.scale_b}, {}, workspace_).volume;
+      const double volume = penetration({tree, {}, 1}, {tree, pose.b_in_a, pose.scale_b},
+                                        {.spheres_only = true}, workspace_)
+                                .volume;
       candidate.errors.push_back(std::abs(volume / pose.volume - 1));
     }
     while (candidate.other_errors.size() < others_.size()) {
