@@ -290,15 +290,12 @@ void add_assets(py::module_& module) {
              const TreeView& view = self.view();
              return "<ist.Asset: " + std::to_string(view.sphere_count()) + " spheres, volume " +
                     text_of(py::float_(view.volume())) + " u³, mesh of " +
-                    std::to_string(view.mesh_triangles()) + " triangles" +
-                    (view.has_surface() ? "" : ", no surface for queries of spheres") + ">";
+                    std::to_string(view.mesh_triangles()) + " triangles>";
            })
       .def("__str__", [](const Asset& self) { return describe_asset(self.view()); })
       .def("surface", &surface_of,
-           "The surface that queries of spheres use, or the mesh of a surface alone: (n, 3) "
-           "float64 vertices [u] in the mesh's own "
-           "frame, and (m, 3) uint32 triangles, counter-clockwise from outside. A vertex may "
-           "appear in several rows. Raises Error without a surface.")
+           "The kept mesh: (n, 3) float64 vertices [u] in its own frame, and (m, 3) uint32 "
+           "triangles, counter-clockwise from outside. Raises Error without one.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
            "which: 'matched' or 'inner'.")
