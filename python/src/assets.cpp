@@ -294,8 +294,8 @@ void add_assets(py::module_& module) {
            })
       .def("__str__", [](const Asset& self) { return describe_asset(self.view()); })
       .def("surface", &surface_of,
-           "The kept mesh: (n, 3) float64 vertices [u] in its own frame, and (m, 3) uint32 "
-           "triangles, counter-clockwise from outside. Raises Error without one.")
+           "The kept mesh: (n, 3) float64 vertices [u] in the mesh's own frame, and (m, 3) uint32 "
+           "triangles, counter-clockwise from outside. Raises Error where none is kept.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",
            "(n, 4) float64: centre and radius [u], in the mesh's own frame; a copy.\n\n"
            "which: 'matched' or 'inner'.")
