@@ -131,7 +131,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(scales=[[1.0]]), ValueError, r"scales: shape \(1, 1\); wanted a number or \(n,\)"),
     (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
-    (dict(spheres_only="maybe"), TypeError, "incompatible function arguments"),
+    (dict(spheres_only="maybe"), TypeError, "spheres_only: a str; wanted True or False"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
     (dict(a=ist.BallField(2), b=ist.BallField(1)), TypeError, "a, b: two Fields"),
 ])
