@@ -16,7 +16,7 @@
 
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/tree_builder.h"
-#include "bake/surface/build_surface.h"
+#include "bake/kept_mesh.h"
 #include "packing/cover/cover.h"
 #include "report.h"
 #include "support/on_host.h"
@@ -69,7 +69,7 @@ void one_bake(const ClosedMesh& mesh, const PackingSettings& settings, Stages& s
     tree_from_order(inner, covers, order);
     return build_tree_like(calibration.matched, order);
   });
-  stages.time("9 surface", [&] { return build_surface(*solid, 0); });
+  stages.time("9 mesh", [&] { return keep_mesh(*solid, Resolution()); });
 }
 
 }  // namespace

@@ -216,10 +216,8 @@ int measure(Report& report) {
       {"copies nearly in place, none", &dino4k, &dino4k, poses_of_copies(dino4k, 0.02)}, 1e-4,
       many / 10);
 
-  const Asset surface = baked(elephant, "elephant", 1'000, true);
   Ground ground;
-  const Field half_space = HalfSpaceField{}, terrain = ground.terrain(dino4k),
-              mesh = MeshField{surface.view()};
+  const Field half_space = HalfSpaceField{}, terrain = ground.terrain(dino4k);
   const auto in_ground = [&](const std::string& name, const Field& field, double least, double most,
                              double rate) {
     ask("Fields", {name, nullptr, &dino4k, poses_in_ground(dino4k, least, most), rate, 0, &field},
@@ -229,18 +227,6 @@ int measure(Report& report) {
   in_ground("half-space, to any depth", half_space, 0, 1, 50);
   in_ground("half-space, above it", half_space, -1, 0, 0);
   in_ground("terrain, to 10 %", terrain, 0, 0.1, 0);
-  for (const char* const ratio : {"0.03", "0.1", "0.3"})
-    ask("Fields",
-        {std::string("on a mesh, ") + ratio + " of its size", nullptr, &dino4k,
-         small_poses("small_elephant_dino", ratio), ratio == std::string("0.3") ? 0.0 : 20.0, 0,
-         &mesh},
-        1e-6, many);
-  for (const char* const name : {"pen", "deep", "contain", "sep"}) {
-    std::vector<BatchPair> poses = oracle_poses(name);
-    for (BatchPair& pair : poses) pair.b = 0;  // the only tree
-    ask("Fields", {std::string("in a mesh, ") + name, nullptr, &dino4k, poses, 0, 0, &mesh}, 1e-6,
-        for_cpu);
-  }
   Scene near = scenes[3], far = near;
   near.name = "near each other";
   far.name = "ten times as far";

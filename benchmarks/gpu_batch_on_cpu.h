@@ -32,7 +32,7 @@ inline std::vector<PlacedPair> placed(const Scene& scene, std::size_t count) {
 inline double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetration>& answers) {
   const std::vector<PlacedPair> pairs = placed(scene, count);
   PenetrationSettings settings;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   settings.pair_budget = scene.pair_budget;
   std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
   answers.resize(count);
@@ -81,7 +81,7 @@ struct CpuPatches {
       : answers(count), patches(count * most) {
     const std::vector<PlacedPair> pairs = placed(scene, count);
     ContactSettings settings;
-    settings.surface = SurfaceUse::never;
+    settings.spheres_only = true;
     std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
     double best = 1e30;
     for (int k = 0; k < 3; ++k) {

@@ -25,7 +25,7 @@ inline Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_
                    bool surface = false) {
   PackingSettings settings;
   settings.max_spheres = spheres;
-  settings.surface.wanted = surface;
+  settings.keep_mesh = surface;
   return bake(close_mesh(mesh, name), settings);
 }
 

@@ -1,5 +1,5 @@
-// A small solid against a large one, and flat contact: what the surface in an asset is for, beside
-// lenses alone in the same run.
+// A small solid against a large one, and flat contact: lenses alone, the default, which goes over
+// to the meshes, and these alone, in the same run.
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -24,7 +24,6 @@ namespace {
 
 using Eigen::Vector3d;
 using ist::PlacedTree;
-using ist::SurfaceUse;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::testing::degrees_between;
@@ -119,11 +118,9 @@ struct Measured {
   std::size_t nothing = 0;                          ///< rows that read 0 and are not
 };
 
-constexpr std::size_t kMethods = 4;
-constexpr const char* kNames[kMethods] = {"lenses", "surface", "always", "exact"};
-constexpr SurfaceUse kUses[kMethods] = {SurfaceUse::never, SurfaceUse::automatic,
-                                        SurfaceUse::always, SurfaceUse::automatic};
-constexpr std::size_t kExact = 3;  ///< by Measure::exact
+constexpr std::size_t kMethods = 3;
+constexpr const char* kNames[kMethods] = {"lenses", "default", "exact"};
+constexpr std::size_t kLenses = 0, kExact = 2;
 using Methods = std::array<Measured, kMethods>;
 
 /// Asks all rows, each pose between others, all ways by turns; a row's time is the median of its
@@ -146,7 +143,7 @@ std::map<std::string, Methods> measure(const std::vector<Row>& rows, Assets& ass
     std::shuffle(order.begin(), order.end(), random);
     for (std::size_t method = 0; method < kMethods; ++method) {
       ist::PenetrationSettings settings;
-      settings.surface = kUses[method];
+      settings.spheres_only = method == kLenses;
       if (method == kExact) settings.measure = ist::Measure::exact;
       for (const std::size_t i : order) {
         const auto start = std::chrono::steady_clock::now();
@@ -351,22 +348,22 @@ void unseen_pairs(Report& report, Assets& assets, int turns) {
     for (const double ratio : {1.0, 0.3, 0.1, 0.03}) {
       const std::vector<Row> rows = unseen_rows(a, b, ratio, assets);
       for (const auto& [kind, methods] : measure(rows, assets, turns)) {
-        const Measured &lenses = methods[0], &surface = methods[1], &exact = methods[kExact];
+        const Measured &lenses = methods[0], &usual = methods[1], &exact = methods[kExact];
         report.row("Unseen pairs",
                    {{"pair", std::string(a) + ", " + b},
                     {"ratio", ratio},
                     {"rows", rows.size()},
                     {"crossing pairs median", median(exact.pairs)},
                     {"lenses volume median %", median(lenses.volume)},
-                    {"surface volume median %", median(surface.volume)},
-                    {"surface volume p95 %", quantile(surface.volume, 0.95)},
-                    {"surface angle median °", median(surface.angle)},
+                    {"default volume median %", median(usual.volume)},
+                    {"default volume p95 %", quantile(usual.volume, 0.95)},
+                    {"default angle median °", median(usual.angle)},
                     {"lenses median µs", median(lenses.time)},
-                    {"surface median µs", median(surface.time)},
-                    {"surface p95 µs", quantile(surface.time, 0.95)},
+                    {"default median µs", median(usual.time)},
+                    {"default p95 µs", quantile(usual.time, 0.95)},
                     {"exact median µs", median(exact.time)},
                     {"exact p95 µs", quantile(exact.time, 0.95)},
-                    {"exact over surface", median(exact.time) / median(surface.time)}});
+                    {"exact over default", median(exact.time) / median(usual.time)}});
       }
     }
 }
@@ -445,10 +442,10 @@ void flat_rests(Report& report, Assets& assets) {
                    ist::PlacedField{ist::BoxField{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1},
                    body, {}, workspace));
     ist::PenetrationSettings settings;
-    settings.surface = SurfaceUse::never;
+    settings.spheres_only = true;
     add("cube by lenses", ist::penetration(under, body, settings, workspace));
-    settings.surface = SurfaceUse::automatic;
-    add("cube by surface", ist::penetration(under, body, settings, workspace));
+    settings.measure = ist::Measure::exact;
+    add("cube by meshes", ist::penetration(under, body, settings, workspace));
     report.row("Flat rests", row);
   }
   report.remark("Flat rests on a half-space or a box: the volume is off by " +
@@ -464,8 +461,8 @@ int main(int argc, char** argv) {
   const std::size_t spheres = report.quick() ? 1'000 : 4'000;
   const int turns = report.quick() ? 3 : 15;
   report.remark(std::to_string(spheres) +
-                " spheres each. Lenses: SurfaceUse::never; surface: SurfaceUse::automatic; always: "
-                "SurfaceUse::always; exact: Measure::exact; in the same run by turns. Every pose "
+                " spheres each. Lenses: PenetrationSettings::spheres_only; default: the default "
+                "settings; exact: Measure::exact; in the same run by turns. Every pose "
                 "stands between others; the "
                 "time of a pose is the median "
                 "of its " +

@@ -142,7 +142,7 @@ int main(int argc, char** argv) {
     for (const std::size_t n : counts) {
       PackingSettings settings;
       settings.max_spheres = n;
-      settings.surface.wanted = false;
+      settings.keep_mesh = false;
       const Asset asset = bake(mesh, settings);
       double own = 0;
       for (const Builder& builder : kBuilders) {

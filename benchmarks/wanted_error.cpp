@@ -109,7 +109,7 @@ void report_levels(Report& report, const PairOfBodies& pair, const std::vector<s
   std::array<std::vector<double>, 8> of_one;
   for (const std::size_t count : counts) {
     const ist::Asset a = asset_of(*pair.a, count, keep), b = asset_of(*pair.b, count, keep);
-    const Answers got = measure(a, b, pair.rows, {.surface = ist::SurfaceUse::never}, 1);
+    const Answers got = measure(a, b, pair.rows, {.spheres_only = true}, 1);
     for (std::size_t i = 0; i < pair.rows.size(); ++i) {
       const auto spheres = [&](const ist::Asset& asset, double scale) {
         const ist::AssetHeader& header = asset.view().header();

@@ -93,24 +93,22 @@ TEST_F(FieldQuery, APoseThatIsNoPoseSaysWhy) {
   EXPECT_NE(outcome.out.find("invalid_input: tz is nan"), std::string::npos) << outcome.out;
 }
 
-TEST_F(FieldQuery, OfTwoAssetsTheSurfaceIsUsedAsAsked) {
+TEST_F(FieldQuery, OfTwoAssetsOfUnlikeSizesMeshesAnswerUnlessSpheresAloneAreAsked) {
   ASSERT_EQ(ist({"bake", "cube.obj", "-o", "fine.ist", "--spheres", "1000"}).exit_code, 0);
   const auto a = ist::Asset::load(folder_ / "cube.ist");
   const auto b = ist::Asset::load(folder_ / "fine.ist");
   ist::Workspace workspace;
-  const auto expected = [&](ist::SurfaceUse use) {
-    return ist::penetration({a.view(), {}}, {b.view(), {.t = {0.9, 0.1, 0}}}, {.surface = use},
-                            workspace)
+  const auto expected = [&](bool spheres_only) {
+    return ist::penetration({a.view(), {}}, {b.view(), {.t = {0.9, 0.1, 0}}},
+                            {.spheres_only = spheres_only}, workspace)
         .volume;
   };
   const auto answer = [&](const std::vector<std::string>& more) {
     return asked("cube.ist", "fine.ist", "1,0,0,0,0.9,0.1,0", more)["volume"].get<double>();
   };
-  EXPECT_EQ(answer({"--surface", "never"}), expected(ist::SurfaceUse::never));
-  EXPECT_EQ(answer({"--surface", "always"}), expected(ist::SurfaceUse::always));
-  EXPECT_EQ(answer({"--surface", "auto"}), expected(ist::SurfaceUse::automatic));
-  EXPECT_EQ(answer({}), expected(ist::SurfaceUse::automatic));
-  EXPECT_NE(answer({"--surface", "never"}), answer({"--surface", "always"}));
+  EXPECT_EQ(answer({"--spheres-only"}), expected(true));
+  EXPECT_EQ(answer({}), expected(false));
+  EXPECT_NE(answer({"--spheres-only"}), answer({}));
 }
 
 TEST_F(FieldQuery, AFileNamedLikeAFieldIsReadByItsPath) {

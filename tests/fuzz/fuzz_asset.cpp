@@ -85,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return 0;
   }
   static const Asset alone =
-      bake_surface(close_mesh(testing::torus_mesh(1, 0.4, 8, 5), "torus"), {}, 1);
+      bake_surface(close_mesh(testing::torus_mesh(1, 0.4, 8, 5), "torus"), 1);
   AlignedBytes block(data[0] % 4 == 3 ? alone.bytes() : original.span());
   for (; input.size() >= 6; input = input.subspan(6)) {  // where (2 bytes), what (4)
     std::uint16_t at = 0;

@@ -225,9 +225,9 @@ TEST_F(Library, AnAssetThatIsNotWhatIsDemandedFails) {
   ASSERT_EQ(assets.size(), 4u);
   const auto message = [&](int i) { return assets[i].at("message").dump(); };
   EXPECT_NE(message(0).find("require-surface: the asset holds no surface"), std::string::npos);
-  EXPECT_EQ(assets[1].at("has_surface"), false);
+  EXPECT_EQ(assets[1].at("mesh_state"), "none");
   EXPECT_EQ(assets[1].at("status"), "baked");
-  EXPECT_EQ(assets[2].at("has_surface"), true);
+  EXPECT_EQ(assets[2].at("mesh_state"), "own");
   EXPECT_NE(message(3).find("min-coverage: spheres fill"), std::string::npos) << message(3);
   EXPECT_EQ(files_in("out").count("bare.ist"), 0u);
 }

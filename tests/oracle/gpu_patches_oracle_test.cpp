@@ -14,7 +14,7 @@ TEST(GpuPatchesOracle, AreThoseOfTheCpu) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   Workspace workspace;
   ContactSettings settings;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   constexpr std::uint32_t kMost = 8;
   for (const std::string key : {"eledino", "ico1k"}) {  // spheres do not know the size of a mesh
     constexpr std::size_t kSpheres = 1500;

@@ -35,7 +35,7 @@ class FlatFaces : public ::testing::Test {
         cube().view(),
         {{std::cos(turn), std::sin(turn), 0, 0}, {side_ + gap, 0.1 * side_, -0.05 * side_}},
         1};
-    const Penetration raw = penetration(a, b, {.surface = SurfaceUse::never}, workspace_);
+    const Penetration raw = penetration(a, b, {.spheres_only = true}, workspace_);
     return {raw, without_protrusion(raw, a, b)};
   }
 };
@@ -83,7 +83,7 @@ TEST_F(FlatFaces, VolumeAndForceGrowSmoothlyWithTheDepth) {
 /// hardly touch lose more.
 TEST_F(FlatFaces, PatchesLoseIt) {
   ContactSettings settings;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   const PlacedTree a{cube().view(), {}, 1};
   const auto asked = [&](const PlacedTree& b, ContactSettings how) {
     std::vector<ContactPatch> patches(16);
@@ -137,7 +137,7 @@ TEST(RoundContacts, KeepTheirVolume) {
   for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
     if (row.pose_class != "pen") continue;
     const auto [a, b] = testing::placed(row, 2'000);
-    const Penetration raw = penetration(a, b, {.surface = SurfaceUse::never}, workspace);
+    const Penetration raw = penetration(a, b, {.spheres_only = true}, workspace);
     EXPECT_EQ(without_protrusion(raw, a, b).volume, raw.volume) << row.id;
   }
 }

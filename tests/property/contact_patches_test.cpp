@@ -217,16 +217,12 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(answer.count, 0u);
   EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(answer.penetration.volume));
-  // Neither asset holds a surface that might always be used.
+  // Neither asset holds a mesh.
   const PlacedTree placed{a.view(), {}, 1};
-  const ContactPatches always =
-      contact_patches(placed, placed, {.surface = SurfaceUse::always}, workspace, {&patch, 1});
-  EXPECT_EQ(always.penetration.status, QueryStatus::not_held);
-  EXPECT_EQ(always.count, 0u);
-  const Penetration whole =
-      penetration(placed, placed, {.surface = SurfaceUse::always, .pair_budget = 9}, workspace);
-  EXPECT_EQ(whole.status, QueryStatus::not_held);
-  EXPECT_TRUE(std::isnan(whole.volume));
+  const ContactPatches exact =
+      contact_patches(placed, placed, {.measure = Measure::exact}, workspace, {&patch, 1});
+  EXPECT_EQ(exact.penetration.status, QueryStatus::not_held);
+  EXPECT_EQ(exact.count, 0u);
 }
 
 TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
@@ -234,14 +230,12 @@ TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const PlacedTree placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
   ContactPatch patch;
-  for (const PenetrationSettings& settings : {PenetrationSettings{.measure = Measure{77}},
-                                              PenetrationSettings{.surface = SurfaceUse{3}}}) {
-    const Penetration whole = penetration(placed, other, settings, workspace);
-    EXPECT_EQ(whole.status, QueryStatus::invalid_input);
-    EXPECT_TRUE(std::isnan(whole.volume));
-    EXPECT_EQ(contact_patches(placed, other, settings, workspace, {&patch, 1}).penetration.status,
-              QueryStatus::invalid_input);
-  }
+  const PenetrationSettings settings{.measure = Measure{77}};
+  const Penetration whole = penetration(placed, other, settings, workspace);
+  EXPECT_EQ(whole.status, QueryStatus::invalid_input);
+  EXPECT_TRUE(std::isnan(whole.volume));
+  EXPECT_EQ(contact_patches(placed, other, settings, workspace, {&patch, 1}).penetration.status,
+            QueryStatus::invalid_input);
   const ContactPatches none = contact_patches(placed, other, {}, workspace, {});
   EXPECT_EQ(none.penetration.status, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(none.penetration.volume));

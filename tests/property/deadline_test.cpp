@@ -124,7 +124,7 @@ TEST(Deadline, NoneLimitsNothing) {
     PenetrationSettings settings;
     deadline.limit(settings);
     EXPECT_EQ(settings.pair_budget, 0u);
-    EXPECT_EQ(settings.surface, SurfaceUse::automatic);
+    EXPECT_FALSE(settings.spheres_only);
     EXPECT_FALSE(deadline.too_slow());
   }
 }

@@ -54,33 +54,24 @@ TEST(FieldQuery, LimitsKeepTrueBounds) {
   }
 }
 
-TEST(SurfacePairs, LimitsKeepTrueBounds) {
+TEST(UnlikePairs, LimitsKeepTrueBounds) {
   std::mt19937_64 random(26);
   Workspace large, tiny(64);
   for (const SurfacePair& pair : pairs()) {
-    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
-      for (int i = 0; i < 60; ++i) {
-        const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
-                           pair.scale_b};
-        PenetrationSettings plain;
-        plain.surface = use;
-        const Penetration full = penetration(a, b, plain, large);
-        for (auto [limit, settings] : limits()) {
-          settings.surface = use;
-          expect_bounds(pair.name, limit, penetration(a, b, settings, large), full);
-        }
-        // As many visits as the lenses take, or about: none is left for the exact sum.
-        PenetrationSettings lenses = plain;
-        lenses.surface = SurfaceUse::never;
-        const std::uint32_t visits = penetration(a, b, lenses, large).node_visits;
-        for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u}) {
-          PenetrationSettings settings = plain;
-          settings.max_visits = std::max(1u, visits + more - 1);
-          expect_bounds(pair.name, "lenses' visits", penetration(a, b, settings, large), full);
-        }
-        expect_bounds(pair.name, "tiny", penetration(a, b, plain, tiny), full);
-      }
+    for (int i = 0; i < 60; ++i) {
+      const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
+      const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
+                         pair.scale_b};
+      const Penetration full = penetration(a, b, {}, large);
+      for (const auto& [limit, settings] : limits())
+        expect_bounds(pair.name, limit, penetration(a, b, settings, large), full);
+      // As many visits as the lenses take, or about: none is left for the meshes.
+      const std::uint32_t visits = penetration(a, b, {.spheres_only = true}, large).node_visits;
+      for (const std::uint32_t more : {0u, 1u, 2u, 3u, 5u})
+        expect_bounds(pair.name, "lenses' visits",
+                      penetration(a, b, {.max_visits = std::max(1u, visits + more - 1)}, large),
+                      full);
+      expect_bounds(pair.name, "tiny", penetration(a, b, {}, tiny), full);
     }
   }
 }
@@ -128,26 +119,20 @@ TEST(FieldQuery, PatchesAddUpToTheWhole) {
   }
 }
 
-TEST(SurfacePairs, PatchesAddUpToTheWhole) {
+TEST(UnlikePairs, PatchesAddUpToTheWhole) {
   Workspace workspace;
   std::mt19937_64 random(28);
   ContactPatch patches[12];
   for (const SurfacePair& pair : pairs()) {
-    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
-      for (int i = 0; i < 12; ++i) {
-        const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
-        const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.08 * i) * pair.distance),
-                           pair.scale_b};
-        PenetrationSettings settings;
-        settings.surface = use;
-        ContactSettings contact;
-        contact.surface = use;
-        // A stopped query is divided too.
-        settings.max_visits = contact.max_visits = i % 3 == 0 ? 10u * static_cast<unsigned>(i) : 0;
-        const Penetration whole = penetration(a, b, settings, workspace);
-        expect_shares(pair.name, contact_patches(a, b, contact, workspace, patches), whole,
-                      patches);
-      }
+    for (int i = 0; i < 24; ++i) {
+      const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
+      const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.04 * i) * pair.distance),
+                         pair.scale_b};
+      // A stopped query is divided too.
+      const PenetrationSettings settings = {.max_visits =
+                                                i % 3 == 0 ? 5u * static_cast<unsigned>(i) : 0};
+      const Penetration whole = penetration(a, b, settings, workspace);
+      expect_shares(pair.name, contact_patches(a, b, settings, workspace, patches), whole, patches);
     }
   }
 }
@@ -168,13 +153,8 @@ void expect_no_normals(const PlacedField& a, const PlacedTree& b, const ContactS
 TEST(FieldQuery, PatchesInsideHaveNoNormal) {
   std::mt19937_64 random(29);
   for (int i = 0; i < 20; ++i) {
-    // A body in a field, and a field in one ball of a body: the surface pushes from all sides.
     const PlacedField box{BoxField{Vector3d(2, 2, 2)}, random_pose(random, 0.3), 1.7};
     expect_no_normals(box, {cube().view(), box.pose, 0.05 + 0.01 * i}, {});
-    const PlacedField ring{MeshField{torus().view()}, random_pose(random, 0.05), 0.5};
-    ContactSettings inner;
-    inner.measure = Measure::inner;
-    expect_no_normals(ring, {cube().view(), {}, 1}, inner);
   }
 }
 

@@ -139,8 +139,6 @@ TEST(TimeOfImpact, RefusesWhatIsNoInput) {
   };
   EXPECT_EQ(of_field(BallField{-1}), kInvalid);
   EXPECT_EQ(of_field(HalfSpaceField{{0, 0, 0}, 0}), kInvalid);
-  EXPECT_EQ(of_field(MeshField{ball_of_spheres().view()}), kInvalid);
-  EXPECT_EQ(of_field(MeshField{cube().view()}), ImpactStatus::no_impact);
   EXPECT_EQ(of_field(FunctionField{
                 [](const void*, const Vector3d&) noexcept {
                   return FieldSample{std::numeric_limits<double>::quiet_NaN(), Vector3d::Zero()};

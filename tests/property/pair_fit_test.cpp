@@ -11,10 +11,10 @@
 namespace ist {
 namespace {
 
-Asset cube(bool with_surface) {
+Asset cube(bool with_mesh) {
   PackingSettings settings;
   settings.max_spheres = 200;
-  settings.surface.wanted = with_surface;
+  settings.keep_mesh = with_mesh;
   return bake(close_mesh(testing::cube_mesh(), "cube"), settings);
 }
 
@@ -31,21 +31,20 @@ TEST(PairFit, TellsWhatIsAskedOfAPair) {
         const PairFit fit = pair_fit(first, second);
         EXPECT_NEAR(fit.ratio, ratio, 1e-12 * ratio);
         EXPECT_GT(fit.grain_a, 0);
-        EXPECT_EQ(fit.needs_surface, ratio > 4);
+        EXPECT_EQ(fit.needs_mesh, ratio > 4);
+        EXPECT_EQ(fit.has_mesh, large == &whole);
         if (ratio > 1) {
           EXPECT_EQ(fit.a_is_coarser, !turned);
-          EXPECT_EQ(fit.has_surface, large == &whole);
         }
-        const auto volume = [&](SurfaceUse use) {
-          PenetrationSettings settings;
-          settings.surface = use;
+        const auto volume = [&](const PenetrationSettings& settings) {
           return penetration(first, second, settings, workspace).volume;
         };
-        ASSERT_GT(volume(SurfaceUse::never), 0);
-        if (fit.needs_surface && fit.has_surface) {
-          EXPECT_EQ(volume(SurfaceUse::automatic), volume(SurfaceUse::always));
+        const double by_spheres = volume({.spheres_only = true});
+        ASSERT_GT(by_spheres, 0);
+        if (fit.needs_mesh && fit.has_mesh) {
+          EXPECT_EQ(volume({}), volume({.measure = Measure::exact}));
         } else if (!fit.fits()) {
-          EXPECT_EQ(volume(SurfaceUse::automatic), volume(SurfaceUse::never));
+          EXPECT_EQ(volume({}), by_spheres);
         }
       }
 }

@@ -68,7 +68,6 @@ struct Mixed {
     field(24, CylinderField{0.5, 1});
     field(25, HeightField{heights.data(), 4, 3, {1, 1}});
     field(26, DistanceGridField{distances.data(), {3, 3, 3}, {-1, -1, -1}, 1, 0});
-    field(27, MeshField{cube().view()});
     scene.exclude(3, 22);
   }
 };

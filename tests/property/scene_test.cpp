@@ -28,8 +28,7 @@ using namespace testing;
 using Numbers = std::pair<std::uint32_t, std::uint32_t>;
 
 const Asset& block() {
-  static const Asset asset =
-      bake_surface(closed(box_mesh({-1, -1, -1}, {1, 1, 1}), "block"), {}, 1);
+  static const Asset asset = bake_surface(closed(box_mesh({-1, -1, -1}, {1, 1, 1}), "block"), 1);
   return asset;
 }
 const Asset& ball() {

@@ -241,7 +241,6 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
   const Vector3d zero = Vector3d::Zero();
   expect(PlacedTree{bare.view(), {}, 1}, {}, QueryStatus::not_held);
   expect_point(PlacedTree{bare.view(), {}, 1}, zero, QueryStatus::not_held);
-  expect(PlacedField{MeshField{bare.view()}, {}, 1}, {}, QueryStatus::not_held);
   for (const Ray& ray : {Ray{zero, zero}, Ray{zero, {nan, 1, 0}}, Ray{{nan, 0, 0}},
                          Ray{{1e90, 0, 0}}, Ray{zero, {kInfinity, 0, 0}},
                          Ray{zero, Vector3d::UnitX(), 0}, Ray{zero, Vector3d::UnitX(), nan}}) {

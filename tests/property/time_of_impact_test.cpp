@@ -161,9 +161,7 @@ class Certified : public ::testing::Test {
     };
     if (found.status == ImpactStatus::overlapping) {
       EXPECT_EQ(found.time, 0);
-      PenetrationSettings exact;
-      exact.surface = SurfaceUse::always;
-      EXPECT_GT(penetration(a, b, exact, workspace()).volume, 0);
+      EXPECT_GT(penetration(a, b, {.measure = Measure::exact}, workspace()).volume, 0);
       return;
     }
     for (int i = 0; i <= 12; ++i) {

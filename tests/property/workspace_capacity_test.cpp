@@ -31,30 +31,20 @@ std::size_t bytes_of(std::size_t capacity) {
   return taken;
 }
 
-bool keeps_surface(const PlacedSolid& solid) {
-  const auto* const tree = std::get_if<PlacedTree>(&solid.placed);
-  return tree != nullptr && tree->tree.has_surface();
-}
-
 /// Every answer that a capacity may stop, and whether it did.
 class Answers {
  public:
   Answers(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) {
     std::vector<ContactPatch> patches(16);
-    const bool surfaces = keeps_surface(a) && keeps_surface(b);
     for (const Measure measure : {Measure::matched, Measure::inner})
-      for (const SurfaceUse use :
-           {SurfaceUse::never, surfaces ? SurfaceUse::always : SurfaceUse::automatic})
-        for (const std::uint32_t budget : {0u, 500u}) {
-          PenetrationSettings settings;
-          settings.measure = measure;
-          settings.surface = use;
-          settings.pair_budget = budget;
-          add(penetration(a, b, settings, workspace));
-          const ContactPatches contact = contact_patches(a, b, settings, workspace, patches);
-          add(contact.penetration);
-          for (std::size_t i = 0; i < contact.count; ++i) bits_.add(patches[i]);
-        }
+      for (const std::uint32_t budget : {0u, 500u}) {
+        const PenetrationSettings settings = {
+            .measure = measure, .spheres_only = true, .pair_budget = budget};
+        add(penetration(a, b, settings, workspace));
+        const ContactPatches contact = contact_patches(a, b, settings, workspace, patches);
+        add(contact.penetration);
+        for (std::size_t i = 0; i < contact.count; ++i) bits_.add(patches[i]);
+      }
     for (const bool spheres : {false, true}) add(separation(a, b, {0, spheres}, workspace));
     bits_.add(static_cast<std::uint64_t>(overlap(a, b, workspace)));
   }
@@ -108,16 +98,14 @@ TEST_F(WorkspaceCapacity, ServesEveryPose) {
 
 TEST_F(WorkspaceCapacity, ServesFields) {
   const Asset ball = testing::make_random_asset({.spheres = 30'000}, 4);
-  const Asset torus = testing::baked(testing::torus_mesh(0.7, 0.3, 60, 40), "torus", 500);
   const PlacedTree tree{ball.view(), {}, 1};
-  for (const Field& field : {Field(BoxField{{1, 1, 1}}), Field(MeshField{torus.view()})})
-    for (const double scale : {0.3, 1.0, 10.0}) {
-      const PlacedField placed{field, {}, scale};
-      EXPECT_EQ(workspace_capacity(placed, tree), workspace_capacity(tree, placed));
-      Workspace enough(workspace_capacity(placed, tree));
-      EXPECT_EQ(Answers(placed, tree, enough).stopped(), 0);
-      EXPECT_EQ(Answers(tree, placed, enough).bits(), Answers(tree, placed, ample_).bits());
-    }
+  for (const double scale : {0.3, 1.0, 10.0}) {
+    const PlacedField placed{BoxField{{1, 1, 1}}, {}, scale};
+    EXPECT_EQ(workspace_capacity(placed, tree), workspace_capacity(tree, placed));
+    Workspace enough(workspace_capacity(placed, tree));
+    EXPECT_EQ(Answers(placed, tree, enough).stopped(), 0);
+    EXPECT_EQ(Answers(tree, placed, enough).bits(), Answers(tree, placed, ample_).bits());
+  }
 }
 
 TEST_F(WorkspaceCapacity, IsSmallForSmallTreesAndKnowsPosesNot) {
@@ -141,7 +129,6 @@ TEST_F(WorkspaceCapacity, RefusesWhatNoQueryTakes) {
   const PlacedField ball{BallField{1}, {}, 1};
   EXPECT_THROW(workspace_capacity(tree, PlacedTree{}), Error);
   EXPECT_THROW(workspace_capacity(tree, PlacedTree{asset.view(), {}, 0}), Error);
-  EXPECT_THROW(workspace_capacity(tree, PlacedField{MeshField{asset.view()}, {}, 1}), Error);
   EXPECT_THROW(workspace_capacity(tree, PlacedField{ball.field, {}, -1}), Error);
   EXPECT_THROW(workspace_capacity(ball, ball), Error);
 }

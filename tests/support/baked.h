@@ -17,7 +17,7 @@ inline PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
 /// `surface`: whether the asset holds its surface.
 inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool surface = true) {
   PackingSettings settings = of_size(spheres);
-  settings.surface.wanted = surface;
+  settings.keep_mesh = surface;
   return bake(close_mesh(std::move(mesh), name), settings);
 }
 

@@ -16,7 +16,7 @@
 namespace ist::testing {
 
 inline Asset surface(TriangleMesh mesh, const char* name = "mesh") {
-  return bake_surface(close_mesh(std::move(mesh), name), {}, 1);
+  return bake_surface(close_mesh(std::move(mesh), name), 1);
 }
 
 inline Penetration exactly(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) {

@@ -11,7 +11,7 @@ class SumErrors {
  public:
   void add(const PlacedTree& a, const PlacedTree& b) {
     const ReferenceSum sum = reference_sum(a, b, Measure::matched);
-    const Penetration got = penetration(a, b, {.surface = SurfaceUse::never}, workspace_);
+    const Penetration got = penetration(a, b, {.spheres_only = true}, workspace_);
     if (got.status != QueryStatus::ok) volume_.add(kNoPromise);
     volume_.add(sum.volume > 0 ? std::abs(got.volume / sum.volume - 1) : got.volume);
     if (sum.force_scale > 0)

@@ -65,14 +65,14 @@ inline Motion straight(const Vector3d& velocity) {
   return {velocity, Vector3d::Zero(), Vector3d::Zero()};
 }
 
-/// The corners of all triangles of an asset's surface at a pose, three in a row.
+/// The corners of all triangles of an asset's mesh at a pose, three in a row.
 inline std::vector<Vector3d> corners(const PlacedTree& placed) {
   const ImpactSide side(placed.tree);
   const AssetHeader& header = placed.tree.header();
   const Eigen::Isometry3d to_world = to_isometry(placed.pose);
   std::vector<Vector3d> all;
-  for (std::uint32_t block = 0; block < side.surface()->level[0].count; ++block) {
-    for (std::uint32_t lane = 0; lane < side.surface()->blocks[block].triangles; ++lane) {
+  for (std::uint32_t block = 0; block < side.mesh()->count; ++block) {
+    for (std::uint32_t lane = 0; lane < side.mesh()->blocks[block].triangles; ++lane) {
       const ConvexPiece piece = side.piece(kWidth * block + lane);
       for (const Vector3d& x : piece.corner)
         all.push_back(to_world * (placed.scale *

@@ -15,7 +15,7 @@
 #include "support/random_assets.h"
 #include "support/test_meshes.h"
 
-// Bodies, fields and pairs of trees that meet by a surface, and the work that is done on one that
+// Bodies, fields and pairs of trees of unlike sizes, and the work that is done on one that
 // moves.
 
 namespace ist::testing {
@@ -136,8 +136,7 @@ inline std::vector<std::pair<const char*, Field>> fields() {
           {"cylinder", CylinderField{0.4, 0.3}},
           {"terrain", terrain},
           {"grid", grid_of(distances, 21)},
-          {"function", function},
-          {"mesh", MeshField{torus().view()}}};
+          {"function", function}};
 }
 
 struct SurfacePair {

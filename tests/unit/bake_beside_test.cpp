@@ -92,9 +92,9 @@ Asset baked_beside(const ClosedMesh& mesh, const PackingSettings& settings, Seen
   return thread_arena(settings.threads).execute([&] {
     const Resolution as_it_is;
     const MeshSolid solid(ResolvedMesh{mesh, as_it_is});
-    SharedSurface surface(solid, as_it_is, settings.surface, settings.threads);
+    SharedMesh kept(solid, as_it_is, settings.keep_mesh, settings.threads);
     TwoAtATime backend(solid, seen);
-    return bake_solid(mesh, solid, surface, backend, settings, progress);
+    return bake_solid(mesh, solid, kept, backend, settings, progress);
   });
 }
 

@@ -157,7 +157,7 @@ TEST(BakeToError, MeasuresByTheMeshThatTheAssetDoesNotKeep) {
   const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
   PackingSettings settings = {.max_spheres = 200};
   const TargetedAsset own = bake_to_error(torus, {0.2, 0.01}, settings);
-  settings.surface.wanted = false;
+  settings.keep_mesh = false;
   const TargetedAsset none = bake_to_error(torus, {0.2, 0.01}, settings);
   EXPECT_FALSE(none.asset.view().has_mesh());
   EXPECT_GT(none.poses, 100u);

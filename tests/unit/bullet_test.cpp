@@ -14,13 +14,13 @@
 namespace ist::testing {
 namespace {
 
-// The default asks for surfaces: an asset that keeps none still collides, by its spheres.
-TEST(BulletShapes, WithoutASurfaceCollideByLenses) {
+// The default asks for meshes: an asset that keeps none still collides, by its spheres.
+TEST(BulletShapes, WithoutAMeshCollideByLenses) {
   PackingSettings packing;
   packing.max_spheres = 500;
-  packing.surface.wanted = false;
+  packing.keep_mesh = false;
   const Asset asset = bake(close_mesh(cube_mesh(), "cube"), packing);
-  ASSERT_FALSE(asset.view().has_surface());
+  ASSERT_FALSE(asset.view().has_mesh());
   bullet::Shape shape(asset.view());
   btCollisionObject first, second;
   first.setCollisionShape(&shape);

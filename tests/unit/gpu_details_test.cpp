@@ -23,7 +23,7 @@ namespace {
 Penetration by_cpu(const BatchPair& pair, std::uint32_t budget) {
   static Workspace workspace;
   PenetrationSettings settings;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   settings.pair_budget = budget;
   return penetration(PlacedTree{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
                      PlacedTree{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b},
@@ -123,7 +123,7 @@ TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
   HostBatch batch(trees);
   Workspace workspace;
   PenetrationSettings settings;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   const std::vector<Penetration> whole = batch.run(pairs, Measure::matched);
   for (const std::uint32_t budget : {0u, 150u, 600u}) {
     settings.pair_budget = budget;

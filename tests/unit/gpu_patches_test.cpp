@@ -25,7 +25,7 @@ std::vector<ContactPatch> patches_of_cpu(const PlacedTree& a, const PlacedTree& 
   std::vector<ContactPatch> patches(most);
   ContactSettings settings;
   settings.measure = measure;
-  settings.surface = SurfaceUse::never;
+  settings.spheres_only = true;
   patches.resize(contact_patches(a, b, settings, workspace, patches).count);
   return patches;
 }

@@ -91,15 +91,12 @@ Field field_named(const std::string& name) {
     field.spacing[0] = field.spacing[1] = 0.25;
     return field;
   }
-  if (name == "grid") {
-    DistanceGridField field;
-    field.distances = numbers.data();
-    for (std::uint32_t& n : field.size) n = 7;
-    field.origin = Eigen::Vector3d::Constant(-0.75);
-    field.spacing = 0.25;
-    return field;
-  }
-  return MeshField{asset_named(name == "mesh_box" ? "box" : "ball").view()};
+  DistanceGridField field;
+  field.distances = numbers.data();
+  for (std::uint32_t& n : field.size) n = 7;
+  field.origin = Eigen::Vector3d::Constant(-0.75);
+  field.spacing = 0.25;
+  return field;
 }
 
 /// Random poses of the same bits everywhere: the C library's functions differ in the last one.
@@ -132,7 +129,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
       bits.add(penetration(a, b, settings, workspace));
       return;
     }
-  if (asked == "always") settings.surface = SurfaceUse::always;
+  if (asked == "spheres_only") settings.spheres_only = true;
   if (asked == "inner") settings.measure = Measure::inner;
   if (asked == "max_visits") settings.max_visits = 50;
   if (asked == "pair_budget") settings.pair_budget = 300;

@@ -25,18 +25,11 @@ using Point = Eigen::Vector3d;
 
 ClosedMesh closed(TriangleMesh mesh, const char* name) { return close_mesh(std::move(mesh), name); }
 
-PackingSettings few_spheres(const SurfaceSettings& surface = {}) {
+PackingSettings few_spheres(bool keep_mesh = true) {
   PackingSettings settings;
   settings.max_spheres = 20;
-  settings.surface = surface;
+  settings.keep_mesh = keep_mesh;
   return settings;
-}
-
-SurfaceSettings within(double error, double share = 0) {
-  SurfaceSettings surface;
-  surface.error = error;
-  surface.share = share;
-  return surface;
 }
 
 void expect_sound(const Asset& asset, const ClosedMesh& mesh) {
@@ -59,7 +52,6 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
     const Asset asset = bake(*mesh, few_spheres());
     EXPECT_EQ(asset.view().mesh_state(), MeshState::own);
     EXPECT_EQ(asset.view().mesh_triangles(), mesh->mesh.triangles.size());
-    EXPECT_EQ(asset.view().surface_triangles(), mesh->mesh.triangles.size());
     EXPECT_EQ(mesh_of(asset).error, 0);
     EXPECT_EQ(asset.view().counted_twice(), 0);
     expect_sound(bake_surface(*mesh), *mesh);
@@ -110,39 +102,12 @@ TEST(KeptMesh, TellsHowFarVerticesWereRounded) {
   expect_sound(rounded, moved);
 }
 
-TEST(KeptMesh, IsSimplifiedWithinAnErrorOnRequest) {
-  const ClosedMesh ball = closed(testing::icosphere_mesh(4), "ball");  // 5,120
-  std::uint32_t last = 0;
-  for (const SurfaceSettings& surface : {within(0.05), within(0, 0.005), within(2e-3)}) {
-    const Asset asset = bake(ball, few_spheres(surface));
-    EXPECT_EQ(asset.view().mesh_state(), MeshState::polygonised);
-    EXPECT_EQ(asset.view().mesh_triangles(), asset.view().surface_triangles());
-    EXPECT_LE(
-        asset.view().mesh_error(),
-        surface.error > 0 ? surface.error : surface.share * ball.report.bounds.sizes().maxCoeff());
-    EXPECT_GT(asset.view().mesh_triangles(), last);
-    last = asset.view().mesh_triangles();
-    expect_sound(asset, ball);
-    const Asset alone = bake_surface(ball, surface);
-    EXPECT_EQ(alone.view().mesh_triangles(), last);
-    EXPECT_EQ(alone.view().mesh_error(), asset.view().mesh_error());
-    expect_sound(alone, ball);
-  }
-  EXPECT_LT(last, ball.mesh.triangles.size());
-}
-
 TEST(KeptMesh, IsLeftOutWhereNoneIsWanted) {
-  SurfaceSettings none;
-  none.wanted = false;
   const ClosedMesh cube = closed(testing::cube_mesh(), "cube");
-  const Asset asset = bake(cube, few_spheres(none));
+  const Asset asset = bake(cube, few_spheres(false));
   EXPECT_FALSE(asset.view().has_mesh());
-  EXPECT_FALSE(asset.view().has_surface());
   EXPECT_EQ(asset.view().mesh_state(), MeshState::none);
   EXPECT_EQ(asset.view().mesh_triangles(), 0u);
-  EXPECT_THROW(bake_surface(cube, none), Error);
-  EXPECT_THROW(bake(cube, few_spheres(within(-1))), Error);
-  EXPECT_THROW(bake(cube, few_spheres(within(0, 1))), Error);
 }
 
 // Never counted twice in silence.
@@ -195,13 +160,11 @@ TEST(KeptMesh, OfASolidByItsDistanceIsTheOneInItsPlace) {
 
 TEST(KeptMesh, SameBytesForAnyNumberOfThreads) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(5), "ball");
-  for (const SurfaceSettings& surface : {SurfaceSettings(), within(1e-3)}) {
-    const Asset one = bake_surface(ball, surface, 1);
-    for (const unsigned threads : {2u, 5u}) {
-      const Asset other = bake_surface(ball, surface, threads);
-      EXPECT_TRUE(std::equal(one.bytes().begin(), one.bytes().end(), other.bytes().begin(),
-                             other.bytes().end()));
-    }
+  const Asset one = bake_surface(ball, 1);
+  for (const unsigned threads : {2u, 5u}) {
+    const Asset other = bake_surface(ball, threads);
+    EXPECT_TRUE(std::equal(one.bytes().begin(), one.bytes().end(), other.bytes().begin(),
+                           other.bytes().end()));
   }
 }
 
@@ -217,7 +180,6 @@ TEST_F(SurfaceAlone, HoldsMeshMassAndBounds) {
   expect_sound(alone_, mesh_);
   EXPECT_EQ(alone_.view().sphere_count(), 0u);
   EXPECT_FALSE(alone_.view().empty());
-  EXPECT_FALSE(alone_.view().has_surface());
   EXPECT_EQ(mass_properties(alone_.view()).inertia, mass_properties(whole_.view()).inertia);
   EXPECT_EQ(alone_.view().volume(), whole_.view().volume());
   EXPECT_EQ(bounds(alone_.view()).radius, bounds(whole_.view()).radius);
@@ -275,16 +237,14 @@ TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
 }
 
 TEST_F(SurfaceAlone, MeetsNoField) {
-  const PlacedTree alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
-  const PlacedField ball{BallField{1}, {}, 1}, mesh{MeshField{alone_.view()}, {}, 1};
-  for (const auto& [a, b] : {std::pair(ball, alone), {mesh, whole}, {mesh, alone}}) {
-    expect_not_held(penetration(a, b, {}, workspace_));
-    expect_not_held(separation(a, b, {}, workspace_));
-    expect_not_held(time_of_impact(a, b, {}, {}, workspace_));
-    EXPECT_EQ(overlap(a, b, workspace_), Overlapping::unknown);
-    std::vector<ContactPatch> patches(4);
-    expect_not_held(contact_patches(a, b, {}, workspace_, patches).penetration);
-  }
+  const PlacedTree alone{alone_.view(), {}, 1};
+  const PlacedField ball{BallField{1}, {}, 1};
+  expect_not_held(penetration(ball, alone, {}, workspace_));
+  expect_not_held(separation(ball, alone, {}, workspace_));
+  expect_not_held(time_of_impact(ball, alone, {}, {}, workspace_));
+  EXPECT_EQ(overlap(ball, alone, workspace_), Overlapping::unknown);
+  std::vector<ContactPatch> patches(4);
+  expect_not_held(contact_patches(ball, alone, {}, workspace_, patches).penetration);
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ Reference of_box(const Vector3d& lower, const Vector3d& upper) {
 Asset asset_of(const TriangleMesh& mesh, const std::string& name) {
   PackingSettings settings;
   settings.max_spheres = 20;
-  settings.surface.wanted = false;
+  settings.keep_mesh = false;
   return bake(close_mesh(mesh, name), settings);
 }
 

@@ -87,14 +87,11 @@ class RealTime : public ::testing::Test {
     closest_point(field, at);
     time_of_impact(solid, other, motions, until, workspaces_[0]);
     time_of_impact(field, other, motions, until, workspaces_[0]);
-    for (const SurfaceUse use : {SurfaceUse::automatic, SurfaceUse::always}) {
-      PenetrationSettings by_surface = settings;
-      by_surface.surface = use;
-      // NaN where the coarser one holds no surface.
-      for (const double volume : {penetration(solid, b, by_surface, workspaces_[0]).volume,
-                                  penetration(b, solid, by_surface, workspaces_[0]).volume})
-        if (!std::isnan(volume)) volume_[i] += volume;
-      contact_patches(solid, b, by_surface, workspaces_[0], patches_);
+    for (const double scale : {1.0, 0.1}) {  // where spheres answer, and where meshes do
+      const PlacedTree small{box_.view(), b.pose, scale};
+      volume_[i] += penetration(solid, small, settings, workspaces_[0]).volume +
+                    penetration(small, solid, settings, workspaces_[0]).volume;
+      contact_patches(solid, small, settings, workspaces_[0], patches_);
     }
   }
 
@@ -116,8 +113,7 @@ class RealTime : public ::testing::Test {
       CylinderField{0.4, 0.4},
       HeightField{numbers_.data(), 5, 5, {0.3, 0.3}},
       DistanceGridField{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
-      FunctionField{sample, nullptr, 0},
-      MeshField{box_.view()}};
+      FunctionField{sample, nullptr, 0}};
   Workspace workspaces_[1], small_{16};
   ist_workspace_t c_workspace_ = {};
   ist_tree_t c_tree_a_ = {}, c_tree_b_ = {};

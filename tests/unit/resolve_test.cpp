@@ -423,7 +423,7 @@ TEST(Resolve, ReportsAndIsCancelled) {
     return std::string_view(now.stage) != "resolve";
   };
   EXPECT_THROW(bake(closed, {.max_spheres = 100}, no), Error);
-  EXPECT_THROW(bake_surface(closed, {}, 0, no), Error);
+  EXPECT_THROW(bake_surface(closed, 0, no), Error);
   EXPECT_THROW(bake_to_error(closed, {}, {}, no), Error);
   // What meets nothing is not looked at.
   EXPECT_EQ(resolve(close_mesh(testing::cube_mesh(), "cube"), no).resolution.how, How::as_it_is);

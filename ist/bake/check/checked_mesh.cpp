@@ -80,8 +80,6 @@ Hit cross(const Eigen::Vector3d& p, const std::array<Eigen::Vector3d, 3>& triang
   return side < 0 ? Hit::back : Hit::no;
 }
 
-}  // namespace
-
 /// The edges, and the foot of the perpendicular where that lies inside. Every candidate is a point
 /// of the triangle, so that a sliver's poor normal cannot make the distance too small.
 double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckedMesh::Corners& t) {
@@ -101,6 +99,8 @@ double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckedMesh:
   }
   return best;
 }
+
+}  // namespace
 
 CheckedMesh::CheckedMesh(const ClosedMesh& mesh, const UnitFrame& frame) {
   triangles_.reserve(mesh.mesh.triangles.size());
@@ -135,27 +135,8 @@ void CheckedMesh::build(std::uint32_t begin, std::uint32_t end) {
   build(middle, end);
 }
 
-CheckedMesh::CheckedMesh(std::vector<Corners> triangles) : triangles_(std::move(triangles)) {
-  for (const Corners& corners : triangles_)
-    for (const Eigen::Vector3d& corner : corners) bounds_.extend(corner);
-  build(0, static_cast<std::uint32_t>(triangles_.size()));
-}
-
 double CheckedMesh::distance(const Eigen::Vector3d& p, double limit) const {
   double best = limit * limit;
-  std::uint32_t triangle = 0;
-  search(p, best, triangle);
-  return std::sqrt(best);
-}
-
-std::pair<double, std::uint32_t> CheckedMesh::nearest(const Eigen::Vector3d& p) const {
-  double best = 1e30;
-  std::uint32_t triangle = 0;
-  search(p, best, triangle);
-  return {std::sqrt(best), triangle};
-}
-
-void CheckedMesh::search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const {
   struct Entry {
     std::uint32_t node;
     double squared;
@@ -168,13 +149,8 @@ void CheckedMesh::search(const Eigen::Vector3d& p, double& best, std::uint32_t& 
     if (entry.squared >= best) continue;
     const Node& node = nodes_[entry.node];
     if (node.right == 0) {
-      for (std::uint32_t i = node.begin; i < node.end; ++i) {
-        const double squared = squared_distance_to_triangle(p, triangles_[i]);
-        if (squared < best) {
-          best = squared;
-          triangle = i;
-        }
-      }
+      for (std::uint32_t i = node.begin; i < node.end; ++i)
+        best = std::min(best, squared_distance_to_triangle(p, triangles_[i]));
       continue;
     }
     Entry near = {entry.node + 1, nodes_[entry.node + 1].box.squaredExteriorDistance(p)};
@@ -183,6 +159,7 @@ void CheckedMesh::search(const Eigen::Vector3d& p, double& best, std::uint32_t& 
     stack[size++] = far;
     stack[size++] = near;
   }
+  return std::sqrt(best);
 }
 
 int CheckedMesh::winding(const Eigen::Vector3d& p) const {

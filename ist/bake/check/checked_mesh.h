@@ -35,14 +35,9 @@ class CheckedMesh final : public CheckedSolid {
   using Corners = std::array<Eigen::Vector3d, 3>;
 
   CheckedMesh(const ClosedMesh& mesh, const UnitFrame& frame);
-  /// Of triangles in the unit frame; at least one.
-  explicit CheckedMesh(std::vector<Corners> triangles);
 
   /// Unit frame, to the nearest triangle; once nothing is nearer than `limit`, any value ≥ limit.
   double distance(const Eigen::Vector3d& p, double limit) const override;
-
-  /// The nearest triangle, as an index of triangles(), and its distance, unit frame.
-  std::pair<double, std::uint32_t> nearest(const Eigen::Vector3d& p) const;
 
   /// In an order of its own.
   const std::vector<Corners>& triangles() const { return triangles_; }
@@ -60,9 +55,6 @@ class CheckedMesh final : public CheckedSolid {
     std::uint32_t right = 0;           ///< second child; the first is the next node; 0 at a leaf
   };
 
-  /// `best`: squared distance beyond which nothing is of interest; becomes the least. The triangle
-  /// stays where nothing is nearer.
-  void search(const Eigen::Vector3d& p, double& best, std::uint32_t& triangle) const;
   void build(std::uint32_t begin, std::uint32_t end);
   int winding_by_solid_angle(const Eigen::Vector3d& p) const;
 
@@ -70,8 +62,5 @@ class CheckedMesh final : public CheckedSolid {
   std::vector<Node> nodes_;
   Eigen::AlignedBox3d bounds_;
 };
-
-/// Unit frame, squared.
-double squared_distance_to_triangle(const Eigen::Vector3d& p, const CheckedMesh::Corners& t);
 
 }  // namespace ist
