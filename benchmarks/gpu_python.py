@@ -33,7 +33,7 @@ def measure(folder):
             poses, scales = drawn[:, :7].contiguous(), drawn[:, 7].contiguous()
             numbers = [torch.full((count,), k, dtype=torch.int32, device="cuda") for k in (0, 1)]
             sides = [assets[number] for number in numbers]
-            kept = ist.penetration(*sides, poses, scales=scales, surface="never")
+            kept = ist.penetration(*sides, poses, scales=scales, spheres_only=True)
             torch.cuda.synchronize()
             row = dict(poses=kind, pairs=count)
             for name, out in (("into the same arrays", kept), ("into new arrays", None)):
@@ -44,7 +44,7 @@ def measure(folder):
                     events[0].record()
                     for _ in range(10):
                         before = time.perf_counter()
-                        found = ist.penetration(*sides, poses, scales=scales, surface="never", out=out)
+                        found = ist.penetration(*sides, poses, scales=scales, spheres_only=True, out=out)
                         call.append(time.perf_counter() - before)
                     events[1].record()
                     torch.cuda.synchronize()
@@ -63,12 +63,12 @@ def measure(folder):
                 for _ in range(20):
                     torch.cuda.synchronize()
                     start = time.perf_counter()
-                    overlap(assets, scene, scales=sizes, surface="never").sum().backward()
+                    overlap(assets, scene, scales=sizes, spheres_only=True).sum().backward()
                     torch.cuda.synchronize()
                     times.append(time.perf_counter() - start)
                 row["ist.torch.overlap and backward, ms"] = 1e3 * np.median(times)
             cpu = ist.penetration(elephant, dino, poses[:2000].cpu().numpy(),
-                                  scales=scales[:2000].cpu().numpy(), surface="never").volume
+                                  scales=scales[:2000].cpu().numpy(), spheres_only=True).volume
             ours = torch.from_dlpack(kept.volume)[:2000].cpu().numpy()
             row["largest difference to the CPU"] = float(
                 np.max(np.abs(ours - cpu) / np.maximum(np.maximum(ours, cpu), 1e-300)))

@@ -98,6 +98,14 @@ Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
   return motion;
 }
 
+/// Where a patch pushes: a force on its wrench's axis has no twist left but that about itself. The
+/// axis runs away where a patch pushes both ways, so no farther from its middle than it is wide.
+Eigen::Vector3d place_of(const ContactPatch& patch) {
+  const Eigen::Vector3d aside = patch.point - patch.centroid;
+  const double far = aside.norm(), width = std::sqrt(patch.area);
+  return patch.centroid + (far > width ? width / far : 1) * aside;
+}
+
 }  // namespace
 
 struct PairAlgorithm::State {
@@ -273,7 +281,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       const Eigen::Vector3d normal = -patch.normal;
       result->addContactPoint(
           to_bullet(normal),
-          to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
+          to_bullet(Eigen::Vector3d(place_of(patch) + 0.5 * patch.depth * normal)),
           static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);
@@ -368,7 +376,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     if (!(force > 0)) continue;
     together += force * patch.normal;
     apart += force;
-    const btVector3 middle = to_bullet(patch.centroid);
+    const btVector3 middle = to_bullet(place_of(patch));
     const btVector3 motion = velocity_of(first, middle) + unsaid[0].at(middle) -
                              velocity_of(second, middle) - unsaid[1].at(middle);
     closing = std::max(closing, to_eigen(motion).dot(patch.normal));
@@ -385,8 +393,7 @@ void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
     const ContactPatch& patch = contact.patches[i];
     if (!(patch.area > 0)) continue;
     const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
-    // Not its point, which runs away where a patch pushes both ways.
-    const btVector3 middle = to_bullet(patch.centroid);
+    const btVector3 middle = to_bullet(place_of(patch));
     const btScalar depth = static_cast<btScalar>(patch.depth);
     const btVector3 on_first = middle - normal * (depth / 2);
     const btVector3 on_second = middle + normal * (depth / 2);

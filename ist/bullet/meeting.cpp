@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
@@ -37,6 +38,33 @@ Body body_of(const btCollisionObject& object) {
     return {link->m_link < 0 ? robot.getBaseMass() : robot.getLinkMass(link->m_link), 0};
   }
   return {};
+}
+
+/// How far apart flat faces of meshes may be and push, of the smaller solid's size.
+constexpr double kReach = 0.02;
+
+/// Of two assets whose meshes do not overlap: a push where they touch or are nearest, for
+/// SupportPolygon; nothing beyond `reach`.
+std::optional<Penetration> push_across(const PlacedSolid& a, const PlacedSolid& b,
+                                       const Penetration& apart, double reach,
+                                       std::uint32_t pair_id) {
+  Penetration push = apart;
+  Eigen::Vector3d normal = push.contact_normal;
+  if (!push.touching) {
+    const Separation gap =
+        separation(a, b, {.max_distance = reach, .pair_id = pair_id}, workspace());
+    if (!(gap.distance > 0 && gap.distance < reach)) return std::nullopt;
+    push.centroid = (gap.point_a + gap.point_b) / 2;
+    normal = gap.normal;
+  }
+  if (!(normal.squaredNorm() > 0)) return std::nullopt;
+  constexpr double kHardly = 1e-6;  // its size is no matter
+  const Eigen::Vector3d force = kHardly * (reach * reach) * normal;
+  push.volume = 0;
+  push.translation_gradient = -force;
+  push.rotation_gradient =
+      force.cross(push.centroid - Eigen::Vector3d(std::get<PlacedTree>(b.placed).pose.t));
+  return push;
 }
 
 }  // namespace
@@ -104,15 +132,18 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   const auto keeps_mesh = [](const Shape* shape) {
     return shape != nullptr && shape->tree().has_mesh();
   };
-  if (query.measure == Measure::exact && !(keeps_mesh(first_) && keeps_mesh(second_)))
-    query.measure = Measure::matched;
+  const bool exact = query.measure == Measure::exact && keeps_mesh(first_) && keeps_mesh(second_);
+  if (query.measure == Measure::exact && !exact) query.measure = Measure::matched;
+  const auto blur = [](const Shape* shape) {
+    return shape != nullptr ? shape->scale() * shape->tree().protrusion() : 0;
+  };
+  // How far apart flat faces may be and push: as spheres do that stick out, and meshes shall.
+  const double reach = exact ? kReach * std::cbrt(volume()) : blur(first_) + blur(second_);
   const ContactPatches found = contact_patches(a, b, query, workspace(), room);
   if (first_ != nullptr && second_ != nullptr && found.penetration.volume_max <= 0) {
     // A lower bound suffices: the first few nodes give one.
     constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
-    contact.clearance = separation(a, b, kGlance, workspace()).distance_min;
-    for (const Shape* const shape : {first_, second_})
-      contact.clearance -= shape->scale() * shape->tree().protrusion();
+    contact.clearance = separation(a, b, kGlance, workspace()).distance_min - reach;
   }
   if (std::isnan(found.penetration.volume)) {
     warn(
@@ -124,23 +155,27 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   contact.whole = found.penetration;
   contact.count = found.count;
   contact.inside = found.penetration.volume > 0 && find_way_out({a, b}, {first, second}, contact);
-  // Patches of a flat contact push alike.
-  constexpr double kAlike = 0.99;
-  double areas = 0;
-  for (const ContactPatch& patch : room.first(contact.count)) areas += patch.area;
-  if (contact.inside || !(contact.whole.translation_gradient.norm() > kAlike * areas)) return;
+  const bool waits = exact && !(found.penetration.volume > 0);
+  std::optional<Penetration> whole = contact.whole;
+  if (waits) {
+    if (contact.clearance > 0) return;
+    whole = push_across(a, b, contact.whole, reach, pair_id_);
+    if (!whole) return;
+  } else {
+    // Patches of a flat contact push alike.
+    constexpr double kAlike = 0.99;
+    double areas = 0;
+    for (const ContactPatch& patch : room.first(contact.count)) areas += patch.area;
+    if (contact.inside || !(whole->translation_gradient.norm() > kAlike * areas)) return;
+  }
 
   const auto radius = [](const Shape* shape) {
     return shape != nullptr ? shape->reach() : std::numeric_limits<double>::infinity();
   };
-  const auto blur = [](const Shape* shape) {
-    return shape != nullptr ? shape->scale() * shape->tree().protrusion() : 0;
-  };
   const bool by_second = radius(second_) <= radius(first_);
-  SupportPolygon polygon(
-      contact.whole, contact.origin, to_eigen(by_second ? second : first).linear(),
-      2 * std::min(radius(first_), radius(second_)),
-      settings.query.measure == Measure::exact ? 0 : blur(first_) + blur(second_));
+  SupportPolygon polygon(*whole, contact.origin, to_eigen(by_second ? second : first).linear(),
+                         2 * std::min(radius(first_), radius(second_)),
+                         exact && !waits ? 0 : reach);
   for (const bool of_second : {false, true}) {
     const PlacedSolid& solid = of_second ? b : a;
     if (polygon.add(of_second, solid)) continue;

@@ -189,12 +189,8 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
 ContactSettings contact_settings(const std::string& measure, bool spheres_only,
                                  std::uint32_t pair_budget, std::uint32_t max_visits,
                                  double relative_error, std::uint32_t pair_id) {
-  return {named(measure, "measure", kMeasures),
-          spheres_only,
-          pair_budget,
-          max_visits,
-          take_limit(relative_error, "relative_error"),
-          pair_id};
+  return {named(measure, "measure", kMeasures),         spheres_only, pair_budget, max_visits,
+          take_limit(relative_error, "relative_error"), pair_id};
 }
 
 void add_penetration(py::module_& module) {
@@ -219,10 +215,10 @@ void add_penetration(py::module_& module) {
                   cuda::Stream on) { penetration_batch(all, pairs, settings, workspace, to, on); });
         }
         refuse_output(given);
-        return py::cast(answer(
-            pair.rows(),
-            contact_settings(measure, spheres_only, pair_budget, max_visits, relative_error, pair_id),
-            scale_gradients, threads));
+        return py::cast(answer(pair.rows(),
+                               contact_settings(measure, spheres_only, pair_budget, max_visits,
+                                                relative_error, pair_id),
+                               scale_gradients, threads));
       },
       py::arg("scale_gradients") = false, py::arg("measure") = "matched",
       py::arg("spheres_only") = false, py::arg("pair_budget") = 0, py::arg("max_visits") = 0,

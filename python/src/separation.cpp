@@ -289,10 +289,10 @@ void add_separation(py::module_& module) {
         }
         refuse_output(given);
         if (max_patches < 1) throw value_error("max_patches: 0; wanted 1 or more");
-        return py::cast(patches(
-            pair.rows(), max_patches,
-            contact_settings(measure, spheres_only, pair_budget, max_visits, relative_error, pair_id),
-            threads));
+        return py::cast(patches(pair.rows(), max_patches,
+                                contact_settings(measure, spheres_only, pair_budget, max_visits,
+                                                 relative_error, pair_id),
+                                threads));
       },
       py::arg("max_patches") = kUsualPatches, py::arg("measure") = "matched",
       py::arg("spheres_only") = false, py::arg("pair_budget") = 0, py::arg("max_visits") = 0,

@@ -87,7 +87,8 @@ void add_solid_rows(py::module_& module) {
             return std::make_unique<Solids>(solids, text_of(device));
           }),
           py::arg("solids"), py::kw_only(), py::arg("device") = "cpu",
-          "solids: an ist.Asset or ist.Field each. device: 'cpu', 'cuda', 'cuda:1', …, or a device of PyTorch. A GPU gets a copy; batches "
+          "solids: an ist.Asset or ist.Field each. device: 'cpu', 'cuda', 'cuda:1', …, or a device "
+          "of PyTorch. A GPU gets a copy; batches "
           "of one Solids run there one after another, on any streams, because they share working "
           "memory. Keep it alive as long as captured graphs use it. Raises ist.Error if the device "
           "cannot be used or is out of memory.")

@@ -111,7 +111,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     settings.pair_budget = row.id % 40 == 0 ? 200 : 0;
     const ist_penetration_settings_t c_settings = {sizeof c_settings,
                                                    static_cast<ist_measure_t>(settings.measure),
-                                                   IST_SURFACE_AUTOMATIC,
+                                                   0,
                                                    settings.pair_budget,
                                                    settings.max_visits,
                                                    0,
@@ -125,11 +125,10 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
     expect_same(c_penetration, asked.penetration);
     expect_same(c_separation, asked.separation);
 
-    // The surface in A's asset as a field.
-    const PlacedField field{MeshField{a.tree}, a.pose, a.scale};
+    const PlacedField field{BallField{0.4}, a.pose, a.scale};
     auto c_field = sized<ist_field_t>();
-    c_field.kind = IST_MESH;
-    c_field.as.mesh.tree = &tree_a;
+    c_field.kind = IST_BALL;
+    c_field.as.ball.radius = 0.4;
     const ist_placed_t c_placed = {sizeof c_placed, nullptr, &c_field, c_a.pose, c_a.scale};
     ASSERT_GE(
         ist_query(&c_placed, &c_b, nullptr, nullptr, &c_workspace_, &c_penetration, &c_separation),
@@ -493,7 +492,7 @@ TEST(CApi, PatchesWithoutProtrusion) {
   ist_contact_patches_t c_patches = {sizeof c_patches, sizeof c_room[0], c_room.data(), count,
                                      count};
   auto c_settings = sized<ist_contact_settings_t>();
-  c_settings.surface = IST_SURFACE_NEVER;
+  c_settings.spheres_only = 1;
   ASSERT_EQ(ist_patches_without_protrusion(&c_a, &c_b, &c_settings, &c_patches), IST_OK);
   for (std::size_t i = 0; i < count; ++i) expect_same(c_room[i], patches[i]);
 }

@@ -93,7 +93,6 @@ static int trees_are_checked(const char* path) {
   CHECK(ist_tree_view(bytes, size, &tree) == IST_OK);
   CHECK(ist_tree_get_info(&tree, &info) == IST_OK);
   CHECK(info.spheres > 0 && info.volume > 0 && info.coverage >= 0 && info.coverage <= 1);
-  CHECK(info.has_surface == (info.surface_triangles > 0));
   CHECK(info.mesh_triangles == 0 || info.mesh_state == IST_MESH_OWN);
   CHECK(ist_tree_get_predicted_errors(&tree, &errors) == IST_OK && errors.size == sizeof errors);
   CHECK(errors.poses == 0 && errors.target_met == 0 && errors.classes[0].median == 0);

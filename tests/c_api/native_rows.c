@@ -78,12 +78,12 @@ static ist_placed_t placed_b(int i) {
 /* --- Queries, by name. Each answers row i and, if asked to, prints the answer -------------------
  */
 
-static void ask_penetration(int i, int print, ist_measure_t measure, ist_surface_use_t use,
+static void ask_penetration(int i, int print, ist_measure_t measure, uint32_t spheres_only,
                             uint32_t pair_budget, uint32_t max_visits) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings,
                                                .measure = measure,
-                                               .surface = use,
+                                               .spheres_only = spheres_only,
                                                .pair_budget = pair_budget,
                                                .max_visits = max_visits};
   ist_penetration_t answer = {.size = sizeof answer};
@@ -92,19 +92,19 @@ static void ask_penetration(int i, int print, ist_measure_t measure, ist_surface
 }
 
 static void matched(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_AUTOMATIC, 0, 0);
+  ask_penetration(i, print, IST_MATCHED, 0, 0, 0);
 }
-static void lenses_alone(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_NEVER, 0, 0);
+static void spheres_only(int i, int print) {
+  ask_penetration(i, print, IST_MATCHED, 1, 0, 0);
 }
-static void surface_alone(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_ALWAYS, 0, 0);
+static void exact(int i, int print) {
+  ask_penetration(i, print, IST_EXACT, 0, 0, 0);
 }
 static void inner(int i, int print) {
-  ask_penetration(i, print, IST_INNER, IST_SURFACE_AUTOMATIC, 0, 0);
+  ask_penetration(i, print, IST_INNER, 0, 0, 0);
 }
 static void budget(int i, int print) {
-  ask_penetration(i, print, IST_MATCHED, IST_SURFACE_AUTOMATIC, 200, 300);
+  ask_penetration(i, print, IST_MATCHED, 0, 200, 300);
 }
 
 static void ask_field(int i, int print, const ist_field_t* field) {
@@ -176,7 +176,7 @@ static void outline(int i, int print) {
 static void without_protrusion(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
   const ist_penetration_settings_t settings = {.size = sizeof settings,
-                                               .surface = IST_SURFACE_NEVER};
+                                               .spheres_only = 1};
   ist_penetration_t answer = {.size = sizeof answer};
   ist_penetration(&a, &b, &settings, &workspace, &answer);
   ist_without_protrusion(&answer, &a, &b, &answer);
@@ -185,7 +185,7 @@ static void without_protrusion(int i, int print) {
 
 static void patches_without_protrusion(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  const ist_contact_settings_t settings = {.size = sizeof settings, .surface = IST_SURFACE_NEVER};
+  const ist_contact_settings_t settings = {.size = sizeof settings, .spheres_only = 1};
   ist_contact_patch_t room[kMostPatches];
   ist_contact_patches_t found = {sizeof found, sizeof room[0], room, kMostPatches, 0};
   ist_contact_patches(&a, &b, &settings, &workspace, &found, NULL);
@@ -199,7 +199,7 @@ static void fit(int i, int print) {
   ist_get_pair_fit(&a, &b, &found);
   if (!print) return;
   print_doubles(&found.grain_a, 3);
-  printf(" %u %u %u %u", found.a_is_coarser, found.has_surface, found.needs_surface, found.fits);
+  printf(" %u %u %u %u", found.a_is_coarser, found.has_mesh, found.needs_mesh, found.fits);
 }
 
 static void wrenches(int i, int print) {
@@ -333,8 +333,8 @@ static const struct {
   void (*ask)(int i, int print);
 } kQueries[] = {
     {"matched", matched},
-    {"lenses alone", lenses_alone},
-    {"surface alone", surface_alone},
+    {"spheres only", spheres_only},
+    {"exact", exact},
     {"inner", inner},
     {"budget", budget},
     {"half-space", half_space},

@@ -86,8 +86,6 @@ int penetrations_answer(scene_t* s) {
   settings.measure = 3;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
   settings.measure = IST_MATCHED;
-  settings.surface = -1;
-  CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other) == IST_INVALID_INPUT);
   wrong = s->a;
   wrong.pose.t[1] = NAN;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
@@ -96,7 +94,7 @@ int penetrations_answer(scene_t* s) {
   wrong.scale = -1;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_INVALID_INPUT);
 
-  settings.surface = IST_SURFACE_NEVER;
+  settings.spheres_only = 1;
   settings.max_visits = 0;
   CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &whole) == IST_OK);
   CHECK(ist_without_protrusion(&whole, &s->a, &s->b, &other) == IST_OK);
@@ -117,10 +115,10 @@ int deadlines_limit(scene_t* s) {
   int i;
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &whole) == IST_OK);
   CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK); /* all zero: none */
-  CHECK(settings.pair_budget == 0 && settings.surface == IST_SURFACE_AUTOMATIC);
+  CHECK(settings.pair_budget == 0 && settings.spheres_only == 0);
   CHECK(ist_deadline_make(100, &deadline) == IST_OK);
   CHECK(ist_deadline_limit(&deadline, &settings) == IST_OK);
-  CHECK(settings.pair_budget > 0 && settings.surface == IST_SURFACE_NEVER);
+  CHECK(settings.pair_budget > 0 && settings.spheres_only == 1);
   CHECK(ist_deadline_too_slow(&deadline) == 0);
   for (i = 0; i < 300; ++i)
     CHECK(ist_deadline_record(&deadline, &whole, 1e6) == IST_OK &&
@@ -261,7 +259,7 @@ int patches_answer(scene_t* s) {
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, NULL, &whole) == IST_NULL_POINTER);
 
   /* Without protrusion: by lenses alone, where the faces hardly touch. */
-  settings.surface = IST_SURFACE_NEVER;
+  settings.spheres_only = 1;
   CHECK(ist_contact_patches(&s->a, &s->b, &settings, &s->workspace, &patches, NULL) == IST_OK);
   for (i = 0, volume = 0; i < patches.count; ++i) volume += room[i].volume;
   CHECK(ist_patches_without_protrusion(&s->a, &s->b, &settings, &patches) == IST_OK);
@@ -374,14 +372,12 @@ int fields_answer(scene_t* s) {
   static float numbers[125];
   static const double offset = 0.1;
   const ist_pose_t identity = IST_POSE_IDENTITY;
-  const ist_tree_t empty = {0};
   ist_field_t field = {.size = sizeof field};
   ist_placed_t a = {.size = sizeof a};
   ist_penetration_t answer = {.size = sizeof answer}, again = {.size = sizeof again};
   ist_separation_t gap = {.size = sizeof gap};
   ist_contact_patch_t room[4];
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
-  ist_tree_info_t info = {.size = sizeof info};
   double by_plane = 0;
   int kind, i;
   a.field = &field;
@@ -389,8 +385,7 @@ int fields_answer(scene_t* s) {
   patches.patches = room;
   patches.capacity = 4;
   for (i = 0; i < 125; ++i) numbers[i] = 0.1f;
-  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
-  for (kind = IST_HALF_SPACE; kind <= IST_MESH; ++kind) {
+  for (kind = IST_HALF_SPACE; kind <= IST_FUNCTION; ++kind) {
     memset(&field.as, 0, sizeof field.as);
     field.kind = kind;
     if (kind == IST_HALF_SPACE) {
@@ -411,15 +406,9 @@ int fields_answer(scene_t* s) {
       for (i = 0; i < 3; ++i) field.as.distance_grid.points[i] = 5;
       for (i = 0; i < 3; ++i) field.as.distance_grid.origin[i] = -1;
       field.as.distance_grid.spacing = 0.5;
-    } else if (kind == IST_FUNCTION) {
+    } else {
       field.as.function.sample = sample;
       field.as.function.context = &offset;
-    } else {
-      field.as.mesh.tree = &s->tree_a;
-      if (!info.has_surface) {
-        CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
-        break;
-      }
     }
     CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
     CHECK(answer.volume > 0);
@@ -441,13 +430,11 @@ int fields_answer(scene_t* s) {
 
   /* What they point to, null. */
   memset(&field.as, 0, sizeof field.as);
-  for (kind = IST_HEIGHTS; kind <= IST_MESH; ++kind) {
+  for (kind = IST_HEIGHTS; kind <= IST_FUNCTION; ++kind) {
     field.kind = kind;
     CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
     CHECK(is_refused(&answer, sizeof answer, IST_NULL_POINTER));
   }
-  field.as.mesh.tree = &empty;
-  CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
   memset(&field.as, 0, sizeof field.as);
   for (kind = IST_HALF_SPACE; kind <= IST_CYLINDER; ++kind) { /* no length may be 0 */
     field.kind = kind;

@@ -137,22 +137,19 @@ def test_a_surface_alone_answers_no_query_of_spheres(cube):
     assert ist.separation(cube, again, [1, 0, 0, 0, 3, 0, 0]).distance > 0  # of the meshes
 
 
-@pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none"), (0.1, "own"),
-                                            ("1%", "own")])
+@pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none")])
 def test_surface_says_what_is_kept(surface, state):
     closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
     assert ist.bake(closed, max_spheres=5, surface=surface).mesh_state == state
-    with pytest.raises(ist.Error, match="surface: 'some' is not one of"):
-        ist.bake(closed, max_spheres=5, surface="some")
+    for wrong in ("some", 0.1, "1%"):
+        with pytest.raises(ist.Error, match=f"surface: '{wrong}' is not one of all, none"):
+            ist.bake(closed, max_spheres=5, surface=wrong)
 
 
-def test_fields_hold_their_arrays_and_assets(cube):
+def test_fields_hold_their_arrays(cube):
     terrain = ist.HeightField(np.full((3, 3), 0.25, np.float32), spacing=(4, 4))
-    field = ist.MeshField(ist.Asset.from_bytes(cube.to_bytes()))
     gc.collect()
-    shifted = [1, 0, 0, 0, 4, 4, 0.5]
-    assert ist.penetration(terrain, cube, shifted).volume > 0
-    assert ist.penetration(field, cube, [1, 0, 0, 0, 0.5, 0, 0]).volume > 0
+    assert ist.penetration(terrain, cube, [1, 0, 0, 0, 4, 4, 0.5]).volume > 0
 
 
 def test_errors_speak_the_librarys_words(tmp_path):
@@ -347,11 +344,11 @@ def expect_same_columns(one, other):
             assert getattr(x, "dtype", None) == getattr(y, "dtype", None), name
 
 
-def test_shapes_and_meshes_pickle(knot, cube):
+def test_shapes_and_meshes_pickle(cube):
     heights = np.random.default_rng(1).uniform(0, 1, (4, 5)).astype(np.float32)
     inside = np.ones((3, 3, 3), np.float32)
     for shape in (ist.HalfSpaceField([0, 0, 2], 0.5), ist.BoxField([1, 2, 3]), ist.BallField(2),
-                  ist.CapsuleField(1, 2), ist.CylinderField(1, 2), ist.MeshField(knot),
+                  ist.CapsuleField(1, 2), ist.CylinderField(1, 2),
                   ist.HeightField(heights, spacing=(0.5, 0.5), lowest=0),
                   ist.DistanceGridField(inside, origin=[-1, -1, -1], spacing=1.0)):
         again = pickle.loads(pickle.dumps(shape))

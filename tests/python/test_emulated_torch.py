@@ -94,8 +94,8 @@ def test_overlaps_are_those_of_the_cpu(overlap, solids, random_poses, pairs, sca
     poses[1, 2, 5] = torch.nan
     scales = torch.linspace(0.7, 1.3, 24, dtype=torch.float64).reshape(4, 6) if scaled else None
     for p, s in ((poses, scales), (poses[0], scales[0] if scaled else None)):
-        theirs = gradients(ist.torch.overlap, solids, p, s, pairs=pairs, surface="never")
-        ours = gradients(overlap, solids, p, s, pairs=pairs, surface="never")
+        theirs = gradients(ist.torch.overlap, solids, p, s, pairs=pairs, spheres_only=True)
+        ours = gradients(overlap, solids, p, s, pairs=pairs, spheres_only=True)
         assert pairs == [] or p.ndim == 2 or theirs[0].nan_to_num().abs().max() > 0.01
         for k, (one, other) in enumerate(zip(ours, theirs)):
             assert one.shape == other.shape and (one.isnan() == other.isnan()).all()
@@ -111,19 +111,18 @@ def test_wrong_scenes_are_named(overlap, solids, random_poses):
             (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two Fields; one of them must"),
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
-            (dict(surface="always"), ValueError, "surface: 'always'; one of 'automatic', 'never'"),
             (dict(max_visits=1), ValueError, "max_visits: not on a GPU"),
             (dict(poses=poses[:5]), ValueError, r"poses: shape \(5, 7\); wanted \(6, 7\)"),
             (dict(scales=torch.ones(3)), ValueError, r"scales: shape \(3,\); wanted \(6,\)"),
             (dict(solids=[*solids[:5], 3]), TypeError, r"solids\[5\]: a int; wanted an Asset or a")]:
         with pytest.raises(error, match=text):
-            overlap(**{**dict(solids=solids, poses=poses, pairs=[(0, 2)], surface="never"), **wrong})
+            overlap(**{**dict(solids=solids, poses=poses, pairs=[(0, 2)], spheres_only=True), **wrong})
 
 
 def test_a_budget_is_passed_on(overlap, solids, random_poses):
     poses = torch.from_numpy(random_poses(6, 0.8))
-    assert not torch.equal(overlap(solids, poses, pair_budget=60, surface="never"),
-                           overlap(solids, poses, surface="never"))
+    assert not torch.equal(overlap(solids, poses, pair_budget=60, spheres_only=True),
+                           overlap(solids, poses, spheres_only=True))
 
 
 @pytest.mark.parametrize("held", [False, True])

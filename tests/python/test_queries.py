@@ -131,7 +131,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(scales=[[1.0]]), ValueError, r"scales: shape \(1, 1\); wanted a number or \(n,\)"),
     (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
-    (dict(surface="maybe"), ValueError, "surface: 'maybe'; one of 'automatic', 'never', 'always'"),
+    (dict(spheres_only="maybe"), TypeError, "spheres_only: a str; wanted True or False"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
     (dict(a=ist.BallField(2), b=ist.BallField(1)), TypeError, "a, b: two Fields"),
 ])
@@ -175,12 +175,12 @@ def compose(a, b):
     return np.concatenate((q, rotation(a) @ b[4:] + a[4:]))
 
 
-@pytest.mark.parametrize("surface", ["never", "automatic", "always"])
-def test_gradients_are_those_of_the_volume(gear, knot, random_poses, surface):
+@pytest.mark.parametrize("spheres_only", [False, True])
+def test_gradients_are_those_of_the_volume(gear, knot, random_poses, spheres_only):
     poses, poses_a = random_poses(24, 1.5), random_poses(24, 0.5)
     scales, scales_a = np.full(24, 0.8), np.full(24, 1.2)
     found = ist.penetration(gear, knot, poses, poses_a=poses_a, scales=scales, scales_a=scales_a,
-                            surface=surface, scale_gradients=True)
+                            spheres_only=spheres_only, scale_gradients=True)
     met = found.volume > 1e-2
     assert met.sum() > 12
 
@@ -189,7 +189,7 @@ def test_gradients_are_those_of_the_volume(gear, knot, random_poses, surface):
         for moved in (b, a):  # the function is of q/|q|
             moved[:, :4] /= np.linalg.norm(moved[:, :4], axis=1, keepdims=True)
         return ist.penetration(gear, knot, b, poses_a=a, scales=scale, scales_a=scale_a,
-                               surface=surface).volume
+                               spheres_only=spheres_only).volume
 
     h = 1e-4
     for k in range(7):
@@ -220,19 +220,13 @@ def test_fields_meet_assets(cube):
     pose = np.concatenate(([1, 0, 0, 0], -centre))
     for field in (ist.HalfSpaceField(offset=side), ist.BoxField([side, side, side]),
                   ist.BallField(side), ist.CapsuleField(side, side), ist.CylinderField(side, side),
-                  ist.MeshField(cube), ball):
-        if isinstance(field, ist.MeshField):
-            assert ist.penetration(field, cube, [1, 0, 0, 0, side / 2, 0, 0]).volume == pytest.approx(
-                cube.volume / 2, rel=0.02)
-        else:
-            assert ist.penetration(field, cube, pose).volume == pytest.approx(cube.volume, rel=1e-2)
-            assert ist.overlap(field, cube, pose) == ist.Overlapping.yes
+                  ball):
+        assert ist.penetration(field, cube, pose).volume == pytest.approx(cube.volume, rel=1e-2)
+        assert ist.overlap(field, cube, pose) == ist.Overlapping.yes
     with pytest.raises(ValueError, match=r"half_extents: shape \(2,\); wanted \(3,\)"):
         ist.BoxField([1, 2])
     with pytest.raises(ValueError, match=r"heights: shape \(4,\); wanted \(rows, columns\)"):
         ist.HeightField(np.zeros(4))
-    with pytest.raises(TypeError, match="MeshField|Asset|asset"):
-        ist.MeshField(ist.BallField(1))
     for refused, text in (
             (lambda: ist.BallField(-1), "radius=-1.0; wanted > 0"),
             (lambda: ist.BoxField([-1, 1, 1]), "half_extents="),
@@ -249,12 +243,6 @@ def test_fields_meet_assets(cube):
             (lambda: ist.DistanceGridField(np.zeros((2, 2, 2)), origin=(0, 0, 0), spacing=-1), "spacing=-1")):
         with pytest.raises(ValueError, match=text):
             refused()
-    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
-    with pytest.raises(ist.Error, match="asset: holds no surface"):
-        ist.MeshField(bare)
-    with pytest.raises(ist.Error, match="surface='always': the asset of coarser spheres holds no surface"):
-        ist.penetration(bare, bare, pose, surface="always")
-    assert (ist.penetration(bare, bare, [pose], surface="always").status == ist.QueryStatus.not_held).all()
     assert repr(ist.BoxField([1, 2, 3])) == "ist.BoxField(half_extents=[1, 2, 3])"
 
 
@@ -387,24 +375,29 @@ def test_pictures_and_corrections(cube, knot):
     assert triangles.max() < len(vertices) and triangles.shape == (12, 3)
     corners = vertices[triangles]
     volume = np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
-    assert volume == pytest.approx(cube.volume, rel=1e-6)
-    with pytest.raises(ist.Error, match="holds no surface"):
+    assert len(vertices) == 8 and volume == pytest.approx(cube.volume, rel=1e-12)
+    with pytest.raises(ist.Error, match="holds no mesh"):
         ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none").surface()
     side = cube.bounds().upper[0] - cube.bounds().lower[0]
     pose = [1, 0, 0, 0, 1.001 * side, 0, 0]
-    whole = ist.penetration(cube, cube, pose, surface="never")
+    whole = ist.penetration(cube, cube, pose, spheres_only=True)
     found = ist.lenses(cube, cube, pose)
     assert len(found.centre) == whole.sphere_pairs > 0
     assert np.linalg.norm(found.axis, axis=1) == pytest.approx(1)
     fewer = ist.without_protrusion(whole, cube, cube, pose)
     assert fewer.volume < whole.volume
-    deep = ist.penetration(cube, cube, IDENTITY, surface="never")
+    deep = ist.penetration(cube, cube, IDENTITY, spheres_only=True)
     assert ist.without_protrusion(deep, cube, cube, IDENTITY).volume == deep.volume
     with pytest.raises(ValueError, match="whole: shape"):
         ist.without_protrusion(whole, cube, cube, [pose])
     fit = ist.pair_fit(cube, cube)
     assert fit.fits and fit.ratio == 1 and fit.grain_a == fit.grain_b > 0
-    assert ist.pair_fit(cube, cube, scale=100).needs_surface
+    unlike = ist.pair_fit(cube, cube, scale=100)
+    assert unlike.needs_mesh and unlike.has_mesh and unlike.fits
+    inside = [1, 0, 0, 0, 0, 0, 0]
+    by_meshes, by_spheres = (ist.penetration(cube, cube, inside, scales=100, spheres_only=only).volume
+                             for only in (False, True))
+    assert by_meshes == pytest.approx(cube.volume, rel=1e-12) != pytest.approx(by_spheres, rel=1e-3)
     with pytest.raises(ValueError, match="scale: 0.0"):
         ist.pair_fit(cube, cube, scale=0)
 

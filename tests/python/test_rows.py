@@ -17,7 +17,7 @@ def ask(solids, *, a, b, poses, query=ist.penetration, **arguments):
     if query is ist.separation:
         arguments.setdefault("inner_spheres", True)
     else:
-        arguments.setdefault("surface", "never")
+        arguments.setdefault("spheres_only", True)
     return query(solids[a], solids[b], poses, **arguments)
 
 
@@ -137,9 +137,7 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
                  (ist.separation, dict(wanted=["distance"]), "wanted: for solids on a GPU only"),
                  (ist.contact_patches, dict(stream=1), "stream: for solids on a GPU only")]
     else:
-        wrong = [(ist.penetration, dict(surface="always"), "surface: 'always'; one of 'automatic'"),
-                 (ist.contact_patches, dict(surface="always"), "surface: 'always'; one of 'automatic'"),
-                 (ist.penetration, dict(measure="exact"), "measure: 'exact'; one of 'matched', 'inner'"),
+        wrong = [(ist.penetration, dict(measure="exact"), "measure: 'exact'; one of 'matched', 'inner'"),
                  (ist.penetration, dict(max_visits=9), "max_visits: not on a GPU"),
                  (ist.penetration, dict(relative_error=0.1), "relative_error: not on a GPU"),
                  (ist.penetration, dict(scale_gradients=True), "scale_gradients: not on a GPU"),
@@ -154,8 +152,8 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
 def test_the_defaults_work_on_both(device, there, solids, arguments):
     """On a GPU they mean lenses and inner spheres."""
     held = ist.Solids(solids, device=device)
-    for query, meant, name in [(ist.penetration, dict(surface="never"), "volume"),
-                               (ist.contact_patches, dict(surface="never"), "volume"),
+    for query, meant, name in [(ist.penetration, dict(spheres_only=True), "volume"),
+                               (ist.contact_patches, dict(spheres_only=True), "volume"),
                                (ist.separation, dict(inner_spheres=True), "distance")]:
         found, same = (back(getattr(query(held[0], held[1], there(arguments["poses"]), **settings), name))
                        for settings in ({}, meant))
@@ -185,7 +183,7 @@ def test_every_query_takes_unlike_rows(solids, arguments):
     by = dict(poses_a=arguments["poses_a"], scales=arguments["scales"], scales_a=arguments["scales_a"])
     meet = ist.overlap(held[a], held[b], poses, **by)
     times = ist.time_of_impact(held[a], held[b], poses, poses_to, **by)
-    whole = ist.penetration(held[a], held[b], poses, surface="never", scale_gradients=True, **by)
+    whole = ist.penetration(held[a], held[b], poses, spheres_only=True, scale_gradients=True, **by)
     assert {0, 1} <= set(meet.tolist()) and len(set(times.status.tolist())) > 1
     everything = [*solids, ist.HalfSpaceField()]
     for i in range(60):
@@ -193,7 +191,7 @@ def test_every_query_takes_unlike_rows(solids, arguments):
         pair = everything[a[i]], everything[b[i]], poses[i]
         assert ist.overlap(*pair, **one) == meet[i]
         assert ist.time_of_impact(*pair, poses_to[i], **one).time == times.time[i]
-        single = ist.penetration(*pair, surface="never", scale_gradients=True, **one)
+        single = ist.penetration(*pair, spheres_only=True, scale_gradients=True, **one)
         for name in ("volume", "pose_gradient", "pose_gradient_a", "scale_gradient_a"):
             assert np.array_equal(getattr(single, name), getattr(whole, name)[i]), name
 

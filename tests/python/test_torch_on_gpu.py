@@ -12,7 +12,7 @@ pytestmark = pytest.mark.skipif(not ist.gpu.available(), reason=f"{ist.gpu.why_n
 if ist.gpu.available():
     torch = pytest.importorskip("torch", reason="no PyTorch")
     import ist.torch
-    overlap = functools.partial(ist.torch.overlap, surface="never")
+    overlap = functools.partial(ist.torch.overlap, spheres_only=True)
 
 CYCLES = 1_000_000_000  # a good part of a second
 
@@ -48,10 +48,9 @@ def test_overlaps_are_those_of_the_cpu(solids, random_poses):
 
 
 def test_fields_stand_first(solids, random_poses):
-    poses = torch.from_numpy(random_poses(600, 0.8).reshape(100, 6, 7))
-    solids = [solids[0], ist.HalfSpaceField(), solids[1], ist.BoxField([0.5, 0.7, 0.6]), solids[2],
-              ist.MeshField(solids[1])]
-    scales = torch.linspace(0.7, 1.3, 600, dtype=torch.float64).reshape(100, 6)
+    poses = torch.from_numpy(random_poses(500, 0.8).reshape(100, 5, 7))
+    solids = [solids[0], ist.HalfSpaceField(), solids[1], ist.BoxField([0.5, 0.7, 0.6]), solids[2]]
+    scales = torch.linspace(0.7, 1.3, 500, dtype=torch.float64).reshape(100, 5)
     for s in (None, scales):
         ours = gradients(solids, poses.clone(), s, "cuda")
         theirs = gradients(solids, poses.clone(), s, "cpu")

@@ -56,7 +56,9 @@ export type SphereMeasure = 'matched' | 'inner';
 
 /**
  * What represents the solid: a set of spheres, or its mesh. `exact`: the true volume and its
- * gradients, for two assets that both store their mesh (AssetInfo.meshTriangles > 0).
+ * gradients, for two assets that both store their mesh (AssetInfo.meshTriangles > 0). `matched` goes
+ * over to it where the spheres are too coarse for the contact of two solids of unlike sizes that
+ * both store theirs (ContactOptions.spheresOnly).
  */
 export type Measure = SphereMeasure | 'exact';
 
@@ -65,7 +67,7 @@ export interface AssetInfo {
   name: string;
   /** Bytes of the asset. */
   bytes: number;
-  /** Count of spheres, of each of the two sets. 0: a surface alone, without spheres to query. */
+  /** Count of spheres, of each of the two sets. 0: a mesh alone, without spheres to query. */
   spheres: number;
   /** Count of spheres of the matched set at each level of detail, finest first. */
   details: number[];
@@ -75,14 +77,11 @@ export interface AssetInfo {
   coverage: number;
   /** [u] bound on how far matched spheres stick out of the solid. */
   protrusion: number;
-  /** The asset stores the solid's surface, which makes queries of spheres exact. */
-  hasSurface: boolean;
-  /** [u] the stored surface and the solid's lie within this of each other. */
-  surfaceError: number;
-  /** Count of triangles of the stored surface. */
-  surfaceTriangles: number;
-  /** State of the mesh for exact queries; `unresolved`: none, since it counts volume twice. */
-  meshState: 'none' | 'own' | 'resolved' | 'simplified' | 'unresolved';
+  /**
+   * State of the mesh for exact queries. `polygonised`: made from a signed distance. `unresolved`:
+   * none, since it counts volume twice.
+   */
+  meshState: 'none' | 'own' | 'resolved' | 'polygonised' | 'unresolved';
   /** Count of triangles of that mesh, 0: there is none. */
   meshTriangles: number;
   /** [u] its surface and the solid's lie within this of each other. */
@@ -127,7 +126,7 @@ export interface Surface {
   triangles: Uint32Array;
 }
 
-/** An .ist asset: a solid as spheres, trees over them, and usually its surface and mesh. */
+/** An .ist asset: a solid as spheres, trees over them, and usually its mesh. */
 export class Asset {
   /**
    * Copies and checks an asset's bytes.
@@ -153,13 +152,10 @@ export class Asset {
    */
   level(level: number, set?: SphereSet): Float64Array;
 
-  /**
-   * The stored surface, within AssetInfo.surfaceError of the solid's, or the mesh of a surface alone;
-   * null if there is none.
-   */
+  /** The stored mesh; null if there is none. */
   surface(): Surface | null;
 
-  /** Releases the memory. Fields of this asset must not be used any more. May be called twice. */
+  /** Releases the memory. May be called twice. */
   free(): void;
 }
 
@@ -196,8 +192,6 @@ export class Field {
     spacing: number,
     options?: { origin?: Vector; error?: number },
   ): Field;
-  /** The stored surface of an asset, without its spheres. */
-  static surface(asset: Asset): Field;
 
   /** Releases the memory. May be called twice. */
   free(): void;
@@ -221,10 +215,10 @@ export interface ContactOptions extends Limits {
   /** Default `matched`. `exact` obeys only the limit maxVisits. */
   measure?: Measure;
   /**
-   * Whether the stored surface of an asset is used: where spheres are too coarse for the contact
-   * (`automatic`, the default), `never`, or `always`.
+   * Sums spheres even where they are too coarse for two solids of unlike sizes, and may be wrong by
+   * any factor (pairFit()); otherwise the meshes answer there. `matched` only. Default false.
    */
-  surface?: 'automatic' | 'never' | 'always';
+  spheresOnly?: boolean;
   /**
    * Accepted relative error of the volume, such as 0.005 for 0.5 %. The query uses the cheapest level
    * of detail, or `exact`, whose predicted error is smaller, blended smoothly. `matched` only.
@@ -515,8 +509,8 @@ export function contains(
  * a gap of a fifth of a mean sphere radius. Round and deeper contacts are unchanged. Use it for
  * contacts, not where energy must be conserved: the force is the volume's gradient to within 15 %.
  *
- * `whole`: the answer of penetration() at these poses by lenses, {surface: 'never'}, in the matched
- * measure without a pair budget. `into` may be `whole`.
+ * `whole`: the answer of penetration() at these poses with {spheresOnly: true}, without a pair
+ * budget. `into` may be `whole`.
  */
 export function withoutProtrusion(
   whole: Penetration,
@@ -570,11 +564,11 @@ export interface PairFit {
   /** ≥ 1, coarser grain over the finer. */
   ratio: number;
   aIsCoarser: boolean;
-  /** The coarser asset stores its surface. */
-  hasSurface: boolean;
+  /** Both assets store their meshes. */
+  hasMesh: boolean;
   /** Volumes and forces by spheres alone are misleading. */
-  needsSurface: boolean;
-  /** hasSurface, or not needsSurface. */
+  needsMesh: boolean;
+  /** hasMesh, or not needsMesh. */
   fits: boolean;
 }
 
@@ -626,7 +620,7 @@ export interface ImpactOptions extends Limits {
   duration?: number;
   /**
    * [u] Default 0: a thousandth of the smaller solid's bounding radius, or ten times the error of
-   * the stored surfaces if that is more.
+   * the meshes if that is more.
    */
   tolerance?: number;
   into?: Impact;
@@ -655,7 +649,10 @@ export interface Impact {
   surfacePairs: number;
 }
 
-/** A proven time up to which two moving solids stay clear. Needs the stored surface of both. */
+/**
+ * A proven time up to which two moving solids stay clear: of their meshes, or where an asset stores
+ * none, of balls that contain it.
+ */
 export function timeOfImpact(
   a: Asset | Field,
   b: Asset | Field,

@@ -5,7 +5,6 @@ import {count, desk, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {checkOptions} from './options.js';
-import {welded} from './weld.js';
 
 /** Gives back what nobody refers to any more. */
 const forgotten = new FinalizationRegistry((places) => places.forEach(give));
@@ -44,7 +43,7 @@ function bytesOf(given) {
       'await (await fetch(address)).arrayBuffer()');
 }
 
-const kMeshStates = ['none', 'own', 'resolved', 'simplified', 'unresolved'];
+const kMeshStates = ['none', 'own', 'resolved', 'polygonised', 'unresolved'];
 
 export class Asset extends Owner {
   static from(given, name = 'asset') {
@@ -83,8 +82,8 @@ export class Asset extends Owner {
     const integers = u32(), at = desk().info / 4, values = at / 2 + 2;
     const details = [];
     const spheres = integers[at + 2] + 2 ** 32 * integers[at + 3];
-    // A surface alone has no levels of spheres.
-    for (let i = 0; spheres > 0 && i < integers[at + 13]; ++i)
+    // A mesh alone has no levels of spheres.
+    for (let i = 0; spheres > 0 && i < integers[at + 1]; ++i)
       details.push(this._count({detail: i}, 0));
     return {
       name: this._name,
@@ -94,13 +93,10 @@ export class Asset extends Owner {
       volume: numbers[values],
       coverage: numbers[values + 1],
       protrusion: numbers[values + 2],
-      hasSurface: integers[at + 1] !== 0,
-      surfaceError: numbers[values + 3],
-      surfaceTriangles: integers[at + 12],
-      meshState: kMeshStates[integers[at + 15]],
-      meshTriangles: integers[at + 14],
-      meshError: numbers[values + 6],
-      countedTwice: numbers[values + 7],
+      meshState: kMeshStates[integers[at + 11]],
+      meshTriangles: integers[at + 10],
+      meshError: numbers[values + 4],
+      countedTwice: numbers[values + 5],
     };
   }
 
@@ -170,20 +166,21 @@ export class Asset extends Owner {
     return withRoom(24 * vertices + 12 * triangles, (room) => {
       const corners = room + 24 * vertices;
       check(wasm.surface(this._at, room, vertices, corners, triangles), this._name);
-      return welded(
-          f64().subarray(room / 8, room / 8 + 3 * vertices),
-          u32().subarray(corners / 4, corners / 4 + 3 * triangles));
+      return {
+        positions: f64().slice(room / 8, room / 8 + 3 * vertices),
+        triangles: u32().slice(corners / 4, corners / 4 + 3 * triangles),
+      };
     });
   }
 }
 
 // ist_field_kind_t
 const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6,
-      kDistanceGrid = 7, kMesh = 9;
+      kDistanceGrid = 7;
 
 /** A field of up to eight numbers, and of `data`, whose memory it owns. */
 function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
-  const owned = data === 0 || kind === kMesh ? [] : [data];
+  const owned = data === 0 ? [] : [data];
   try {
     const wasm = functions('a field');
     const absent = numbers.concat(Array(8 - numbers.length).fill(0));
@@ -256,17 +253,9 @@ export class Field extends Owner {
     return made(kDistanceGrid, [...origin, spacing, options?.error ?? 0], data, ...along);
   }
 
-  static surface(asset) {
-    if (!(asset instanceof Asset)) throw new IstError('ist: Field.surface() takes an Asset');
-    const field = made(kMesh, [], asset._at);
-    field._asset = asset;
-    return field;
-  }
-
   /** Its place in WebAssembly. */
   get _at() {
     if (this._places === null) throw new IstError('ist: a field was used after free()');
-    this._asset?._at;  // which throws if it is free
     return this._places[0];
   }
 }

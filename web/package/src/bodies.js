@@ -54,8 +54,8 @@ export function pairFit(a, b, options) {
     grainB: numbers[at + 1],
     ratio: numbers[at + 2],
     aIsCoarser: integers[2 * at + 6] !== 0,
-    hasSurface: integers[2 * at + 7] !== 0,
-    needsSurface: integers[2 * at + 8] !== 0,
+    hasMesh: integers[2 * at + 7] !== 0,
+    needsMesh: integers[2 * at + 8] !== 0,
     fits: integers[2 * at + 9] !== 0,
   };
 }

@@ -73,7 +73,6 @@ export function count(value, absent, what) {
 
 const kSphereMeasures = ['matched', 'inner'];
 const kMeasures = [...kSphereMeasures, 'exact'];
-const kSurfaceUses = ['automatic', 'never', 'always'];
 const limit = (value, what) => (value === undefined ? 0 : number(value, what));
 
 /** Of what has spheres to show. */
@@ -86,7 +85,7 @@ export function writeSettings(options) {
   const integers = u32();
   const at = desk().settings / 4;
   integers[at + 1] = choice(options?.measure, kMeasures, 'measure');
-  integers[at + 2] = choice(options?.surface, kSurfaceUses, 'surface');
+  integers[at + 2] = options?.spheresOnly ? 1 : 0;
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
   integers[at + 5] = count(options?.pairId, 0, 'pairId');

@@ -80,8 +80,8 @@ ist_status_t surface(const ist_tree_t* tree, double (*vertices)[3], size_t verte
   return status;
 }
 
-/* A field of the eight numbers of place A; null if there is no memory. `data`: heights, distances
- * or a tree. `columns`, `rows`, `layers`: of data. */
+/* A field of the eight numbers of place A; null if there is no memory. `data`: heights or
+ * distances. `columns`, `rows`, `layers`: of data. */
 EXPORT(field)
 ist_field_t* field(ist_field_kind_t kind, const void* data, uint32_t columns, uint32_t rows,
                    uint32_t layers) {
@@ -103,9 +103,6 @@ ist_field_t* field(ist_field_kind_t kind, const void* data, uint32_t columns, ui
       made->as.distance_grid.points[1] = rows;
       made->as.distance_grid.points[2] = layers;
       memcpy(made->as.distance_grid.origin, numbers, 5 * sizeof *numbers); /* spacing, error too */
-      break;
-    case IST_MESH:
-      made->as.mesh.tree = data;
       break;
     default: /* at most four numbers, in the order of the header */
       memcpy(&made->as, numbers, 4 * sizeof *numbers);

@@ -1,7 +1,7 @@
 // Names that options may have: others are misspelt.
 
 const kLimits = ['maxVisits', 'poseA', 'into'];
-const kContact = [...kLimits, 'measure', 'surface', 'relativeError', 'pairBudget', 'pairId'];
+const kContact = [...kLimits, 'measure', 'spheresOnly', 'relativeError', 'pairBudget', 'pairId'];
 const kOfBatch = (names) => names.filter((name) => name !== 'poseA');
 const kPenetration = kContact, kPatches = [...kContact, 'maxPatches'];
 

@@ -52,12 +52,12 @@ function moreQueries(ist, a, b, halfSpace) {
   return {
     'without protrusion': {
       ask: (pose) =>
-          ist.withoutProtrusion(ist.penetration(a, b, pose, {surface: 'never'}), a, b, pose),
+          ist.withoutProtrusion(ist.penetration(a, b, pose, {spheresOnly: true}), a, b, pose),
       bits: penetrationBits,
     },
     'patches without protrusion': {
       ask: (pose) => {
-        const options = {surface: 'never', maxPatches: 16};
+        const options = {spheresOnly: true, maxPatches: 16};
         const found = ist.contactPatches(a, b, pose, options);
         return ist.patchesWithoutProtrusion(found, a, b, pose, options);
       },
@@ -66,8 +66,8 @@ function moreQueries(ist, a, b, halfSpace) {
     'fit': {
       ask: (pose) => ist.pairFit(a, b, {scaleB: pose.scale}),
       bits: (f) =>
-          [...hexes([f.grainA, f.grainB, f.ratio]), Number(f.aIsCoarser), Number(f.hasSurface),
-           Number(f.needsSurface), Number(f.fits)],
+          [...hexes([f.grainA, f.grainB, f.ratio]), Number(f.aIsCoarser), Number(f.hasMesh),
+           Number(f.needsMesh), Number(f.fits)],
     },
     'wrenches': {
       ask: (pose) => ist.wrenches(
@@ -134,8 +134,8 @@ export function queries(ist, a, b) {
         forOutline = {maxPatches: 16, into: undefined};
   return {
     'matched': penetrationOf(a),
-    'lenses alone': penetrationOf(a, {surface: 'never'}),
-    'surface alone': penetrationOf(a, {surface: 'always'}),
+    'spheres only': penetrationOf(a, {spheresOnly: true}),
+    'exact': penetrationOf(a, {measure: 'exact'}),
     'inner': penetrationOf(a, {measure: 'inner'}),
     'budget': penetrationOf(a, {pairBudget: 200, maxVisits: 300}),
     'half-space': penetrationOf(halfSpace),

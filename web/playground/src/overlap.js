@@ -30,10 +30,10 @@ export class Overlap {
     }
   }
 
-  /** Takes two solids; of those that hold no surface only an outline is drawn. */
+  /** Takes two solids; nothing is drawn where one holds no mesh. */
   hold(a, b) {
     for (const {columns} of this.skins) columns?.dispose();
-    const drawn = a.info.hasSurface && b.info.hasSurface;
+    const drawn = a.info.meshTriangles > 0 && b.info.meshTriangles > 0;
     [[a, b], [b, a]].forEach(([own, other], k) => {
       const skin = this.skins[k], {mesh, uniforms} = skin;
       skin.columns = undefined;

@@ -1,4 +1,4 @@
-// A solid as it is drawn: the surface that its asset holds, its spheres at a level of detail, or a
+// A solid as it is drawn: the mesh that its asset holds, its spheres at a level of detail, or a
 // level of its tree.
 
 import * as THREE from 'three';
@@ -71,7 +71,7 @@ export class Solid {
 
   show(mode, level) {
     this.asked = {mode, level};
-    if (mode === 'surface' && !this.info.hasSurface) mode = 'spheres';
+    if (mode === 'surface' && this.info.meshTriangles === 0) mode = 'spheres';
     const last = Math.max(0, this.levels(mode).length - 1);
     this.shown = {mode, level: Math.min(level, last)};
     this.draw();
