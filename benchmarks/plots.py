@@ -46,8 +46,8 @@ def small_large(report, path):
             mine = sorted((row for row in rows if (row["pair"], row["depth"]) == (pair, depth)),
                           key=lambda row: row["ratio"])
             ratios = [row["ratio"] for row in mine]
-            line, = axis.loglog(ratios, [row["surface volume median %"] for row in mine], "o-",
-                                label=f"depth {depth:g}, surface")
+            line, = axis.loglog(ratios, [row["default volume median %"] for row in mine], "o-",
+                                label=f"depth {depth:g}, by default")
             axis.loglog(ratios, [row["lenses volume median %"] for row in mine], "s--",
                         color=line.get_color(), label=f"depth {depth:g}, lenses")
         axis.set(title=pair, xlabel="size of B over A's")

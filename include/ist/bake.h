@@ -14,8 +14,8 @@
 
 namespace IST_API ist {
 
-/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees, the mesh
-/// and the surface.
+/// Makes the asset of a closed mesh: inner spheres, matched spheres, cover radii, trees and the
+/// mesh.
 ///
 /// The same mesh, settings and seed give the same bytes on any machine, CPU or GPU, for any number
 /// of threads. Cancelling during packing keeps the spheres so far; before and after packing it

@@ -222,11 +222,12 @@ class Workspace {
 /// worst poses: at least 4,096, and 169,140 for two cubes of 64,000 spheres. The call allocates,
 /// and takes some 0.3 s for 16,000 spheres.
 ///
-/// It does not cover Measure::exact and time_of_impact(). A capacity c lets penetration() by the
-/// exact measure open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh
-/// that cross the other: copies in place need most. Patches and outlines hold all crossings at
-/// once, c / 16 + 128. The mesh must have no more than c blocks. What these return here may be too
-/// little for them (a bolt in its nut: 10,710, where 34,816 are needed): use the default capacity.
+/// It does not cover time_of_impact() and Measure::exact, nor the meshes that answer for unlike
+/// sizes (PenetrationSettings::spheres_only). A capacity c lets penetration() by the exact measure
+/// open c + 2,048 pairs of blocks of 16 triangles and c / 64 + 8 blocks of a mesh that cross the
+/// other: copies in place need most. Patches and outlines hold all crossings at once, c / 16 + 128.
+/// The mesh must have no more than c blocks. What these return here may be too little for them (a
+/// bolt in its nut: 10,710, where 34,816 are needed): use the default capacity.
 ///
 /// Throws Error for an empty asset, a scale out of range, or two fields.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
@@ -378,9 +379,9 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
 /// only where they hardly touch.
 ///
 /// Volumes are reduced; areas, forces and torques are scaled with them. A patch reduced to nothing
-/// is kept, with zeros and no normal. Patches whose spheres met a surface, and those of the inner
-/// and the exact measure, are unchanged. The accompanying Penetration is not updated; it no longer
-/// equals the sum of the patches.
+/// is kept, with zeros and no normal. Patches of solids of unlike sizes, where meshes may answer,
+/// and those of the inner and the exact measure are unchanged. The accompanying Penetration is not
+/// updated; it no longer equals the sum of the patches.
 ///
 /// `patches`: those that contact_patches() wrote for these two under these settings.
 void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
