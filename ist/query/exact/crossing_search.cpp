@@ -10,6 +10,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/exact/crossing_ends-inl.h"
 #include "query/exact/nearest_points.h"
 #include "query/exact/pair_signs-inl.h"
 #include "query/exact/placed_mesh-inl.h"
@@ -429,7 +430,7 @@ class TriangleSearch : PairSigns {
     pairs.count = 0;
     const std::uint32_t asks = std::exchange(pairs.asks, 0);
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
-    Heights heights;
+    PairHeights heights;
     find_heights<kAsks>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
@@ -444,7 +445,7 @@ class TriangleSearch : PairSigns {
 
   /// Tests by edges the pairs that planes left.
   template <bool kAsks>
-  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights, std::uint32_t all,
+  HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights, std::uint32_t all,
                              std::uint32_t asks) {
     WaysRound round;
     find_ways_round<kAsks>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
@@ -551,59 +552,20 @@ class TriangleSearch : PairSigns {
     }
   }
 
-  void add_crossings(const TrianglePairs& pairs, const Heights& heights,
+  void add_crossings(const TrianglePairs& pairs, const PairHeights& heights,
                      const std::uint32_t (&pierced)[2][3], std::uint32_t crossing) {
-    if (found_.crossings + static_cast<std::uint32_t>(std::popcount(crossing)) >
-        scratch_.most_crossings) {
+    const auto added = static_cast<std::uint32_t>(std::popcount(crossing));
+    if (found_.crossings + added > scratch_.most_crossings) {
       found_.complete = false;
       return;
     }
+    write_crossings(pairs, heights, pierced, crossing, found_.crossings, scratch_.crossings);
+    found_.crossings += added;
     for (; crossing != 0; crossing &= crossing - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
-      const std::uint32_t at = found_.crossings++;
-      for (int s = 0; s < 2; ++s) {
-        scratch_.crossings.triangle(s, at) = pairs.triangle[s][n];
-        set((s == 0 ? scratch_.a : scratch_.b).near, pairs.triangle[s][n] / kWidth);
-        for (int k = 0; k < 3; ++k)
-          if (pierced[s][k] >> n & 1) add_end(pairs, heights, n, s, k, at);
-      }
+      const int n = std::countr_zero(crossing);
+      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
     }
-  }
-
-  /// Where edge k of a side of pair n goes through the other triangle.
-  void add_end(const TrianglePairs& pairs, const Heights& heights, std::uint32_t n, int s, int k,
-               std::uint32_t at) {
-    const int next = (k + 1) % 3;
-    const double hp = std::abs(heights.value[s][k][n]), hq = std::abs(heights.value[s][next][n]);
-    const double whole = hp + hq, error = heights.error[s][k][n] + heights.error[s][next][n];
-    const auto& corner = pairs.corner[s];
-    const auto before = [&] {
-      for (int c = 0; c < 3; ++c)
-        if (corner[k][c][n] != corner[next][c][n]) return corner[next][c][n] < corner[k][c][n];
-      return false;
-    };
-    // From the nearer end, and between two as near from the first in space, so that both triangles
-    // at an edge do alike.
-    const bool turned = hq < hp || (hq == hp && before());
-    // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
-    const bool flat = whole == 0;
-    const double share = flat ? 0.5 : std::min(hp, hq) / whole;
-    // An edge that goes down enters the other solid.
-    const bool down = (heights.positive[s][k] >> n & 1) != 0;
-    const int e = down == (s == 0) ? 1 : 0;
-    const auto put = [&](int number, double value) {
-      scratch_.crossings.end(e, number)[at] = value;
-    };
-    const int near = turned ? next : k, far = turned ? k : next;
-    for (int c = 0; c < 3; ++c) {
-      put(Crossings::kFrom + c, corner[near][c][n]);
-      put(Crossings::kOffset + c, share * (corner[far][c][n] - corner[near][c][n]));
-    }
-    put(Crossings::kT, turned ? 1 - share : share);
-    // Which of two places comes first is asked with B moved aside.
-    put(Crossings::kTError, flat ? 1 : 2 * (error + 2 * heights.shift[s][n]) / whole + 1e-15);
-    put(Crossings::kHeightError, error);
-    put(Crossings::kEdge, 3 * s + k + (turned ? 0 : 8));
   }
 
   const MeshTree& a_;

@@ -16,40 +16,40 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
+HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
+  const D d;
+  return {hn::Load(d, pairs.corner[side][c][0] + l), hn::Load(d, pairs.corner[side][c][1] + l),
+          hn::Load(d, pairs.corner[side][c][2] + l)};
+}
+
+inline std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
+inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
+  return each(bits) | ~(bits[0] | bits[1] | bits[2]);
+}
+
+/// Heights of eight pairs, and what their signs say: a bit each.
+struct alignas(64) PairHeights {
+  double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
+  double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
+  std::uint32_t positive[2][3] = {};  ///< with B moved aside
+  std::uint32_t certain[2][3] = {};   ///< in double
+  std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
+
+  /// Pairs that a plane keeps apart.
+  std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
+    return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
+  }
+};
+
 /// Signs of pairs that were gathered, in double, and exactly where doubles leave them unclear.
 class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
-    const D d;
-    return {hn::Load(d, pairs.corner[side][c][0] + l), hn::Load(d, pairs.corner[side][c][1] + l),
-            hn::Load(d, pairs.corner[side][c][2] + l)};
-  }
-
-  static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
-  static std::uint32_t alike(const std::uint32_t (&bits)[3]) {
-    return each(bits) | ~(bits[0] | bits[1] | bits[2]);
-  }
-
-  /// Heights of eight pairs, and what their signs say: a bit each.
-  struct alignas(64) Heights {
-    double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-    double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
-    std::uint32_t positive[2][3] = {};  ///< with B moved aside
-    std::uint32_t certain[2][3] = {};   ///< in double
-    std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
-
-    /// Pairs that a plane keeps apart.
-    std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
-      return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
-    }
-  };
-
   /// `kAsks`: whether it matters what is settled.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
-                               Heights& out) const {
+                               PairHeights& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
     const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
@@ -111,7 +111,7 @@ class PairSigns {
 
   /// Of pair n, where doubles leave a sign unclear.
   HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
-                                         Heights& out) const {
+                                         PairHeights& out) const {
     const ExactCorners corners(pairs, n);
     for (int s = 1; s >= 0; --s) {
       for (int c = 0; c < 3; ++c) {
