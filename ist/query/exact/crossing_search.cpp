@@ -275,12 +275,15 @@ class TriangleSearch : PairSigns {
     const std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
-    Meeting now(*this, number_a, number_b);
+    std::optional<Meeting> made;
+    const auto now = [&]() -> Meeting& {
+      return made ? *made : made.emplace(*this, number_a, number_b);
+    };
     const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
       return high[lane] - low[lane] <= 2 * slack_;
     };
-    if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now.beside(false)) ||
-        (thin(box_b.slab_low, box_b.slab_high, lane_b) && now.beside(true)))
+    if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now().beside(false)) ||
+        (thin(box_b.slab_low, box_b.slab_high, lane_b) && now().beside(true)))
       return;
     bool flush = false;
     for (; rows != 0; rows &= rows - 1) {
@@ -292,12 +295,12 @@ class TriangleSearch : PairSigns {
         const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes);
         flush |= found.clear == 0 && found.doubtful != 0;
         lanes = found.clear;
-        if (found.doubtful != 0) lanes |= now.straddling(i, found.doubtful);
+        if (found.doubtful != 0) lanes |= now().straddling(i, found.doubtful);
       }
       for (; lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, *now.vertices[0],
+        add_pair(kWidth * number_a + i, *now().vertices[0],
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 *now.vertices[1], !now.near);
+                 *now().vertices[1], !now().near);
     }
   }
 
@@ -412,53 +415,29 @@ class TriangleSearch : PairSigns {
     take(1, b_, triangle_b, vertices_b);
   }
 
-  void test_pairs() {
-    TrianglePairs& pairs = *scratch_.pairs;
-    // Others of their blocks may have marked them meanwhile.
-    pairs.asks = not_marked(pairs, pairs.asks);
-    if (pairs.asks != 0 || !found_.settled)
-      test_pairs<true>();
-    else
-      test_pairs<false>();
-  }
-
   /// Tests what has been gathered, by the planes of both triangles and by edges.
-  template <bool kAsks>
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
-    pairs.count = 0;
-    const std::uint32_t asks = std::exchange(pairs.asks, 0);
+    const std::uint32_t count = std::exchange(pairs.count, 0), asks = std::exchange(pairs.asks, 0);
+    const std::uint32_t all = (1u << count) - 1;
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     PairHeights heights;
-    find_heights<kAsks>(pairs, count, heights);
+    find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
          left &= left - 1)
       find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
-    const std::uint32_t apart = heights.apart(heights.certain);
-    if constexpr (kAsks) {
-      note_near(pairs, asks & all & apart & ~heights.apart(heights.settled));
-    }
-    if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
+    const std::uint32_t meet = all & ~heights.apart(heights.certain);
+    note_near(pairs, count, asks, meet != 0 ? test_edges(pairs, heights, meet) : 0);
   }
 
-  /// Tests by edges the pairs that planes left.
-  template <bool kAsks>
-  HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights, std::uint32_t all,
-                             std::uint32_t asks) {
+  /// Tests by edges the pairs that planes left. Returns those that cross.
+  HWY_INLINE std::uint32_t test_edges(const TrianglePairs& pairs, const PairHeights& heights,
+                                      std::uint32_t all) {
     WaysRound round;
-    find_ways_round<kAsks>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
+    find_ways_round<false>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
-    for (int s = 0; s < 2; ++s)
-      for (int k = 0; k < 3; ++k)
-        parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
-    std::uint32_t settled = 0;
-    if constexpr (kAsks) {
-      settled =
-          each(heights.settled[0]) & each(heights.settled[1]) & round.decided(parts, round.settled);
-      note_near(pairs, asks & all & ~settled);
-    }
+    heights.find_parts(parts);
     for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
          left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
@@ -472,8 +451,8 @@ class TriangleSearch : PairSigns {
         once |= bits & all;
       }
     found_.consistent &= once == twice && more == 0;
-    found_.settled |= (twice & settled) != 0;
     if (twice != 0) add_crossings(pairs, heights, pierced, twice);
+    return twice;
   }
 
   /// Those whose blocks are not both marked as near.
@@ -488,9 +467,15 @@ class TriangleSearch : PairSigns {
   }
 
   /// Pairs whose signs might be others if points moved by the room mark their blocks, if they are
-  /// as near: the same ones whichever search found them.
-  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t which) {
-    std::uint32_t fresh = not_marked(pairs, which);
+  /// as near: the same ones whichever search found them. Those that cross have marked theirs.
+  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t count, std::uint32_t asks,
+                            std::uint32_t crossing) {
+    asks = not_marked(pairs, asks);
+    if (found_.settled) crossing = 0;
+    if ((asks | crossing) == 0) return;
+    const std::uint32_t settled = find_settled(pairs, count);
+    found_.settled |= (crossing & settled) != 0;
+    std::uint32_t fresh = asks & ~settled;
     if (fresh == 0) return;
     fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
                             double{search_.near});

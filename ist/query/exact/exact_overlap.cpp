@@ -119,15 +119,19 @@ CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noe
   for (std::uint32_t v = 0; v < kWidth; ++v)
     away[v] =
         (std::abs(made.vertex[0][v]) + std::abs(made.vertex[1][v])) + std::abs(made.vertex[2][v]);
-  const std::uint8_t* const corner[5] = {mesh.corner[0], mesh.corner[1], mesh.corner[2],
-                                         mesh.corner[0], mesh.corner[1]};
+  std::uint8_t last[kWidth], second[kWidth];  // all bits, if the apex is corner 2, 1
   for (std::uint32_t t = 0; t < kWidth; ++t) {
-    const double first = away[corner[0][t]], second = away[corner[1][t]],
-                 third = away[corner[2][t]];
-    const int apex = third < std::min(first, second) ? 2 : second < first ? 1 : 0;
-    made.apex[t] = static_cast<std::uint8_t>(apex);
-    for (int k = 0; k < 3; ++k) made.fan[k][t] = corner[apex + k][t];
+    const double of[3] = {away[mesh.corner[0][t]], away[mesh.corner[1][t]], away[mesh.corner[2][t]]};
+    last[t] = static_cast<std::uint8_t>(-int{(of[2] < of[0]) & (of[2] < of[1])});
+    second[t] = static_cast<std::uint8_t>(~last[t] & -int{of[1] < of[0]});
   }
+  for (int k = 0; k < 3; ++k)
+    for (std::uint32_t t = 0; t < kWidth; ++t)
+      made.fan[k][t] = static_cast<std::uint8_t>(
+          (last[t] & mesh.corner[(k + 2) % 3][t]) | (second[t] & mesh.corner[(k + 1) % 3][t]) |
+          (~(last[t] | second[t]) & mesh.corner[k][t]));
+  for (std::uint32_t t = 0; t < kWidth; ++t)
+    made.apex[t] = static_cast<std::uint8_t>((last[t] & 2) | (second[t] & 1));
   return &made;
 }
 
@@ -195,19 +199,22 @@ void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
     const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                         q = mesh.corner[(edge + 1) % 3][edge / 3];
     const int sum = crossed.sum[edge], first = crossed.first[edge];
-    if (sum == 0 && first == 0) continue;
-    known |= 1u << p | 1u << q;
-    if (sum < 0 || (sum == 0 && first < 0)) inside |= 1u << p;
-    if (sum > 0 || (sum == 0 && first < 0)) inside |= 1u << q;
+    const bool leaves = (sum == 0) & (first < 0);  // and enters again
+    const auto clear = static_cast<std::uint32_t>((sum != 0) | (first != 0));
+    known |= clear << p | clear << q;
+    inside |= static_cast<std::uint32_t>((sum < 0) | leaves) << p |
+              static_cast<std::uint32_t>((sum > 0) | leaves) << q;
   }
   std::uint32_t joined[kWidth] = {};
-  for (std::uint32_t k = 0; k < 3; ++k)
-    for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-      const std::uint32_t p = mesh.corner[k][t], q = mesh.corner[(k + 1) % 3][t];
-      const auto whole = static_cast<std::uint32_t>(~crossed.pierced >> (3 * t + k) & 1);
-      joined[p] |= whole << q;
-      joined[q] |= whole << p;
-    }
+  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
+    const std::uint32_t v[3] = {mesh.corner[0][t], mesh.corner[1][t], mesh.corner[2][t]};
+    const auto other_end = [&](std::uint32_t edge, std::uint32_t end) {
+      return static_cast<std::uint32_t>(~crossed.pierced >> (3 * t + edge) & 1) << v[end];
+    };
+    joined[v[0]] |= other_end(0, 1) | other_end(2, 2);
+    joined[v[1]] |= other_end(0, 0) | other_end(1, 2);
+    joined[v[2]] |= other_end(1, 1) | other_end(2, 0);
+  }
   const std::uint32_t all = (1u << mesh.vertices) - 1;
   const auto spread = [&](std::uint32_t from) {
     while (from != 0) {

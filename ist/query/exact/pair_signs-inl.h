@@ -39,6 +39,11 @@ struct alignas(64) PairHeights {
   std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
     return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
   }
+  /// Edges that go through the other's plane.
+  void find_parts(std::uint32_t (&out)[2][3]) const {
+    for (int s = 0; s < 2; ++s)
+      for (int k = 0; k < 3; ++k) out[s][k] = positive[s][k] ^ positive[s][(k + 1) % 3];
+  }
 };
 
 /// Signs of pairs that were gathered, in double, and exactly where doubles leave them unclear.
@@ -46,7 +51,7 @@ class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  /// `kAsks`: whether it matters what is settled.
+  /// `kAsks`: whether what is settled is asked.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
                                PairHeights& out) const {
@@ -214,6 +219,20 @@ class PairSigns {
         put(out.positive[i][j], n, sign > 0);
         put(out.certain[i][j], n, true);
       }
+  }
+
+  /// Pairs that cross, or do not, wherever points move by the room.
+  HWY_NOINLINE std::uint32_t find_settled(const TrianglePairs& pairs, std::uint32_t count) const {
+    PairHeights heights;
+    find_heights<true>(pairs, count, heights);
+    const std::uint32_t apart = heights.apart(heights.settled);
+    const std::uint32_t all = each(heights.settled[0]) & each(heights.settled[1]) & ~apart;
+    if (all == 0) return apart;
+    WaysRound round;
+    find_ways_round<true>(pairs, count, round);
+    std::uint32_t parts[2][3];
+    heights.find_parts(parts);
+    return apart | (all & round.decided(parts, round.settled));
   }
 
   /// Pairs that are further apart than `reach` across or along the plane of one of them.
