@@ -110,28 +110,8 @@ CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noe
   made.block = block;
   made.inside = 0;
   made.pierced = 0;
-  const MeshBlock& mesh = own.mesh.blocks[block];
-  double away[kWidth];
-  const PlacedVertices& placed = place_block(search_, own.is_b, block, scratch_);
-  const double origin[3] = {out_.origin.x, out_.origin.y, out_.origin.z};
-  for (int k = 0; k < 3; ++k)
-    for (std::uint32_t v = 0; v < kWidth; ++v) made.vertex[k][v] = placed.at[k][v] - origin[k];
-  for (std::uint32_t v = 0; v < kWidth; ++v)
-    away[v] =
-        (std::abs(made.vertex[0][v]) + std::abs(made.vertex[1][v])) + std::abs(made.vertex[2][v]);
-  std::uint8_t last[kWidth], second[kWidth];  // all bits, if the apex is corner 2, 1
-  for (std::uint32_t t = 0; t < kWidth; ++t) {
-    const double of[3] = {away[mesh.corner[0][t]], away[mesh.corner[1][t]], away[mesh.corner[2][t]]};
-    last[t] = static_cast<std::uint8_t>(-int{(of[2] < of[0]) & (of[2] < of[1])});
-    second[t] = static_cast<std::uint8_t>(~last[t] & -int{of[1] < of[0]});
-  }
-  for (int k = 0; k < 3; ++k)
-    for (std::uint32_t t = 0; t < kWidth; ++t)
-      made.fan[k][t] = static_cast<std::uint8_t>(
-          (last[t] & mesh.corner[(k + 2) % 3][t]) | (second[t] & mesh.corner[(k + 1) % 3][t]) |
-          (~(last[t] | second[t]) & mesh.corner[k][t]));
-  for (std::uint32_t t = 0; t < kWidth; ++t)
-    made.apex[t] = static_cast<std::uint8_t>((last[t] & 2) | (second[t] & 1));
+  place_fans(place_block(search_, own.is_b, block, scratch_), own.mesh.blocks[block], out_.origin,
+             made);
   return &made;
 }
 

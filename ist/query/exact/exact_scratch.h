@@ -115,7 +115,7 @@ struct CrossedBlock {
 /// start and leave it at the end.
 class Crossings {
  public:
-  /// Eight are read at once.
+  /// Eight are read and written at once, so that up to seven more are touched.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
       : room_((most + 15) / 8 * 8),
         numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
