@@ -411,6 +411,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   clear_marks();
   out_.complete = begin_search(max_visits, pair_id);
   std::uint32_t left = 0, next = 0;
+  bool settled = false;  // of those that are no longer held
   while (out_.complete) {
     const CrossingsFound found = find_more(left, next);
     out_.consistent = found.consistent;
@@ -420,7 +421,6 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
     for (std::uint32_t i = left; i < found.crossings; ++i) out_.complete &= add_crossing(i);
     out_.crossings += found.crossings - left;
-    out_.settled |= found.settled;
     const bool ends = serves_ || found.next == block_pairs_;
     const std::uint32_t sums_end = ends ? found.crossings : found.crossings / 8 * 8;
     for (std::uint32_t i = 0; i < sums_end; i += 8) {
@@ -428,8 +428,12 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       crossing_terms(scratch_.crossings, i, out_.origin, terms);
       slots_.add_crossings(terms);
     }
-    if (ends) break;
+    if (ends) {
+      left = found.crossings;
+      break;
+    }
     whole_ = false;
+    settled = settled || any_settled(search_, sums_end, scratch_);
     left = found.crossings - sums_end;
     scratch_.crossings.move_to_front(sums_end, left);
     next = found.next;
@@ -458,7 +462,8 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   // What sums round may be nothing, where no triangles cross for certain. It is if it is no thicker
   // than what poses and vertices round, over the faces that lie on each other or push.
   const double volume = std::abs(out_.sums.volume());
-  if (!out_.settled && volume <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+  if (volume <= 1.01 * (rounding_ + slots_.rounding()) / 6 && !settled &&
+      !any_settled(search_, left, scratch_)) {
     const SurfaceContact contact =
         find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
     if (contact.touching &&

@@ -30,6 +30,7 @@ struct alignas(64) PlacedVertices {
 /// The triangles of a block in A's unit frame, in floats.
 struct alignas(64) PlacedTriangles {
   float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
+  float vertex[3][kWidth];                ///< [axis] the block's
   float corner[3][3][kWidth];             ///< [corner][axis]
   float normal[3][kWidth];                ///< product of two sides
   float offset[kWidth];                   ///< of the plane along it
@@ -46,6 +47,8 @@ struct alignas(64) PlacedPlanes {
   double normal[3][kWidth];  ///< product of two sides
   double size[kWidth];       ///< no sum of the absolute products in it is larger
   double longest[kWidth];    ///< no coordinate of these sides is larger
+  /// [edge][axis]: about one long, along the plane out of the triangle, which lies below the offset.
+  float edge[3][3][kWidth], edge_offset[3][kWidth];
   /// The block's vertices lie between these heights over the plane of `widest`, times the length of
   /// its normal.
   double low, high;
