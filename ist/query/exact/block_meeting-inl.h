@@ -115,21 +115,23 @@ class Meeting {
     const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
     const PlaneSides found = sides(side, planes.widest, planes.low - off, planes.high + off);
     constexpr std::uint32_t kAll = (1u << kWidth) - 1;
-    if (margin_ == Margin::room) return found.above == kAll || found.below == kAll ? 0 : kAll;
     flat_[side] = true;
+    if (margin_ == Margin::room) return found.above == kAll || found.below == kAll ? 0 : kAll;
     return ~kept_apart(side, found);
   }
 
   /// Which of `lanes` of B no plane keeps apart from A's triangle i.
   std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
-    if (!flat_[0]) lanes &= ~beside(0, i);
-    if (!flat_[1]) lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
+    const bool told = margin_ != Margin::room;  // by the planes of flat blocks
+    if (!told || !flat_[0]) lanes &= ~beside(0, i);
+    if (!told || !flat_[1]) lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
     return meeting_edges(i, lanes);
   }
 
   /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch, and no
   /// edge keeps apart from it.
   std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
+    flat_[0] = flat_[1] = true;
     const PlacedPlanes& planes = planes_of(0);
     const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
     const double far = search_.touch * std::sqrt(dot(n, n));
@@ -164,8 +166,8 @@ class Meeting {
     return beyond_edges_of(planes_of(side), t, *triangles_[1 - side], block(1 - side), blur_);
   }
   std::uint32_t meeting_edges(std::uint32_t i, std::uint32_t lanes) {
-    if (lanes == 0) return 0;
-    return edges_.without(i, lanes & ~beyond(0, i), [&](std::uint32_t j) { return beyond(1, j); });
+    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
+    return flat_[1] ? edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); }) : lanes;
   }
 
   /// A's triangles that those of B keep apart, found when they are asked for first.
@@ -196,7 +198,7 @@ class Meeting {
   const PlacedTriangles* triangles_[2];
   float apart_ = 0;  ///< no coordinates of both blocks differ by more
   float blur_;       ///< and these are floats
-  bool flat_[2] = {};  ///< whose block's planes have told all
+  bool flat_[2] = {};  ///< whose edges are asked
   Columns planes_, edges_;
 };
 
