@@ -18,8 +18,8 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 /// Which triangles of a block reach into a slab.
-inline std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3],
-                             float low, float high) {
+inline std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3], float low,
+                             float high) {
   const F d;
   std::uint32_t bits = 0;
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -28,10 +28,9 @@ inline std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&nor
       along[c] = (hn::Set(d, normal[0]) * hn::Load(d, triangles.corner[c][0] + l) +
                   hn::Set(d, normal[1]) * hn::Load(d, triangles.corner[c][1] + l)) +
                  hn::Set(d, normal[2]) * hn::Load(d, triangles.corner[c][2] + l);
-    bits |=
-        mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <= hn::Set(d, high),
-                             hn::Max(along[0], hn::Max(along[1], along[2])) >= hn::Set(d, low)))
-        << l;
+    bits |= mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <= hn::Set(d, high),
+                                 hn::Max(along[0], hn::Max(along[1], along[2])) >= hn::Set(d, low)))
+            << l;
   }
   return bits;
 }
@@ -51,8 +50,8 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   Straddling out;
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
     if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
-    const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
-                        hn::Load(d, b.slack + l) * hn::Set(d, size);
+    const auto over_b =
+        hn::Set(d, blur) * hn::Load(d, b.length + l) + hn::Load(d, b.slack + l) * hn::Set(d, size);
     hn::Vec<F> of_b[3], of_a[3];
     for (int c = 0; c < 3; ++c) {
       of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
@@ -124,20 +123,21 @@ class Meeting {
   std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
     const bool told = margin_ != Margin::room;  // by the planes of flat blocks
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
-    if (!told || !flat_[1]) lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
-    return meeting_edges(i, lanes);
+    if (!told || !flat_[1])
+      lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
+    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
+    if (flat_[1]) lanes = edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); });
+    return lanes;
   }
 
-  /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch, and no
-  /// edge keeps apart from it.
-  std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
-    flat_[0] = flat_[1] = true;
+  /// Which of B's triangles lie in the plane of A's triangle i, to CrossingSearch::touch.
+  std::uint32_t flush(std::uint32_t i) const {
     const PlacedPlanes& planes = planes_of(0);
     const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
     const double far = search_.touch * std::sqrt(dot(n, n));
     const PlaneSides off = sides_of(*vertices_[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
                                     Margin::rounding, 0);
-    return meeting_edges(i, lanes & triangles_of(~(off.above | off.below), block(1)));
+    return triangles_of(~(off.above | off.below), block(1));
   }
 
  private:
@@ -165,11 +165,6 @@ class Meeting {
   std::uint32_t beyond(int side, std::uint32_t t) const {
     return beyond_edges_of(planes_of(side), t, *triangles_[1 - side], block(1 - side), blur_);
   }
-  std::uint32_t meeting_edges(std::uint32_t i, std::uint32_t lanes) {
-    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
-    return flat_[1] ? edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); }) : lanes;
-  }
-
   /// A's triangles that those of B keep apart, found when they are asked for first.
   struct Columns {
     std::uint32_t apart[kWidth];
@@ -196,8 +191,8 @@ class Meeting {
   const std::uint32_t number_[2];
   const PlacedVertices* vertices_[2];
   const PlacedTriangles* triangles_[2];
-  float apart_ = 0;  ///< no coordinates of both blocks differ by more
-  float blur_;       ///< and these are floats
+  float apart_ = 0;    ///< no coordinates of both blocks differ by more
+  float blur_;         ///< and these are floats
   bool flat_[2] = {};  ///< whose edges are asked
   Columns planes_, edges_;
 };

@@ -28,8 +28,9 @@ struct PiercingEdges {
       put((this->*of).y, (from.*of).y);
       put((this->*of).z, (from.*of).z);
     }
-    for (V PiercingEdges::*of : {&PiercingEdges::height_p, &PiercingEdges::height_q,
-                                 &PiercingEdges::error, &PiercingEdges::shift, &PiercingEdges::number})
+    for (V PiercingEdges::*of :
+         {&PiercingEdges::height_p, &PiercingEdges::height_q, &PiercingEdges::error,
+          &PiercingEdges::shift, &PiercingEdges::number})
       put(this->*of, from.*of);
   }
 };
@@ -63,9 +64,9 @@ HWY_INLINE void write_ends(const PiercingEdges& from, const Compressor<D>& chose
   coordinate(2, p.z, q.z);
   put(Crossings::kT, hn::IfThenElse(turned, one - share, share));
   // Which of two places comes first is asked with B moved aside.
-  put(Crossings::kTError, hn::IfThenElse(flat, one,
-                                         (two * (from.error + two * from.shift)) / divisor +
-                                             hn::Set(d, 1e-15)));
+  put(Crossings::kTError,
+      hn::IfThenElse(flat, one,
+                     (two * (from.error + two * from.shift)) / divisor + hn::Set(d, 1e-15)));
   put(Crossings::kHeightError, from.error);
   put(Crossings::kEdge, hn::IfThenElse(turned, from.number, from.number + hn::Set(d, 8.0)));
 }
@@ -83,7 +84,8 @@ inline void write_crossings(const TrianglePairs& pairs, const PairHeights& heigh
     const std::uint32_t here = crossing >> l & lanes;
     if (here == 0) continue;
     const V zero = hn::Zero(d);
-    const PiercingEdges none = {{zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero, zero};
+    const PiercingEdges none = {
+        {zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero, zero};
     PiercingEdges end[2] = {none, none};
     for (int s = 0; s < 2; ++s)
       for (int k = 0; k < 3; ++k) {

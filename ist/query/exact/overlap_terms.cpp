@@ -119,8 +119,9 @@ void place_block_fans(const PlacedVertices& placed, const MeshBlock& mesh,
     const auto is_third = apex == hn::Set(bytes, 2), is_second = apex == hn::Set(bytes, 1);
     for (int k = 0; k < 3; ++k) {
       const auto corner = [&](int c) { return hn::LoadU(bytes, mesh.corner[(k + c) % 3] + l); };
-      hn::StoreU(hn::IfThenElse(is_third, corner(2), hn::IfThenElse(is_second, corner(1), corner(0))),
-                 bytes, out.fan[k] + l);
+      hn::StoreU(
+          hn::IfThenElse(is_third, corner(2), hn::IfThenElse(is_second, corner(1), corner(0))),
+          bytes, out.fan[k] + l);
     }
   }
 }

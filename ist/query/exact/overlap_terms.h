@@ -15,8 +15,8 @@ struct alignas(64) ExactTerms {
   double rounding[8];  ///< six times what the volume may be off by
 };
 
-/// The vertices of a crossed block from the origin of the sums, and the corners that the cones of its
-/// triangles start at.
+/// The vertices of a crossed block from the origin of the sums, and the corners that the cones of
+/// its triangles start at.
 void place_fans(const PlacedVertices& placed, const MeshBlock& mesh, const exact::Point& origin,
                 CrossedBlock& out) noexcept;
 

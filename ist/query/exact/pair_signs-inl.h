@@ -41,10 +41,10 @@ inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
 /// Heights of eight pairs, and what their signs say: a bit each.
 struct alignas(64) PairHeights {
   double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-  double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
-  std::uint32_t positive[2][3] = {};  ///< with B moved aside
-  std::uint32_t certain[2][3] = {};   ///< in double
-  std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
+  double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
+  std::uint32_t positive[2][3] = {};      ///< with B moved aside
+  std::uint32_t certain[2][3] = {};       ///< in double
+  std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
 
   /// Pairs that a plane keeps apart.
   std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {

@@ -112,12 +112,12 @@ HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32
     const auto least = hn::Set(d, planes.edge_offset[e][t] + blur);
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
-      beyond |= mask_bits(d, (hn::Set(d, planes.edge[e][0][t]) * hn::Load(d, other.vertex[0] + l) +
-                              hn::Set(d, planes.edge[e][1][t]) * hn::Load(d, other.vertex[1] + l)) +
-                                     hn::Set(d, planes.edge[e][2][t]) *
-                                         hn::Load(d, other.vertex[2] + l) >
-                                 least)
-                << l;
+      beyond |=
+          mask_bits(d, (hn::Set(d, planes.edge[e][0][t]) * hn::Load(d, other.vertex[0] + l) +
+                        hn::Set(d, planes.edge[e][1][t]) * hn::Load(d, other.vertex[1] + l)) +
+                               hn::Set(d, planes.edge[e][2][t]) * hn::Load(d, other.vertex[2] + l) >
+                           least)
+          << l;
     out |= triangles_of(beyond, block);
   }
   return out;

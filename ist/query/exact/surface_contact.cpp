@@ -47,7 +47,7 @@ class ContactSearch : PairSigns {
           const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
           if (std::exchange(blocks, met) != met)
             now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
-          for (lanes = now->flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
+          for (lanes &= now->flush(i); lanes != 0; lanes &= lanes - 1) {
             const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
             gather(kWidth * number_a + i, now->vertices(0), kWidth * number_b + j,
                    now->vertices(1));
