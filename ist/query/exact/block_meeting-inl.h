@@ -106,17 +106,16 @@ class Meeting {
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
   Margin margin() const { return margin_; }
 
-  /// Which triangles of the other block may not lie beside all planes of a flat one of this side:
-  /// where signs have to be settled, all or none.
+  /// Which triangles of the other block may not lie beside all planes of a flat one of this side.
+  /// Where signs have to be settled, those of its triangles may not be: what is left out is out of
+  /// reach.
   std::uint32_t straddling_block(int side) {
     // Its own heights are off by as much as the other's.
     const PlacedPlanes& planes = planes_of(side);
     const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
-    const PlaneSides found = sides(side, planes.widest, planes.low - off, planes.high + off);
-    constexpr std::uint32_t kAll = (1u << kWidth) - 1;
     flat_[side] = true;
-    if (margin_ == Margin::room) return found.above == kAll || found.below == kAll ? 0 : kAll;
-    return ~kept_apart(side, found);
+    return ~kept_apart(side, sides(side, planes.widest, planes.low - off, planes.high + off,
+                                   margin_ == Margin::room ? Margin::reach : margin_));
   }
 
   /// Which of `lanes` of B no plane keeps apart from A's triangle i.
@@ -149,17 +148,17 @@ class Meeting {
                      : placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
   }
   /// Of the other block's vertices.
-  PlaneSides sides(int side, std::uint32_t t, double low, double high) const {
+  PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
     return sides_of(*vertices_[1 - side], planes_of(side), t, low, high,
-                    (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin_,
-                    double{margin_ == Margin::reach ? reach_ : search_.room});
+                    (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin,
+                    double{margin == Margin::reach ? reach_ : search_.room});
   }
   std::uint32_t kept_apart(int side, const PlaneSides& found) const {
     return triangles_of(found.above, block(1 - side)) | triangles_of(found.below, block(1 - side));
   }
   /// Which of the other block's triangles lie beside the plane of triangle t.
   std::uint32_t beside(int side, std::uint32_t t) const {
-    return kept_apart(side, sides(side, t, 0, 0));
+    return kept_apart(side, sides(side, t, 0, 0, margin_));
   }
   /// And beyond an edge of it.
   std::uint32_t beyond(int side, std::uint32_t t) const {
