@@ -90,17 +90,13 @@ class Meeting {
           Margin margin, float reach)
       : search_(search), scratch_(scratch), margin_(margin), reach_(reach), number_{a, b} {
     PlacedMeshes placed(search, scratch);
-    float reaches = 0;
-    for (int s = 0; s < 2; ++s) {
-      vertices_[s] = &placed.vertices(s == 1, number_[s]);
-      triangles_[s] = &placed.triangles(s == 1, number_[s]);
-      reaches += triangles_[s]->reach;
-    }
+    for (int s = 0; s < 2; ++s) vertices_[s] = &placed.vertices(s == 1, number_[s]);
+    const PlacedTriangles &of_a = placed.triangles(false, a), &of_b = placed.triangles(true, b);
     for (int k = 0; k < 3; ++k)
-      apart_ = std::max(apart_, std::max(triangles_[0]->all_high[k], triangles_[1]->all_high[k]) -
-                                    std::min(triangles_[0]->all_low[k], triangles_[1]->all_low[k]));
+      apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
+                                    std::min(of_a.all_low[k], of_b.all_low[k]));
     apart_ += search.room;
-    blur_ = 1e-6f * reaches + reach;
+    blur_ = 1e-6f * (of_a.reach + of_b.reach) + reach;
   }
 
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
@@ -162,7 +158,7 @@ class Meeting {
   }
   /// And beyond an edge of it.
   std::uint32_t beyond(int side, std::uint32_t t) const {
-    return beyond_edges_of(planes_of(side), t, *triangles_[1 - side], block(1 - side), blur_);
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side), blur_);
   }
   /// A's triangles that those of B keep apart, found when they are asked for first.
   struct Columns {
@@ -189,9 +185,8 @@ class Meeting {
   const float reach_;
   const std::uint32_t number_[2];
   const PlacedVertices* vertices_[2];
-  const PlacedTriangles* triangles_[2];
   float apart_ = 0;    ///< no coordinates of both blocks differ by more
-  float blur_;         ///< and these are floats
+  float blur_;         ///< and planes through edges are floats
   bool flat_[2] = {};  ///< whose edges are asked
   Columns planes_, edges_;
 };

@@ -30,7 +30,6 @@ struct alignas(64) PlacedVertices {
 /// The triangles of a block in A's unit frame, in floats.
 struct alignas(64) PlacedTriangles {
   float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
-  float vertex[3][kWidth];                ///< [axis] the block's
   float corner[3][3][kWidth];             ///< [corner][axis]
   float normal[3][kWidth];                ///< product of two sides
   float offset[kWidth];                   ///< of the plane along it

@@ -138,7 +138,7 @@ inline const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32
   const PlacedVertices& vertices = placed_vertices(tree, number, map, kept);
   const hn::CappedTag<double, 8> dd;
   const hn::Rebind<float, decltype(dd)> df;
-  float(&at)[3][kWidth] = out.vertex;
+  alignas(64) float at[3][kWidth];
   for (int k = 0; k < 3; ++k)
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(dd))
       hn::Store(hn::DemoteTo(df, hn::Load(dd, vertices.at[k] + l)), df, at[k] + l);

@@ -102,22 +102,23 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
 }
 
 /// Which triangles of the other block have all corners further than `blur` beyond an edge of
-/// triangle t, in its plane: in float.
+/// triangle t, in its plane.
 HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32_t t,
-                                         const PlacedTriangles& other, const MeshBlock& block,
+                                         const PlacedVertices& other, const MeshBlock& block,
                                          float blur) {
-  const F d;
+  const D d;
   std::uint32_t out = 0;
   for (int e = 0; e < 3; ++e) {
-    const auto least = hn::Set(d, planes.edge_offset[e][t] + blur);
+    const V least = hn::Set(d, double{planes.edge_offset[e][t] + blur});
+    const Vec3 away = {hn::Set(d, double{planes.edge[e][0][t]}),
+                       hn::Set(d, double{planes.edge[e][1][t]}),
+                       hn::Set(d, double{planes.edge[e][2][t]})};
     std::uint32_t beyond = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
-      beyond |=
-          mask_bits(d, (hn::Set(d, planes.edge[e][0][t]) * hn::Load(d, other.vertex[0] + l) +
-                        hn::Set(d, planes.edge[e][1][t]) * hn::Load(d, other.vertex[1] + l)) +
-                               hn::Set(d, planes.edge[e][2][t]) * hn::Load(d, other.vertex[2] + l) >
-                           least)
-          << l;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      const Vec3 at = {hn::Load(d, other.at[0] + l), hn::Load(d, other.at[1] + l),
+                       hn::Load(d, other.at[2] + l)};
+      beyond |= mask_bits(d, dot(at, away) > least) << l;
+    }
     out |= triangles_of(beyond, block);
   }
   return out;
