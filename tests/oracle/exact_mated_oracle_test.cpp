@@ -151,6 +151,31 @@ TEST_F(ExactMated, EveryRow) {
   EXPECT_EQ(planar, static_cast<int>(kPlanar.size()));
 }
 
+/// Steps by some times what a search looks around for, which a plane of a flat block may lie
+/// within.
+TEST_F(ExactMated, WhatIsKeptKeepsTheBits) {
+  IST_NEEDS_SHARED("oracle/mated/poses.csv");
+  Workspace kept;
+  PenetrationSettings fresh;
+  fresh.measure = Measure::exact;
+  PenetrationSettings step = fresh;
+  for (const MatedRow& row : testing::read_mated_rows()) {
+    const PlacedTree a{part(row.mesh_a, false).view(), {}, 1};
+    PlacedTree b{part(row.mesh_b, false).view(), row.pose, 1};
+    ++step.pair_id;
+    for (int k = 0; k < 8; ++k) {
+      SCOPED_TRACE(row.name + " moved by " + std::to_string(row.moved) + ", step " +
+                   std::to_string(k));
+      const Penetration x = penetration(a, b, fresh, workspace_), y = penetration(a, b, step, kept);
+      EXPECT_EQ(x.volume, y.volume);
+      EXPECT_EQ(x.volume_min, y.volume_min);
+      EXPECT_EQ(x.volume_max, y.volume_max);
+      EXPECT_EQ(x.contact_area, y.contact_area);
+      b.pose.t[k % 3] += 1e-9 * (k + 1);
+    }
+  }
+}
+
 TEST_F(ExactMated, EveryRightAngledTurnOfBoth) {
   IST_NEEDS_SHARED("oracle/mated/poses.csv");
   for (const MatedRow& row : testing::read_mated_rows())

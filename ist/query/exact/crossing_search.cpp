@@ -10,11 +10,10 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/exact/block_meeting-inl.h"
+#include "query/exact/crossing_ends-inl.h"
 #include "query/exact/nearest_points.h"
 #include "query/exact/pair_signs-inl.h"
-#include "query/exact/placed_mesh-inl.h"
-#include "query/exact/plane_sides-inl.h"
-#include "query/exact/points-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
@@ -63,91 +62,7 @@ class TriangleSearch : PairSigns {
     return finish();
   }
 
-  SurfaceContact contact(std::uint32_t count, const KeptPairs* kept) {
-    look_ahead(search_.near);
-    SurfaceContact out;
-    TrianglePairs& pairs = *scratch_.pairs;
-    const auto add_areas = [&] {
-      alignas(64) double area[8], along[3][8], moment[3][8];
-      find_areas(pairs, area, along, moment);
-      for (std::uint32_t n = 0; n < pairs.count; ++n) {
-        out.area += area[n];
-        out.normal = out.normal + exact::Point{along[0][n], along[1][n], along[2][n]};
-        out.moment = out.moment + exact::Point{moment[0][n], moment[1][n], moment[2][n]};
-      }
-      pairs.count = 0;
-    };
-    std::optional<Meeting> now;
-    std::uint64_t blocks = ~std::uint64_t{0};
-    visit_near(
-        count, kept,
-        [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b, std::uint32_t lanes) {
-          lanes &= facing(placed_.triangles(false, number_a), i, placed_.triangles(true, number_b));
-          if (lanes == 0) return false;
-          const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
-          if (std::exchange(blocks, met) != met) now.emplace(*this, number_a, number_b);
-          for (lanes = now->flush(i, lanes); lanes != 0; lanes &= lanes - 1) {
-            const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
-            put_pair(kWidth * number_a + i, *now->vertices[0], kWidth * number_b + j,
-                     *now->vertices[1]);
-            if (pairs.count == 8) add_areas();
-          }
-          return false;
-        });
-    add_areas();
-    out.touching = out.area > 0;
-    if (!out.touching)  // in a point or an edge, if at all
-      visit_near(
-          count, kept,
-          [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
-              std::uint32_t lanes) {
-            for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
-              out.touching = exact::come_within(
-                  search_.touch, corners(false, number_a, i).of,
-                  corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
-            return out.touching;
-          });
-    return out;
-  }
-
  private:
-  struct Corners {
-    exact::Point of[3];
-  };
-  Corners corners(bool of_b, std::uint32_t number, std::uint32_t t) {
-    const MeshBlock& block = (of_b ? b_ : a_).blocks[number];
-    const PlacedVertices& vertices = placed_.vertices(of_b, number);
-    Corners out;
-    for (int c = 0; c < 3; ++c) {
-      const std::uint32_t v = block.corner[c][t];
-      out.of[c] = {vertices.at[0][v], vertices.at[1][v], vertices.at[2][v]};
-    }
-    return out;
-  }
-
-  /// visit(A's block, its triangle, B's block, some of its triangles): until it returns true, of
-  /// blocks that are marked as near, or of pairs that are kept, those whose boxes meet.
-  template <class Visit>
-  void visit_near(std::uint32_t count, const KeptPairs* kept, const Visit& visit) {
-    for (std::uint32_t n = 0; n < (kept != nullptr ? kept->count : count); ++n) {
-      const std::uint64_t pair = kept != nullptr ? scratch_.kept.pair(*kept, n) : scratch_.keys[n];
-      const auto a = static_cast<std::uint32_t>(pair >> 32), b = static_cast<std::uint32_t>(pair);
-      if (kept != nullptr) {
-        if (are_near(a / kWidth, b / kWidth) &&
-            visit(a / kWidth, a % kWidth, b / kWidth, 1u << b % kWidth))
-          return;
-        continue;
-      }
-      if (!are_near(a, b)) continue;
-      const PlacedTriangles &of_a = placed_.triangles(false, a), &of_b = placed_.triangles(true, b);
-      for (std::uint32_t i = 0; i < a_.blocks[a].triangles; ++i) {
-        const OneBox box(of_a.low, of_a.high, i, reach_);
-        const std::uint32_t lanes = meeting(of_b.low, of_b.high, box.low, box.high);
-        if (lanes != 0 && visit(a, i, b, lanes)) return;
-      }
-    }
-  }
-
   void look_ahead(float reach) {
     reach_ = reach;
     slack_ = 2 * pad_b_ + 2 * pad(Similarity::identity(), a_) + reach * 2;
@@ -171,88 +86,6 @@ class TriangleSearch : PairSigns {
     return found_;
   }
 
-  /// Which of B's triangles may look straight at A's triangle i. In float: sums of a normal's
-  /// coordinates are no more than 1.8 times its length.
-  static std::uint32_t facing(const PlacedTriangles& a, std::uint32_t i, const PlacedTriangles& b) {
-    const F d;
-    const auto length_a = hn::Set(d, a.length[i]), slack_a = hn::Set(d, a.slack[i]);
-    std::uint32_t bits = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      const auto length_b = hn::Load(d, b.length + l), slack_b = hn::Load(d, b.slack + l);
-      const auto along = (hn::Set(d, a.normal[0][i]) * hn::Load(d, b.normal[0] + l) +
-                          hn::Set(d, a.normal[1][i]) * hn::Load(d, b.normal[1] + l)) +
-                         hn::Set(d, a.normal[2][i]) * hn::Load(d, b.normal[2] + l);
-      const auto off = hn::Set(d, 2.0f) * (slack_a * length_b + slack_b * length_a) +
-                       hn::Set(d, 3.0f) * slack_a * slack_b;
-      bits |= mask_bits(d, along <= off - hn::Set(d, 0.3f) * length_a * length_b) << l;
-    }
-    return bits;
-  }
-
-  /// Which triangles of a block reach into a slab.
-  static std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3],
-                               float low, float high) {
-    const F d;
-    std::uint32_t bits = 0;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      hn::Vec<F> along[3];
-      for (int c = 0; c < 3; ++c)
-        along[c] = (hn::Set(d, normal[0]) * hn::Load(d, triangles.corner[c][0] + l) +
-                    hn::Set(d, normal[1]) * hn::Load(d, triangles.corner[c][1] + l)) +
-                   hn::Set(d, normal[2]) * hn::Load(d, triangles.corner[c][2] + l);
-      bits |=
-          mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <= hn::Set(d, high),
-                               hn::Max(along[0], hn::Max(along[1], along[2])) >= hn::Set(d, low)))
-          << l;
-    }
-    return bits;
-  }
-
-  /// Triangles of B that reach through the plane of one of A's, which reaches through theirs.
-  struct Straddling {
-    std::uint32_t clear = 0, doubtful = 0;
-  };
-
-  /// In float.
-  HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
-                                   const PlacedTriangles& b, std::uint32_t lanes) const {
-    const F d;
-    // Coordinates are floats, and points of both blocks that matter are no further apart than this.
-    const float blur = 1e-6f * (a.reach + b.reach) + reach_, size = a.size + b.size;
-    const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
-    Straddling out;
-    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
-      const auto over_b = hn::Set(d, blur) * hn::Load(d, b.length + l) +
-                          hn::Load(d, b.slack + l) * hn::Set(d, size);
-      hn::Vec<F> of_b[3], of_a[3];
-      for (int c = 0; c < 3; ++c) {
-        of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
-                    hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
-                   hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
-                  hn::Set(d, a.offset[i]);
-        of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
-                    hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
-                   hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
-                  hn::Load(d, b.offset + l);
-      }
-      // How far the heights reach to the nearer side of a plane.
-      const auto through = [](const hn::Vec<F>(&height)[3]) {
-        return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
-                       hn::Max(height[0], hn::Max(height[1], height[2])));
-      };
-      const auto a_by = through(of_b), b_by = through(of_a);
-      const std::uint32_t may =
-          mask_bits(d, hn::And(a_by >= hn::Neg(over_a), b_by >= hn::Neg(over_b)));
-      const std::uint32_t clear = mask_bits(d, hn::And(a_by > over_a, b_by > over_b));
-      out.clear |= clear << l;
-      out.doubtful |= (may & ~clear) << l;
-    }
-    out.clear &= lanes;
-    out.doubtful &= lanes;
-    return out;
-  }
-
   /// Tests the triangles of two blocks by boxes and planes.
   void meet(std::uint32_t number_a, std::uint32_t number_b) {
     const PlacedTriangles& a = placed_.triangles(false, number_a);
@@ -271,115 +104,59 @@ class TriangleSearch : PairSigns {
       rows &=
           in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
     if (rows == 0) return;
-    const std::uint32_t in_a =
+    std::uint32_t in_a =
         in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
-    Meeting now(*this, number_a, number_b);
+    std::optional<Meeting> made;
+    const auto now = [&]() -> Meeting& {
+      if (made) return *made;
+      const Margin margin = keep_ != nullptr               ? Margin::reach
+                            : are_near(number_a, number_b) ? Margin::rounding
+                                                           : Margin::room;
+      return made.emplace(search_, scratch_, number_a, number_b, margin, reach_);
+    };
     const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
       return high[lane] - low[lane] <= 2 * slack_;
     };
-    if ((thin(box_a.slab_low, box_a.slab_high, lane_a) && now.beside(false)) ||
-        (thin(box_b.slab_low, box_b.slab_high, lane_b) && now.beside(true)))
-      return;
-    bool flush = false;
-    for (; rows != 0; rows &= rows - 1) {
+    const bool is_thin[2] = {thin(box_a.slab_low, box_a.slab_high, lane_a),
+                             thin(box_b.slab_low, box_b.slab_high, lane_b)};
+    // Whether any are left that do not lie beside the planes of a block.
+    const auto straddle_blocks = [&] {
+      for (int side = 0; side < 2; ++side) {
+        if (!is_thin[side]) continue;
+        const std::uint32_t left = now().straddling_block(side);
+        (side == 0 ? in_a : rows) &= left;
+      }
+      return in_a != 0 && rows != 0;
+    };
+    if (!straddle_blocks()) return;
+    bool flush = false, tried = false;
+    while (rows != 0) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+      rows &= rows - 1;
       const OneBox box(a.low, a.high, i, reach_);
       std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
-      if (lanes != 0) {
-        // Where floats tell nothing, they are not asked again.
-        const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes);
-        flush |= found.clear == 0 && found.doubtful != 0;
-        lanes = found.clear;
-        if (found.doubtful != 0) lanes |= now.straddling(i, found.doubtful);
-      }
+      if (lanes == 0) continue;
+      // Where floats tell nothing, they are not asked again.
+      const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes, reach_);
+      flush |= found.clear == 0 && found.doubtful != 0;
+      if ((found.clear | found.doubtful) == 0) continue;
+      Meeting& both = now();
+      lanes = found.clear;
+      if (found.doubtful != 0) lanes |= both.straddling(i, found.doubtful);
+      if (lanes == 0) continue;
       for (; lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, *now.vertices[0],
+        add_pair(kWidth * number_a + i, both.vertices(0),
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 *now.vertices[1], !now.near);
+                 both.vertices(1), both.margin() == Margin::room);
+      // Once both blocks are marked, planes tell far more.
+      if (!flush || both.margin() != Margin::room) continue;
+      if (!std::exchange(tried, true)) test_pairs();
+      if (!are_near(number_a, number_b)) continue;
+      made.reset();
+      if (!straddle_blocks()) return;
     }
   }
-
-  /// Two blocks whose triangles are tested by the planes of either side, in double. Where a sign is
-  /// not settled, a plane does not keep them apart unless both blocks are marked as near anyway.
-  class Meeting {
-   public:
-    Meeting(TriangleSearch& all, std::uint32_t a, std::uint32_t b)
-        : vertices{&all.placed_.vertices(false, a), &all.placed_.vertices(true, b)},
-          near(all.are_near(a, b)),
-          all_(all),
-          number_{a, b} {
-      margin_ = all.keep_ != nullptr ? Margin::reach : near ? Margin::rounding : Margin::room;
-      by_ = all.keep_ != nullptr ? double{all.reach_} : double{all.search_.room};
-      const PlacedTriangles &of_a = all.placed_.triangles(false, a),
-                            &of_b = all.placed_.triangles(true, b);
-      for (int k = 0; k < 3; ++k)
-        apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
-                                      std::min(of_a.all_low[k], of_b.all_low[k]));
-      apart_ += all.search_.room;
-    }
-
-    const PlacedVertices* const vertices[2];
-    const bool near;  ///< both are marked
-
-    /// Whether the planes of A's or B's block lie beside the other block as a whole.
-    bool beside(bool of_b) {
-      // Its own heights are off by as much as the other's.
-      const PlacedPlanes& planes = planes_of(of_b);
-      const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
-      const PlaneSides found = sides(of_b, planes.widest, planes.low - off, planes.high + off);
-      constexpr std::uint32_t kAll = (1u << kWidth) - 1;
-      return found.above == kAll || found.below == kAll;
-    }
-
-    /// Which of `lanes` of B no plane keeps apart from A's triangle i.
-    std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
-      const MeshBlock &a = all_.a_.blocks[number_[0]], &b = all_.b_.blocks[number_[1]];
-      lanes &= ~kept_apart(sides(false, i, 0, 0), b);
-      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
-        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
-        if ((known_ >> j & 1) == 0) {
-          known_ |= 1u << j;
-          columns_[j] = kept_apart(sides(true, j, 0, 0), a);
-        }
-        lanes &= ~((columns_[j] >> i & 1) << j);
-      }
-      return lanes;
-    }
-
-    /// Which of `lanes` of B lie in the plane of A's triangle i, to CrossingSearch::touch.
-    std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
-      const PlacedPlanes& planes = planes_of(false);
-      const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
-      const double far = all_.search_.touch * std::sqrt(dot(n, n));
-      const PlaneSides off = sides_of(*vertices[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
-                                      Margin::rounding, 0);
-      return lanes & triangles_of(~(off.above | off.below), all_.b_.blocks[number_[1]]);
-    }
-
-   private:
-    const PlacedPlanes& planes_of(bool of_b) {
-      return of_b ? placed_planes(all_.b_, number_[1], &all_.search_.a_from_b,
-                                  *all_.scratch_.placed_b)
-                  : placed_planes(all_.a_, number_[0], nullptr, *all_.scratch_.placed_a);
-    }
-    /// Of the other block's vertices.
-    PlaneSides sides(bool of_b, std::uint32_t t, double low, double high) {
-      return sides_of(*vertices[of_b ? 0 : 1], planes_of(of_b), t, low, high,
-                      (of_b ? -1.0 : 1.0) * all_.search_.aside, double{apart_}, margin_, by_);
-    }
-    static std::uint32_t kept_apart(const PlaneSides& sides, const MeshBlock& block) {
-      return triangles_of(sides.above, block) | triangles_of(sides.below, block);
-    }
-
-    TriangleSearch& all_;
-    std::uint32_t number_[2];
-    Margin margin_;
-    double by_;
-    float apart_ = 0;                ///< no coordinates of both blocks differ by more
-    std::uint32_t columns_[kWidth];  ///< A's triangles that B's plane keeps apart, a bit each
-    std::uint32_t known_ = 0;
-  };
 
   bool are_near(std::uint32_t block_a, std::uint32_t block_b) const {
     return has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b);
@@ -390,74 +167,35 @@ class TriangleSearch : PairSigns {
                 std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
     TrianglePairs& pairs = *scratch_.pairs;
     pairs.asks |= static_cast<std::uint32_t>(asks) << pairs.count;
-    put_pair(triangle_a, vertices_a, triangle_b, vertices_b);
-    if (pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
-  }
-
-  void put_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
-                std::uint32_t triangle_b, const PlacedVertices& vertices_b) {
-    TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t n = pairs.count++;
-    const auto take = [&](int side, const MeshTree& mesh, std::uint32_t triangle,
-                          const PlacedVertices& from) {
-      const MeshBlock& block = mesh.blocks[triangle / kWidth];
-      for (int c = 0; c < 3; ++c) {
-        const std::uint32_t v = block.corner[c][triangle % kWidth];
-        for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][n] = from.at[k][v];
-      }
-      pairs.triangle[side][n] = triangle;
-    };
-    take(0, a_, triangle_a, vertices_a);
-    take(1, b_, triangle_b, vertices_b);
-  }
-
-  void test_pairs() {
-    TrianglePairs& pairs = *scratch_.pairs;
-    // Others of their blocks may have marked them meanwhile.
-    pairs.asks = not_marked(pairs, pairs.asks);
-    if (pairs.asks != 0 || !found_.settled)
-      test_pairs<true>();
-    else
-      test_pairs<false>();
+    put_triangle(a_, triangle_a, vertices_a, 0, pairs);
+    put_triangle(b_, triangle_b, vertices_b, 1, pairs);
+    if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
   }
 
   /// Tests what has been gathered, by the planes of both triangles and by edges.
-  template <bool kAsks>
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = pairs.count, all = (1u << count) - 1;
-    pairs.count = 0;
-    const std::uint32_t asks = std::exchange(pairs.asks, 0);
+    const std::uint32_t count = std::exchange(pairs.count, 0), asks = std::exchange(pairs.asks, 0);
+    const std::uint32_t all = (1u << count) - 1;
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
-    Heights heights;
-    find_heights<kAsks>(pairs, count, heights);
+    PairHeights heights;
+    find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
          left &= left - 1)
       find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
-    const std::uint32_t apart = heights.apart(heights.certain);
-    if constexpr (kAsks) {
-      note_near(pairs, asks & all & apart & ~heights.apart(heights.settled));
-    }
-    if ((all & ~apart) != 0) test_edges<kAsks>(pairs, heights, all & ~apart, asks);
+    const std::uint32_t meet = all & ~heights.apart(heights.certain);
+    if (meet != 0) test_edges(pairs, heights, meet);
+    note_near(pairs, count, asks);
   }
 
   /// Tests by edges the pairs that planes left.
-  template <bool kAsks>
-  HWY_INLINE void test_edges(const TrianglePairs& pairs, const Heights& heights, std::uint32_t all,
-                             std::uint32_t asks) {
+  HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights,
+                             std::uint32_t all) {
     WaysRound round;
-    find_ways_round<kAsks>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
+    find_ways_round<false>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
-    for (int s = 0; s < 2; ++s)
-      for (int k = 0; k < 3; ++k)
-        parts[s][k] = heights.positive[s][k] ^ heights.positive[s][(k + 1) % 3];
-    std::uint32_t settled = 0;
-    if constexpr (kAsks) {
-      settled =
-          each(heights.settled[0]) & each(heights.settled[1]) & round.decided(parts, round.settled);
-      note_near(pairs, asks & all & ~settled);
-    }
+    heights.find_parts(parts);
     for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
          left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
@@ -471,7 +209,6 @@ class TriangleSearch : PairSigns {
         once |= bits & all;
       }
     found_.consistent &= once == twice && more == 0;
-    found_.settled |= (twice & settled) != 0;
     if (twice != 0) add_crossings(pairs, heights, pierced, twice);
   }
 
@@ -487,9 +224,11 @@ class TriangleSearch : PairSigns {
   }
 
   /// Pairs whose signs might be others if points moved by the room mark their blocks, if they are
-  /// as near: the same ones whichever search found them.
-  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t which) {
-    std::uint32_t fresh = not_marked(pairs, which);
+  /// as near: the same ones whichever search found them. Those that cross have marked theirs.
+  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t count, std::uint32_t asks) {
+    asks = not_marked(pairs, asks);
+    if (asks == 0) return;
+    std::uint32_t fresh = asks & ~find_settled(pairs, count);
     if (fresh == 0) return;
     fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
                             double{search_.near});
@@ -506,104 +245,32 @@ class TriangleSearch : PairSigns {
 
   /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps
   /// as far apart as the search reaches.
-  HWY_NOINLINE void keep_pairs() {
-    const D d;
-    const TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = pairs.count;
-    scratch_.pairs->count = 0;
-    scratch_.pairs->asks = 0;
+  void keep_pairs() {
+    TrianglePairs& pairs = *scratch_.pairs;
+    const std::uint32_t count = std::exchange(pairs.count, 0);
+    pairs.asks = 0;
     gathered_ += count;
-    std::uint32_t apart = 0;
-    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3], edge[2][3], normal[2];
-      for (int s = 0; s < 2; ++s) {
-        for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-        for (int c = 0; c < 3; ++c) edge[s][c] = corner[s][(c + 1) % 3] - corner[s][c];
-        normal[s] = cross(edge[s][0], edge[s][1]);
-      }
-      const V zero = hn::Zero(d), reach = hn::Set(d, double{reach_});
-      V beyond = zero;
-      // A axis and what both triangles reach along it, B's seen from a corner of A's.
-      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b) {
-        const V gap = hn::Max(low_b - high_a, low_a - high_b);
-        beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
-      };
-      for (int s = 0; s < 2; ++s) {
-        V at[3];
-        for (int c = 0; c < 3; ++c) at[c] = dot(normal[s], corner[1 - s][c] - corner[s][0]);
-        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]));
-      }
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) {
-          // Both ends of an edge are one along the axis.
-          const Vec3 axis = cross(edge[0][i], edge[1][j]);
-          const V other_a = dot(axis, corner[0][(i + 2) % 3] - corner[0][i]);
-          const V at_b = dot(axis, corner[1][j] - corner[0][i]);
-          const V other_b = at_b + dot(axis, corner[1][(j + 2) % 3] - corner[1][j]);
-          look(axis, hn::Min(zero, other_a), hn::Max(zero, other_a), hn::Min(at_b, other_b),
-               hn::Max(at_b, other_b));
-        }
-      apart |= mask_bits(d, beyond > zero) << l;
-    }
-    for (std::uint32_t left = ((1u << count) - 1) & ~apart; left != 0; left &= left - 1) {
+    for (std::uint32_t left = ((1u << count) - 1) & ~apart_by_axes(pairs, count, double{reach_});
+         left != 0; left &= left - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
       scratch_.kept.add(*keep_, std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]);
     }
   }
 
-  void add_crossings(const TrianglePairs& pairs, const Heights& heights,
+  void add_crossings(const TrianglePairs& pairs, const PairHeights& heights,
                      const std::uint32_t (&pierced)[2][3], std::uint32_t crossing) {
-    if (found_.crossings + static_cast<std::uint32_t>(std::popcount(crossing)) >
-        scratch_.most_crossings) {
+    const auto added = static_cast<std::uint32_t>(std::popcount(crossing));
+    if (found_.crossings + added > scratch_.most_crossings) {
       found_.complete = false;
       return;
     }
+    write_crossings(pairs, heights, pierced, crossing, found_.crossings, scratch_.crossings);
+    found_.crossings += added;
     for (; crossing != 0; crossing &= crossing - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
-      const std::uint32_t at = found_.crossings++;
-      for (int s = 0; s < 2; ++s) {
-        scratch_.crossings.triangle(s, at) = pairs.triangle[s][n];
-        set((s == 0 ? scratch_.a : scratch_.b).near, pairs.triangle[s][n] / kWidth);
-        for (int k = 0; k < 3; ++k)
-          if (pierced[s][k] >> n & 1) add_end(pairs, heights, n, s, k, at);
-      }
+      const int n = std::countr_zero(crossing);
+      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
     }
-  }
-
-  /// Where edge k of a side of pair n goes through the other triangle.
-  void add_end(const TrianglePairs& pairs, const Heights& heights, std::uint32_t n, int s, int k,
-               std::uint32_t at) {
-    const int next = (k + 1) % 3;
-    const double hp = std::abs(heights.value[s][k][n]), hq = std::abs(heights.value[s][next][n]);
-    const double whole = hp + hq, error = heights.error[s][k][n] + heights.error[s][next][n];
-    const auto& corner = pairs.corner[s];
-    const auto before = [&] {
-      for (int c = 0; c < 3; ++c)
-        if (corner[k][c][n] != corner[next][c][n]) return corner[next][c][n] < corner[k][c][n];
-      return false;
-    };
-    // From the nearer end, and between two as near from the first in space, so that both triangles
-    // at an edge do alike.
-    const bool turned = hq < hp || (hq == hp && before());
-    // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
-    const bool flat = whole == 0;
-    const double share = flat ? 0.5 : std::min(hp, hq) / whole;
-    // An edge that goes down enters the other solid.
-    const bool down = (heights.positive[s][k] >> n & 1) != 0;
-    const int e = down == (s == 0) ? 1 : 0;
-    const auto put = [&](int number, double value) {
-      scratch_.crossings.end(e, number)[at] = value;
-    };
-    const int near = turned ? next : k, far = turned ? k : next;
-    for (int c = 0; c < 3; ++c) {
-      put(Crossings::kFrom + c, corner[near][c][n]);
-      put(Crossings::kOffset + c, share * (corner[far][c][n] - corner[near][c][n]));
-    }
-    put(Crossings::kT, turned ? 1 - share : share);
-    // Which of two places comes first is asked with B moved aside.
-    put(Crossings::kTError, flat ? 1 : 2 * (error + 2 * heights.shift[s][n]) / whole + 1e-15);
-    put(Crossings::kHeightError, error);
-    put(Crossings::kEdge, 3 * s + k + (turned ? 0 : 8));
   }
 
   const MeshTree& a_;
@@ -627,11 +294,6 @@ CrossingsFound search_kept(const CrossingSearch& search, const KeptPairs& kept,
   return TriangleSearch(search, scratch).run(kept);
 }
 
-SurfaceContact search_contact(const CrossingSearch& search, std::uint32_t count,
-                              const KeptPairs* kept, ExactScratch& scratch) {
-  return TriangleSearch(search, scratch).contact(count, kept);
-}
-
 const PlacedVertices& place_one(const CrossingSearch& search, bool of_b, std::uint32_t number,
                                 ExactScratch& scratch) {
   return PlacedMeshes(search, scratch).vertices(of_b, number);
@@ -645,7 +307,6 @@ namespace ist {
 
 HWY_EXPORT(search_triangles);
 HWY_EXPORT(search_kept);
-HWY_EXPORT(search_contact);
 HWY_EXPORT(place_one);
 
 CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first, std::uint32_t next,
@@ -657,11 +318,6 @@ CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_kept)(search, kept, scratch);
-}
-
-SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
-                            const KeptPairs* kept, ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_contact)(search, count, kept, scratch);
 }
 
 const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

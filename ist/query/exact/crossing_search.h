@@ -32,7 +32,6 @@ struct BlockPairs {
 struct CrossingsFound {
   std::uint32_t crossings = 0;  ///< in ExactScratch::crossings
   std::uint32_t next = 0;       ///< the pair of blocks to go on from: `count` at the end
-  bool settled = false;         ///< triangles cross wherever points move by the room
   bool complete = true;         ///< no limit or room was short
   bool consistent = true;       ///< signs agree with each other
 };
@@ -64,6 +63,9 @@ CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs
 /// marked as near: how they touch, B where it is.
 SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
                             const KeptPairs* kept, ExactScratch& scratch) noexcept;
+
+/// Whether one of the first `count` crossings is there wherever points move by the room.
+bool any_settled(const CrossingSearch& search, std::uint32_t count, ExactScratch& scratch) noexcept;
 
 /// The vertices of a block in A's unit frame, B's rounded once after the motion. They stay until
 /// others are placed.

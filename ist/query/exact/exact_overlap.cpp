@@ -7,7 +7,6 @@
 
 #include "query/exact/crossing_search.h"
 #include "query/exact/mesh_queries.h"
-#include "query/exact/nearest_points.h"
 
 namespace ist {
 namespace {
@@ -110,24 +109,8 @@ CrossedBlock* ExactQuery::make_crossed_block(Side& own, std::uint32_t block) noe
   made.block = block;
   made.inside = 0;
   made.pierced = 0;
-  const MeshBlock& mesh = own.mesh.blocks[block];
-  double away[kWidth];
-  const PlacedVertices& placed = place_block(search_, own.is_b, block, scratch_);
-  const double origin[3] = {out_.origin.x, out_.origin.y, out_.origin.z};
-  for (int k = 0; k < 3; ++k)
-    for (std::uint32_t v = 0; v < kWidth; ++v) made.vertex[k][v] = placed.at[k][v] - origin[k];
-  for (std::uint32_t v = 0; v < kWidth; ++v)
-    away[v] =
-        (std::abs(made.vertex[0][v]) + std::abs(made.vertex[1][v])) + std::abs(made.vertex[2][v]);
-  const std::uint8_t* const corner[5] = {mesh.corner[0], mesh.corner[1], mesh.corner[2],
-                                         mesh.corner[0], mesh.corner[1]};
-  for (std::uint32_t t = 0; t < kWidth; ++t) {
-    const double first = away[corner[0][t]], second = away[corner[1][t]],
-                 third = away[corner[2][t]];
-    const int apex = third < std::min(first, second) ? 2 : second < first ? 1 : 0;
-    made.apex[t] = static_cast<std::uint8_t>(apex);
-    for (int k = 0; k < 3; ++k) made.fan[k][t] = corner[apex + k][t];
-  }
+  place_fans(place_block(search_, own.is_b, block, scratch_), own.mesh.blocks[block], out_.origin,
+             made);
   return &made;
 }
 
@@ -183,90 +166,6 @@ void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const Crossings
     crossed.first_error[edge] = t_error;
   }
   if (end.from_first) crossed.middle[edge] = static_cast<std::int8_t>(crossed.middle[edge] + sign);
-}
-
-/// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
-/// nothing pierces.
-void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
-  const MeshBlock& mesh = side.mesh.blocks[crossed.block];
-  std::uint32_t known = 0, inside = 0;
-  for (std::uint64_t left = crossed.pierced; left != 0; left &= left - 1) {
-    const auto edge = static_cast<std::uint32_t>(std::countr_zero(left));
-    const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
-                        q = mesh.corner[(edge + 1) % 3][edge / 3];
-    const int sum = crossed.sum[edge], first = crossed.first[edge];
-    if (sum == 0 && first == 0) continue;
-    known |= 1u << p | 1u << q;
-    if (sum < 0 || (sum == 0 && first < 0)) inside |= 1u << p;
-    if (sum > 0 || (sum == 0 && first < 0)) inside |= 1u << q;
-  }
-  std::uint32_t joined[kWidth] = {};
-  for (std::uint32_t k = 0; k < 3; ++k)
-    for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-      const std::uint32_t p = mesh.corner[k][t], q = mesh.corner[(k + 1) % 3][t];
-      const auto whole = static_cast<std::uint32_t>(~crossed.pierced >> (3 * t + k) & 1);
-      joined[p] |= whole << q;
-      joined[q] |= whole << p;
-    }
-  const std::uint32_t all = (1u << mesh.vertices) - 1;
-  const auto spread = [&](std::uint32_t from) {
-    while (from != 0) {
-      const auto v = static_cast<std::uint32_t>(std::countr_zero(from));
-      from &= from - 1;
-      const std::uint32_t reached = joined[v] & ~known;
-      known |= reached;
-      from |= reached;
-      if (inside >> v & 1) inside |= reached;
-    }
-  };
-  spread(known);
-  while (known != all) {  // where it is not clear what pierces an edge first
-    const auto v = static_cast<std::uint32_t>(std::countr_zero(all & ~known));
-    if (is_inside(side, mesh.vertex[v])) inside |= 1u << v;
-    known |= 1u << v;
-    spread(1u << v);
-  }
-  crossed.inside = static_cast<std::uint16_t>(inside);
-}
-
-bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept {
-  const MeshTree& other = sides_[own.is_b ? 0 : 1].mesh;
-  const MeshOfPair solid = own.is_b ? MeshOfPair{other} : MeshOfPair{other, &a_from_b_, &b_from_a_};
-  return ist::is_inside(solid, place(own, vertex), search_.aside);
-}
-
-/// Marks the blocks that lie inside as a whole: from those whose edges are pierced on, and whole
-/// shells.
-void ExactQuery::find_insides(Side& own) noexcept {
-  BlockMarks& marks = own.marks;
-  const MeshTree& mesh = own.mesh;
-  std::uint32_t waiting = 0;
-  const auto wait = [&](std::uint32_t block) {
-    if (has(marks.pierced, block) || has(marks.inside, block)) return;
-    set(marks.inside, block);
-    scratch_.flood[waiting++] = block;
-  };
-  for (std::uint32_t c = 0; c < marks.count; ++c) {
-    CrossedBlock& crossed = marks.blocks[c];
-    if (crossed.pierced == 0) continue;
-    settle(own, crossed);
-    const MeshBlock& block = mesh.blocks[crossed.block];
-    for (std::uint32_t k = 0; k < block.neighbours; ++k) {
-      const std::uint32_t entry = mesh.neighbours[block.first_neighbour + k];
-      if (crossed.inside >> entry % kWidth & 1) wait(entry / kWidth);
-    }
-  }
-  for (std::uint32_t s = 0; s < mesh.header->shell_count; ++s)
-    if (!has(marks.shells, s) && is_inside(own, mesh.blocks[mesh.shells[s].block].vertex[0])) {
-      if (out_.crossings == 0 && waiting == 0)
-        out_.origin = place(own, mesh.blocks[mesh.shells[s].block].vertex[0]);
-      wait(mesh.shells[s].block);
-    }
-  while (waiting > 0) {
-    const MeshBlock& block = mesh.blocks[scratch_.flood[--waiting]];
-    for (std::uint32_t k = 0; k < block.neighbours; ++k)
-      wait(mesh.neighbours[block.first_neighbour + k] / kWidth);
-  }
 }
 
 void ExactQuery::count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
@@ -424,6 +323,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   clear_marks();
   out_.complete = begin_search(max_visits, pair_id);
   std::uint32_t left = 0, next = 0;
+  bool settled = false;  // of those that are no longer held
   while (out_.complete) {
     const CrossingsFound found = find_more(left, next);
     out_.consistent = found.consistent;
@@ -433,7 +333,6 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.origin = scratch_.crossings.place_of(0, 0, {0, 0, 0});
     for (std::uint32_t i = left; i < found.crossings; ++i) out_.complete &= add_crossing(i);
     out_.crossings += found.crossings - left;
-    out_.settled |= found.settled;
     const bool ends = serves_ || found.next == block_pairs_;
     const std::uint32_t sums_end = ends ? found.crossings : found.crossings / 8 * 8;
     for (std::uint32_t i = 0; i < sums_end; i += 8) {
@@ -441,8 +340,12 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       crossing_terms(scratch_.crossings, i, out_.origin, terms);
       slots_.add_crossings(terms);
     }
-    if (ends) break;
+    if (ends) {
+      left = found.crossings;
+      break;
+    }
     whole_ = false;
+    settled = settled || any_settled(search_, sums_end, scratch_);
     left = found.crossings - sums_end;
     scratch_.crossings.move_to_front(sums_end, left);
     next = found.next;
@@ -471,7 +374,8 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   // What sums round may be nothing, where no triangles cross for certain. It is if it is no thicker
   // than what poses and vertices round, over the faces that lie on each other or push.
   const double volume = std::abs(out_.sums.volume());
-  if (!out_.settled && volume <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+  if (volume <= 1.01 * (rounding_ + slots_.rounding()) / 6 && !settled &&
+      !any_settled(search_, left, scratch_)) {
     const SurfaceContact contact =
         find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
     if (contact.touching &&

@@ -21,7 +21,6 @@ struct ExactOverlap {
   exact::Point origin = {};  ///< of the sums
   SurfaceContact contact;    ///< where the sums' volume is nothing
   std::uint32_t visits = 0, crossings = 0;
-  bool settled = false;  ///< some of them cross wherever points move by what is rounded
   /// No limit or room was short, and it is consistent; else nothing above is of use.
   bool complete = true;
   bool consistent = true;  ///< signs agree with each other, as exact ones do

@@ -46,6 +46,9 @@ struct alignas(64) PlacedPlanes {
   double normal[3][kWidth];  ///< product of two sides
   double size[kWidth];       ///< no sum of the absolute products in it is larger
   double longest[kWidth];    ///< no coordinate of these sides is larger
+  /// [edge][axis]: about one long, along the plane out of the triangle, which lies below the
+  /// offset.
+  float edge[3][3][kWidth], edge_offset[3][kWidth];
   /// The block's vertices lie between these heights over the plane of `widest`, times the length of
   /// its normal.
   double low, high;
@@ -115,7 +118,7 @@ struct CrossedBlock {
 /// start and leave it at the end.
 class Crossings {
  public:
-  /// Eight are read at once.
+  /// Eight are read and written at once, so that up to seven more are touched.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
       : room_((most + 15) / 8 * 8),
         numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),

@@ -71,21 +71,23 @@ HWY_INLINE CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const 
     for (int j = 0; j < 3; ++j) {
       const FlatEdge f(at[1][j], at[1][(j + 1) % 3]);
       const V from = hn::Max(e.low, f.low), to = hn::Min(e.high, f.high);
-      const V first = e.at(from) - f.at(from), last = e.at(to) - f.at(to);
+      // Beside both edges nothing is below.
+      const auto over = to > from;
+      const V first = hn::IfThenElseZero(over, e.at(from) - f.at(from)),
+              last = hn::IfThenElseZero(over, e.at(to) - f.at(to));
       const V below = hn::Max(hn::Neg(first), zero) + hn::Max(hn::Neg(last), zero);
       const V whole = hn::Abs(first) + hn::Abs(last);
-      const auto counts = hn::And(to > from, whole > zero);
-      const V part = (to - from) * (below * below) / hn::IfThenElse(counts, whole, one);
-      twice = twice + hn::IfThenElseZero(counts, e.turn * f.turn * part);
+      const V share = (to - from) / hn::IfThenElse(whole > zero, whole, one),
+              turn = e.turn * f.turn;
+      twice = twice + turn * (share * (below * below));
       // ∫ x (e − f) and ∫ (e² − f²) / 2 between the places where e − f is below 0.
-      const V root = from + (to - from) * hn::Abs(first) / hn::IfThenElse(counts, whole, one);
+      const V root = from + share * hn::Abs(first);
       const V p = hn::IfThenElse(first < zero, from, root),
               q = hn::IfThenElse(last < zero, to, root);
       const V dp = hn::Min(first, zero), dq = hn::Min(last, zero);
-      const V at_p = (dp + dp) + dq, at_q = dp + (dq + dq);
-      const V half = hn::Set(d, 0.5);
-      const V mean_p = half * (e.at(p) + f.at(p)), mean_q = half * (e.at(q) + f.at(q));
-      const V turned = hn::IfThenElseZero(counts, e.turn * f.turn * (p - q));
+      const V at_p = (dp + dp) + dq, at_q = dp + (dq + dq), half = hn::Set(d, 0.5);
+      const V mean_p = f.at(p) + half * dp, mean_q = f.at(q) + half * dq;
+      const V turned = turn * (p - q);
       moment_x = moment_x + turned * (at_p * p + at_q * q);
       moment_y = moment_y + turned * (at_p * mean_p + at_q * mean_q);
     }

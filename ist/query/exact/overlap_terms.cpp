@@ -74,10 +74,9 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
   }
 }
 
-/// Corners of eight triangles from a block's sixteen vertices.
-HWY_INLINE Vec3 corners(const CrossedBlock& crossed, const std::uint8_t* local, std::size_t l) {
+/// Numbers of a block's sixteen vertices, of a corner of some triangles.
+HWY_INLINE V pick(const double* of_vertex, const std::uint8_t* local) {
   const D d;
-  V at[3];
   if constexpr (hn::MaxLanes(D()) == 8) {
     const hn::RebindToUnsigned<D> du;
     const auto number =
@@ -85,17 +84,46 @@ HWY_INLINE Vec3 corners(const CrossedBlock& crossed, const std::uint8_t* local, 
                                         hn::LoadU(hn::Rebind<std::uint8_t, D>(), local)));
     const auto lanes = hn::IndicesFromVec(d, hn::And(number, hn::Set(du, 7)));
     const auto low = hn::RebindMask(d, number < hn::Set(du, 8));
-    for (int k = 0; k < 3; ++k)
-      at[k] = hn::IfThenElse(low, hn::TableLookupLanes(hn::LoadU(d, crossed.vertex[k]), lanes),
-                             hn::TableLookupLanes(hn::LoadU(d, crossed.vertex[k] + 8), lanes));
+    return hn::IfThenElse(low, hn::TableLookupLanes(hn::LoadU(d, of_vertex), lanes),
+                          hn::TableLookupLanes(hn::LoadU(d, of_vertex + 8), lanes));
   } else {
+    HWY_ALIGN double lanes[hn::MaxLanes(D())];
+    for (std::size_t i = 0; i < hn::Lanes(d); ++i) lanes[i] = of_vertex[local[i]];
+    return hn::Load(d, lanes);
+  }
+}
+
+void place_block_fans(const PlacedVertices& placed, const MeshBlock& mesh,
+                      const exact::Point& origin, CrossedBlock& out) {
+  const D d;
+  const hn::Rebind<std::uint8_t, D> bytes;
+  const hn::Rebind<std::int32_t, D> integers;
+  const Vec3 o = {hn::Set(d, origin.x), hn::Set(d, origin.y), hn::Set(d, origin.z)};
+  alignas(64) double away[kWidth];
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    const Vec3 at = Vec3{hn::Load(d, placed.at[0] + l), hn::Load(d, placed.at[1] + l),
+                         hn::Load(d, placed.at[2] + l)} -
+                    o;
+    hn::StoreU(at.x, d, out.vertex[0] + l);
+    hn::StoreU(at.y, d, out.vertex[1] + l);
+    hn::StoreU(at.z, d, out.vertex[2] + l);
+    hn::Store(length_bound(at), d, away + l);
+  }
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    const V first = pick(away, mesh.corner[0] + l), second = pick(away, mesh.corner[1] + l),
+            third = pick(away, mesh.corner[2] + l);
+    const V nearest = hn::IfThenElse(third < hn::Min(first, second), hn::Set(d, 2.0),
+                                     hn::IfThenElseZero(second < first, hn::Set(d, 1.0)));
+    const auto apex = hn::DemoteTo(bytes, hn::DemoteTo(integers, nearest));
+    hn::StoreU(apex, bytes, out.apex + l);
+    const auto is_third = apex == hn::Set(bytes, 2), is_second = apex == hn::Set(bytes, 1);
     for (int k = 0; k < 3; ++k) {
-      HWY_ALIGN double lanes[hn::MaxLanes(D())];
-      for (std::size_t i = 0; i < hn::Lanes(d); ++i) lanes[i] = crossed.vertex[k][local[l + i]];
-      at[k] = hn::Load(d, lanes);
+      const auto corner = [&](int c) { return hn::LoadU(bytes, mesh.corner[(k + c) % 3] + l); };
+      hn::StoreU(
+          hn::IfThenElse(is_third, corner(2), hn::IfThenElse(is_second, corner(1), corner(0))),
+          bytes, out.fan[k] + l);
     }
   }
-  return {at[0], at[1], at[2]};
 }
 
 void sum_triangles(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidth], int h,
@@ -104,7 +132,11 @@ void sum_triangles(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidt
   alignas(64) double times[8];
   for (int i = 0; i < 8; ++i) times[i] = whole[8 * h + i];
   for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
-    const auto corner = [&](int k) { return corners(crossed, crossed.fan[k] + 8 * h, l); };
+    const auto corner = [&](int k) -> Vec3 {
+      const std::uint8_t* const local = crossed.fan[k] + 8 * h + l;
+      return {pick(crossed.vertex[0], local), pick(crossed.vertex[1], local),
+              pick(crossed.vertex[2], local)};
+    };
     const Vec3 apex = corner(0), next = corner(1), last = corner(2);
     const Vec3 u = next - apex, v = last - apex;
     const V count = hn::Load(d, times + l);
@@ -124,8 +156,14 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace ist {
 
+HWY_EXPORT(place_block_fans);
 HWY_EXPORT(sum_crossings);
 HWY_EXPORT(sum_triangles);
+
+void place_fans(const PlacedVertices& placed, const MeshBlock& mesh, const exact::Point& origin,
+                CrossedBlock& out) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_block_fans)(placed, mesh, origin, out);
+}
 
 void crossing_terms(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
                     ExactTerms& out) noexcept {

@@ -15,6 +15,11 @@ struct alignas(64) ExactTerms {
   double rounding[8];  ///< six times what the volume may be off by
 };
 
+/// The vertices of a crossed block from the origin of the sums, and the corners that the cones of
+/// its triangles start at.
+void place_fans(const PlacedVertices& placed, const MeshBlock& mesh, const exact::Point& origin,
+                CrossedBlock& out) noexcept;
+
 /// Of crossings `first` … `first` + 7: the segments that two triangles share, and the pierced edges
 /// opposite to an apex from their nearer ends on.
 void crossing_terms(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,

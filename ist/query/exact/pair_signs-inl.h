@@ -11,45 +11,61 @@
 #include <cmath>
 
 #include "query/exact/crossing_search.h"
-#include "query/exact/flat_areas-inl.h"
+#include "query/exact/points-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
+
+HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
+  const D d;
+  return {hn::Load(d, pairs.corner[side][c][0] + l), hn::Load(d, pairs.corner[side][c][1] + l),
+          hn::Load(d, pairs.corner[side][c][2] + l)};
+}
+
+/// Writes a triangle of a pair that is gathered.
+HWY_INLINE void put_triangle(const MeshTree& mesh, std::uint32_t triangle,
+                             const PlacedVertices& from, int side, TrianglePairs& pairs) {
+  const MeshBlock& block = mesh.blocks[triangle / kWidth];
+  for (int c = 0; c < 3; ++c) {
+    const std::uint32_t v = block.corner[c][triangle % kWidth];
+    for (int k = 0; k < 3; ++k) pairs.corner[side][c][k][pairs.count] = from.at[k][v];
+  }
+  pairs.triangle[side][pairs.count] = triangle;
+}
+
+inline std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
+inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
+  return each(bits) | ~(bits[0] | bits[1] | bits[2]);
+}
+
+/// Heights of eight pairs, and what their signs say: a bit each.
+struct alignas(64) PairHeights {
+  double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
+  double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
+  std::uint32_t positive[2][3] = {};      ///< with B moved aside
+  std::uint32_t certain[2][3] = {};       ///< in double
+  std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
+
+  /// Pairs that a plane keeps apart.
+  std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
+    return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
+  }
+  /// Edges that go through the other's plane.
+  void find_parts(std::uint32_t (&out)[2][3]) const {
+    for (int s = 0; s < 2; ++s)
+      for (int k = 0; k < 3; ++k) out[s][k] = positive[s][k] ^ positive[s][(k + 1) % 3];
+  }
+};
 
 /// Signs of pairs that were gathered, in double, and exactly where doubles leave them unclear.
 class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  static HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size_t l) {
-    const D d;
-    return {hn::Load(d, pairs.corner[side][c][0] + l), hn::Load(d, pairs.corner[side][c][1] + l),
-            hn::Load(d, pairs.corner[side][c][2] + l)};
-  }
-
-  static std::uint32_t each(const std::uint32_t (&bits)[3]) { return bits[0] & bits[1] & bits[2]; }
-  static std::uint32_t alike(const std::uint32_t (&bits)[3]) {
-    return each(bits) | ~(bits[0] | bits[1] | bits[2]);
-  }
-
-  /// Heights of eight pairs, and what their signs say: a bit each.
-  struct alignas(64) Heights {
-    double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-    double shift[2][8];                 ///< what moving B aside adds to them, its absolute value
-    std::uint32_t positive[2][3] = {};  ///< with B moved aside
-    std::uint32_t certain[2][3] = {};   ///< in double
-    std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
-
-    /// Pairs that a plane keeps apart.
-    std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
-      return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
-    }
-  };
-
-  /// `kAsks`: whether it matters what is settled.
+  /// `kAsks`: whether what is settled is asked.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
-                               Heights& out) const {
+                               PairHeights& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
     const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
@@ -111,7 +127,7 @@ class PairSigns {
 
   /// Of pair n, where doubles leave a sign unclear.
   HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
-                                         Heights& out) const {
+                                         PairHeights& out) const {
     const ExactCorners corners(pairs, n);
     for (int s = 1; s >= 0; --s) {
       for (int c = 0; c < 3; ++c) {
@@ -216,6 +232,20 @@ class PairSigns {
       }
   }
 
+  /// Pairs that cross, or do not, wherever points move by the room.
+  HWY_NOINLINE std::uint32_t find_settled(const TrianglePairs& pairs, std::uint32_t count) const {
+    PairHeights heights;
+    find_heights<true>(pairs, count, heights);
+    const std::uint32_t apart = heights.apart(heights.settled);
+    const std::uint32_t all = each(heights.settled[0]) & each(heights.settled[1]) & ~apart;
+    if (all == 0) return apart;
+    WaysRound round;
+    find_ways_round<true>(pairs, count, round);
+    std::uint32_t parts[2][3];
+    heights.find_parts(parts);
+    return apart | (all & round.decided(parts, round.settled));
+  }
+
   /// Pairs that are further apart than `reach` across or along the plane of one of them.
   HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
@@ -243,31 +273,43 @@ class PairSigns {
     return out;
   }
 
-  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal; of
-  /// those that look the same way 0.
-  static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
-                                      double (&along)[3][8], double (&moment)[3][8]) {
+  /// Pairs that a plane along a triangle or along an edge of each keeps as far apart as `reach`.
+  static HWY_NOINLINE std::uint32_t apart_by_axes(const TrianglePairs& pairs, std::uint32_t count,
+                                                  double by) {
     const D d;
-    for (std::size_t l = 0; l < pairs.count; l += hn::Lanes(d)) {
-      Vec3 corner[2][3];
-      for (int s = 0; s < 2; ++s)
+    std::uint32_t apart = 0;
+    for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
+      Vec3 corner[2][3], edge[2][3], normal[2];
+      for (int s = 0; s < 2; ++s) {
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      const auto normal_of = [](const Vec3(&t)[3]) { return cross(t[1] - t[0], t[2] - t[0]); };
-      const Vec3 normal = normal_of(corner[0]);
-      const V length = hn::Sqrt(dot(normal, normal));
-      const CommonArea common = common_area(corner[0], corner[1], normal);
-      const V factor =
-          hn::IfThenElseZero(dot(normal, normal_of(corner[1])) < hn::Zero(d), common.over_normal);
-      const V whole = factor * length;
-      const Vec3 centre = corner[0][0] + common.centre;
-      hn::Store(whole * centre.x, d, moment[0] + l);
-      hn::Store(whole * centre.y, d, moment[1] + l);
-      hn::Store(whole * centre.z, d, moment[2] + l);
-      hn::Store(whole, d, area + l);
-      hn::Store(factor * normal.x, d, along[0] + l);
-      hn::Store(factor * normal.y, d, along[1] + l);
-      hn::Store(factor * normal.z, d, along[2] + l);
+        for (int c = 0; c < 3; ++c) edge[s][c] = corner[s][(c + 1) % 3] - corner[s][c];
+        normal[s] = cross(edge[s][0], edge[s][1]);
+      }
+      const V zero = hn::Zero(d), reach = hn::Set(d, by);
+      V beyond = zero;
+      // An axis and what both triangles reach along it, B's seen from a corner of A's.
+      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b) {
+        const V gap = hn::Max(low_b - high_a, low_a - high_b);
+        beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
+      };
+      for (int s = 0; s < 2; ++s) {
+        V at[3];
+        for (int c = 0; c < 3; ++c) at[c] = dot(normal[s], corner[1 - s][c] - corner[s][0]);
+        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]));
+      }
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          // Both ends of an edge are one along the axis.
+          const Vec3 axis = cross(edge[0][i], edge[1][j]);
+          const V other_a = dot(axis, corner[0][(i + 2) % 3] - corner[0][i]);
+          const V at_b = dot(axis, corner[1][j] - corner[0][i]);
+          const V other_b = at_b + dot(axis, corner[1][(j + 2) % 3] - corner[1][j]);
+          look(axis, hn::Min(zero, other_a), hn::Max(zero, other_a), hn::Min(at_b, other_b),
+               hn::Max(at_b, other_b));
+        }
+      apart |= mask_bits(d, beyond > zero) << l;
     }
+    return apart;
   }
 
   const CrossingSearch& search_;

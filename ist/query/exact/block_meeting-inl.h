@@ -1,0 +1,197 @@
+// How the triangles of two blocks lie to each other's planes: included once a target.
+
+#if defined(IST_QUERY_BLOCK_MEETING_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_QUERY_BLOCK_MEETING_INL_H_
+#undef IST_QUERY_BLOCK_MEETING_INL_H_
+#else
+#define IST_QUERY_BLOCK_MEETING_INL_H_
+#endif
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "query/exact/placed_mesh-inl.h"
+#include "query/exact/plane_sides-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+/// Which triangles of a block reach into a slab.
+inline std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3], float low,
+                             float high) {
+  const F d;
+  std::uint32_t bits = 0;
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    hn::Vec<F> along[3];
+    for (int c = 0; c < 3; ++c)
+      along[c] = (hn::Set(d, normal[0]) * hn::Load(d, triangles.corner[c][0] + l) +
+                  hn::Set(d, normal[1]) * hn::Load(d, triangles.corner[c][1] + l)) +
+                 hn::Set(d, normal[2]) * hn::Load(d, triangles.corner[c][2] + l);
+    bits |= mask_bits(d, hn::And(hn::Min(along[0], hn::Min(along[1], along[2])) <= hn::Set(d, high),
+                                 hn::Max(along[0], hn::Max(along[1], along[2])) >= hn::Set(d, low)))
+            << l;
+  }
+  return bits;
+}
+
+/// Triangles of B that reach through the plane of one of A's, which reaches through theirs.
+struct Straddling {
+  std::uint32_t clear = 0, doubtful = 0;
+};
+
+/// In float, and as if points moved by `reach`.
+HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
+                                 const PlacedTriangles& b, std::uint32_t lanes, float reach) {
+  const F d;
+  // Coordinates are floats, and points of both blocks that matter are no further apart than this.
+  const float blur = 1e-6f * (a.reach + b.reach) + reach, size = a.size + b.size;
+  const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
+  Straddling out;
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+    if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
+    const auto over_b =
+        hn::Set(d, blur) * hn::Load(d, b.length + l) + hn::Load(d, b.slack + l) * hn::Set(d, size);
+    hn::Vec<F> of_b[3], of_a[3];
+    for (int c = 0; c < 3; ++c) {
+      of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
+                  hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
+                 hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
+                hn::Set(d, a.offset[i]);
+      of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
+                  hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
+                 hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
+                hn::Load(d, b.offset + l);
+    }
+    // How far the heights reach to the nearer side of a plane.
+    const auto through = [](const hn::Vec<F>(&height)[3]) {
+      return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
+                     hn::Max(height[0], hn::Max(height[1], height[2])));
+    };
+    const auto a_by = through(of_b), b_by = through(of_a);
+    const std::uint32_t may =
+        mask_bits(d, hn::And(a_by >= hn::Neg(over_a), b_by >= hn::Neg(over_b)));
+    const std::uint32_t clear = mask_bits(d, hn::And(a_by > over_a, b_by > over_b));
+    out.clear |= clear << l;
+    out.doubtful |= (may & ~clear) << l;
+  }
+  out.clear &= lanes;
+  out.doubtful &= lanes;
+  return out;
+}
+
+/// Two blocks whose triangles are tested by the planes of either side, in double, and by planes
+/// through their edges.
+class Meeting {
+ public:
+  /// `margin`: where a sign is not settled, a plane does not keep them apart unless both blocks are
+  /// marked as near anyway. Planes through edges keep apart what is further than `reach`.
+  Meeting(const CrossingSearch& search, ExactScratch& scratch, std::uint32_t a, std::uint32_t b,
+          Margin margin, float reach)
+      : search_(search), scratch_(scratch), margin_(margin), reach_(reach), number_{a, b} {
+    PlacedMeshes placed(search, scratch);
+    for (int s = 0; s < 2; ++s) vertices_[s] = &placed.vertices(s == 1, number_[s]);
+    const PlacedTriangles &of_a = placed.triangles(false, a), &of_b = placed.triangles(true, b);
+    for (int k = 0; k < 3; ++k)
+      apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
+                                    std::min(of_a.all_low[k], of_b.all_low[k]));
+    apart_ += search.room;
+    blur_ = 1e-6f * (of_a.reach + of_b.reach) + reach;
+  }
+
+  const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
+  Margin margin() const { return margin_; }
+
+  /// Which triangles of the other block may not lie beside all planes of a flat one of this side.
+  /// Where signs have to be settled, those of its triangles may not be: what is left out is out of
+  /// reach.
+  std::uint32_t straddling_block(int side) {
+    // Its own heights are off by as much as the other's.
+    const PlacedPlanes& planes = planes_of(side);
+    const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
+    flat_[side] = true;
+    return ~kept_apart(side, sides(side, planes.widest, planes.low - off, planes.high + off,
+                                   margin_ == Margin::room ? Margin::reach : margin_));
+  }
+
+  /// Which of `lanes` of B no plane keeps apart from A's triangle i.
+  std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
+    const bool told = margin_ != Margin::room;  // by the planes of flat blocks
+    if (!told || !flat_[0]) lanes &= ~beside(0, i);
+    if (!told || !flat_[1])
+      lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
+    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
+    if (flat_[1]) lanes = edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); });
+    return lanes;
+  }
+
+  /// Which of B's triangles lie in the plane of A's triangle i, to CrossingSearch::touch.
+  std::uint32_t flush(std::uint32_t i) const {
+    const PlacedPlanes& planes = planes_of(0);
+    const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
+    const double far = search_.touch * std::sqrt(dot(n, n));
+    const PlaneSides off = sides_of(*vertices_[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
+                                    Margin::rounding, 0);
+    return triangles_of(~(off.above | off.below), block(1));
+  }
+
+ private:
+  const MeshBlock& block(int side) const {
+    return (side == 0 ? search_.a : search_.b)->blocks[number_[side]];
+  }
+  const PlacedPlanes& planes_of(int side) const {
+    return side == 0 ? placed_planes(*search_.a, number_[0], nullptr, *scratch_.placed_a)
+                     : placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
+  }
+  /// Of the other block's vertices.
+  PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
+    return sides_of(*vertices_[1 - side], planes_of(side), t, low, high,
+                    (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin,
+                    double{margin == Margin::reach ? reach_ : search_.room});
+  }
+  std::uint32_t kept_apart(int side, const PlaneSides& found) const {
+    return triangles_of(found.above, block(1 - side)) | triangles_of(found.below, block(1 - side));
+  }
+  /// Which of the other block's triangles lie beside the plane of triangle t.
+  std::uint32_t beside(int side, std::uint32_t t) const {
+    return kept_apart(side, sides(side, t, 0, 0, margin_));
+  }
+  /// And beyond an edge of it.
+  std::uint32_t beyond(int side, std::uint32_t t) const {
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side), blur_);
+  }
+  /// A's triangles that those of B keep apart, found when they are asked for first.
+  struct Columns {
+    std::uint32_t apart[kWidth];
+    std::uint32_t known = 0;
+
+    template <class Find>
+    std::uint32_t without(std::uint32_t i, std::uint32_t lanes, const Find& find) {
+      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
+        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
+        if ((known >> j & 1) == 0) {
+          known |= 1u << j;
+          apart[j] = find(j);
+        }
+        lanes &= ~((apart[j] >> i & 1) << j);
+      }
+      return lanes;
+    }
+  };
+
+  const CrossingSearch& search_;
+  ExactScratch& scratch_;
+  const Margin margin_;
+  const float reach_;
+  const std::uint32_t number_[2];
+  const PlacedVertices* vertices_[2];
+  float apart_ = 0;    ///< no coordinates of both blocks differ by more
+  float blur_;         ///< and planes through edges are floats
+  bool flat_[2] = {};  ///< whose edges are asked
+  Columns planes_, edges_;
+};
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
