@@ -83,9 +83,9 @@ RayHit hit_at(const SolidFrame& frame, const OwnRay& ray, double distance, const
 }
 
 /// An asset's mesh at a place.
-class PlacedMesh {
+class MeshOfSolid {
  public:
-  explicit PlacedMesh(const PlacedTree& placed) noexcept {
+  explicit MeshOfSolid(const PlacedTree& placed) noexcept {
     if (placed.tree.empty()) return;
     if (!keeps_mesh(placed)) {
       status_ = QueryStatus::not_held;
@@ -284,7 +284,7 @@ class PlacedShape {
 /// Runs `use(solid)` with what answers.
 template <class Use>
 auto with_solid(const PlacedTree& placed, const Use& use) noexcept {
-  return use(PlacedMesh(placed));
+  return use(MeshOfSolid(placed));
 }
 template <class Use>
 auto with_solid(const PlacedField& placed, const Use& use) noexcept {
