@@ -21,10 +21,12 @@ struct LineLattice {
   double shift = 0;               ///< of every row against the one before, over the step
   std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
 
-  IST_HD double y(std::uint32_t i, std::uint32_t j) const {
-    const double turned = offset + j * shift;
-    return y0 + (i + (shift == 0 ? turned : turned - std::floor(turned))) * step_y;
+  /// Of the first line of row j from the lower corner, over the step.
+  IST_HD double turned(std::uint32_t j) const {
+    const double all = offset + j * shift;
+    return shift == 0 ? all : all - static_cast<double>(static_cast<std::int64_t>(all));
   }
+  IST_HD double y(std::uint32_t i, std::uint32_t j) const { return y0 + (i + turned(j)) * step_y; }
   IST_HD double z(std::uint32_t j) const { return z0 + (j + offset) * step_z; }
   IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
 };
@@ -71,6 +73,40 @@ IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t
   const double first = lattice.y(0, j);
   return {(low - first) / lattice.step_y, (high - first) / lattice.step_y, lattice.ny};
 }
+
+/// The strip of the (y, z) plane along a triangle's edge from its lowest to its highest corner that
+/// holds the triangle. Most rows of a needle have no line within it, which it tells for less than
+/// lines_of() does. Coordinates along y are in steps.
+struct TriangleStrip {
+  double at0, slope;   ///< the edge at row 0; per row
+  double left, right;  ///< the strip's sides, from the edge
+
+  /// `t` spans a step along z and more.
+  TriangleStrip(const LineLattice& lattice, const Corners& t) {
+    constexpr double kRoom = 2e-6;  // more than a LatticeRange's
+    int low = 0, high = 0;
+    for (int k = 1; k < 3; ++k) {
+      if (t.p[k][2] < t.p[low][2]) low = k;
+      if (t.p[k][2] > t.p[high][2]) high = k;
+    }
+    const auto y = [&](int k) { return (t.p[k][1] - lattice.y0) / lattice.step_y; };
+    const auto z = [&](int k) {
+      return (t.p[k][2] - lattice.z0) / lattice.step_z - lattice.offset;
+    };
+    slope = (y(high) - y(low)) / (z(high) - z(low));
+    at0 = y(low) - slope * z(low);
+    const int middle = 3 - low - high;
+    const double off = y(middle) - at0 - slope * z(middle);
+    left = (off < 0 ? off : 0) - kRoom;
+    right = (off > 0 ? off : 0) + kRoom;
+  }
+
+  /// Whether a line of row j may lie within.
+  bool may_meet(const LineLattice& lattice, std::uint32_t j) const {
+    const double at = at0 + slope * j - lattice.turned(j);
+    return static_cast<double>(static_cast<std::int64_t>(at + right)) >= at + left;
+  }
+};
 
 /// Order of crossings along a line: by x, equal x: +1 first.
 IST_HD inline bool comes_before(const Crossing& a, const Crossing& b) {
