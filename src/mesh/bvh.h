@@ -14,6 +14,7 @@ struct Bvh {
   std::unique_ptr<BvhNode[]> nodes;
   std::unique_ptr<TriangleBlock[]> blocks;
   std::uint32_t root = kBvhEmpty;
+  std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented;  ///< of meshes of needles
 };
 
 /// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).

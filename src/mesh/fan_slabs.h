@@ -13,8 +13,8 @@ namespace ist {
 
 using FloatPoint = std::array<float, 3>;
 
-/// What is known of the triangles under a node besides its box, where there are large fans: their
-/// triangles are long and thin, and their boxes meet nearly all others'.
+/// What is known of the triangles under a node besides its box, where there are large fans or other
+/// needles: their triangles are long and thin, and their boxes meet nearly all others'.
 struct Slab {
   std::uint32_t owner = kNoIndex;  ///< the vertex in whose spread fan all of them are
   Eigen::Vector3d centre;          ///< of a box around them
@@ -40,8 +40,9 @@ std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
                                      const std::vector<std::uint32_t>& spread);
 
 /// A box around a group of triangles, one of whose axes is along their longest side, one along
-/// their normal. `points`: vertices, in [0, 1].
+/// their normal. `points`: vertices, in [0, 1]. `margin`: by which one of two boxes is wider.
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners);
+             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
+             double margin);
 
 }  // namespace ist
