@@ -18,9 +18,9 @@ LatticeCrossings cross_lattice(const MeshView& mesh, const LineLattice& lattice)
         for (std::uint32_t j = rows.first; j < rows.last; ++j) for_row(lattice, t, j, visit);
         return;
       }
-      const TriangleStrip strip(lattice, t);
+      const TriangleStrip strip = strip_of(lattice, t);
       const auto row = [&](std::uint32_t j) {
-        if (strip.may_meet(lattice, j)) for_row(lattice, t, j, visit);
+        if (may_meet(strip, lattice, j)) for_row(lattice, t, j, visit);
       };
       if (is_few && rows.first + kManyRows < rows.last) {
         tbb::parallel_for(rows.first, rows.last, row);

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/ray_crossing.h"
+#include "mesh/triangle_strip.h"
 #include "numerics/host_device.h"
 
 namespace ist {
@@ -74,39 +76,24 @@ IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t
   return {(low - first) / lattice.step_y, (high - first) / lattice.step_y, lattice.ny};
 }
 
-/// The strip of the (y, z) plane along a triangle's edge from its lowest to its highest corner that
-/// holds the triangle. Most rows of a needle have no line within it, which it tells for less than
-/// lines_of() does. Coordinates along y are in steps.
-struct TriangleStrip {
-  double at0, slope;   ///< the edge at row 0; per row
-  double left, right;  ///< the strip's sides, from the edge
-
-  /// `t` spans a step along z and more.
-  TriangleStrip(const LineLattice& lattice, const Corners& t) {
-    constexpr double kRoom = 2e-6;  // more than a LatticeRange's
-    int low = 0, high = 0;
-    for (int k = 1; k < 3; ++k) {
-      if (t.p[k][2] < t.p[low][2]) low = k;
-      if (t.p[k][2] > t.p[high][2]) high = k;
-    }
-    const auto y = [&](int k) { return (t.p[k][1] - lattice.y0) / lattice.step_y; };
-    const auto z = [&](int k) {
-      return (t.p[k][2] - lattice.z0) / lattice.step_z - lattice.offset;
-    };
-    slope = (y(high) - y(low)) / (z(high) - z(low));
-    at0 = y(low) - slope * z(low);
-    const int middle = 3 - low - high;
-    const double off = y(middle) - at0 - slope * z(middle);
-    left = (off < 0 ? off : 0) - kRoom;
-    right = (off > 0 ? off : 0) + kRoom;
+/// A triangle in the (y, z) plane in steps of a lattice, seen from row 0 of its line 0.
+inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
+  std::array<double, 3> y, z;
+  for (std::size_t k = 0; k < 3; ++k) {
+    y[k] = (t.p[k][1] - lattice.y0) / lattice.step_y;
+    z[k] = (t.p[k][2] - lattice.z0) / lattice.step_z - lattice.offset;
   }
+  return {y, z};
+}
 
-  /// Whether a line of row j may lie within.
-  bool may_meet(const LineLattice& lattice, std::uint32_t j) const {
-    const double at = at0 + slope * j - lattice.turned(j);
-    return static_cast<double>(static_cast<std::int64_t>(at + right)) >= at + left;
-  }
-};
+/// Whether a line of row j may lie within. Most rows of a needle have none, which this tells for
+/// less than lines_of() does.
+inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
+  constexpr double kRoom = 2e-6;  // more than a LatticeRange's
+  const double at = strip.at(j) - lattice.turned(j);
+  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kRoom)) >=
+         at + strip.left - kRoom;
+}
 
 /// Order of crossings along a line: by x, equal x: +1 first.
 IST_HD inline bool comes_before(const Crossing& a, const Crossing& b) {

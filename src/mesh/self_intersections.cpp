@@ -209,11 +209,11 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
     std::stable_sort(
         order_.begin(), order_.end(),
         [&](const std::uint32_t a, const std::uint32_t b) { return owners[a] < owners[b]; });
-  } else if (mean_slenderness(triangles.size(), [&](const std::size_t t) {
-               const Triangle& of = triangles[t];
-               return Corners{{vertices[of[0]].data(), vertices[of[1]].data(),
-                               vertices[of[2]].data()}};
-             }) > kSlender) {
+  } else if (
+      mean_slenderness(triangles.size(), [&](const std::size_t t) {
+        const Triangle& of = triangles[t];
+        return Corners{{vertices[of[0]].data(), vertices[of[1]].data(), vertices[of[2]].data()}};
+      }) > kSlender) {
     owners.assign(triangles.size(), kNoIndex);
   }
 
@@ -236,10 +236,9 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
     std::vector<Slab>& slabs = slabs_.emplace_back(levels_[level].size());
     tbb::parallel_for(std::size_t{0}, slabs.size(), [&](const std::size_t node) {
       const std::span<const std::uint32_t> all(order_);
-      slabs[node] =
-          slab_of(points, triangles,
-                  all.subspan(size * node, std::min(size, all.size() - size * node)), owners,
-                  double{wider});
+      slabs[node] = slab_of(points, triangles,
+                            all.subspan(size * node, std::min(size, all.size() - size * node)),
+                            owners, double{wider});
     });
   }
 }
