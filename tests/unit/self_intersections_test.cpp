@@ -226,6 +226,19 @@ TriangleMesh fan_body(const std::uint32_t n, const bool cone, const bool about_c
   return weld(mesh, 0);
 }
 
+TEST(SelfIntersections, OfNeedles) {
+  TriangleMesh other = testing::needle_tube(110, 0.2);
+  for (Eigen::Vector3d& v : other.vertices) v = Eigen::Vector3d(v.y(), 0.6 * v.z(), v.x());
+  const TriangleMesh two = testing::joined(testing::needle_tube(130, 0.5), other);
+  expect_all_found(two);
+  EXPECT_GT(find_self_intersections(two.vertices, two.triangles)->count, 100u);
+  // By their boxes along the axes, more pairs meet than are looked at.
+  const TriangleMesh large = testing::needle_tube(10'000, 0.3);
+  const auto none = find_self_intersections(large.vertices, large.triangles);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->count, 0u);
+}
+
 TEST(SelfIntersections, OfLargeFans) {
   std::mt19937_64 random(55);
   std::normal_distribution<double> any;
