@@ -16,9 +16,7 @@
 
 #include "mesh/bvh.h"
 #include "mesh/closest_point.h"
-#include "mesh/slenderness.h"
 #include "mesh/triangle_frame.h"
-#include "mesh/wide_build.h"
 #include "numerics/rounding.h"
 
 // Many triangles are sorted into cells of a coarse grid first; the tree over
@@ -463,10 +461,6 @@ class TrianglesToSort {
   TrianglesToSort(std::span<const double> vertices, std::span<const std::uint32_t> corners)
       : vertices_(vertices), corners_(corners) {}
 
-  Corners corners(std::uint32_t triangle) const {
-    return {{corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)}};
-  }
-
   Item item(std::uint32_t triangle) const {
     const double *a = corner(triangle, 0), *b = corner(triangle, 1), *c = corner(triangle, 2);
     GrowingBox box;
@@ -498,51 +492,6 @@ class TrianglesToSort {
   const std::span<const std::uint32_t> corners_;
 };
 
-/// The triangles below a child, as far as `most`.
-void gather(const Tree& tree, std::uint32_t child, std::size_t most,
-            std::vector<std::uint32_t>& triangles) {
-  if (child == kBvhEmpty || triangles.size() > most) return;
-  if ((child & kBvhLeaf) != 0) {
-    for (const std::uint32_t t : tree.leaves[child & ~kBvhLeaf])
-      if (t != kNoTriangle) triangles.push_back(t);
-  } else {
-    for (const std::uint32_t below : tree.nodes[child].child) gather(tree, below, most, triangles);
-  }
-}
-
-/// Around few triangles; many have a box that keeps nothing out.
-WideOrientedBox oriented_box(const TrianglesToSort& all,
-                             const std::vector<std::uint32_t>& triangles, std::size_t most) {
-  WideMoments moments;
-  if (triangles.empty() || triangles.size() > most) {
-    WideOrientedBox everything(moments);
-    constexpr float kFar = 4;  // coordinates are within ±1
-    for (int k = 0; k < 3; ++k) everything.lower[k] = -(everything.upper[k] = kFar);
-    return everything;
-  }
-  const double* const origin = all.corners(triangles[0]).p[0];
-  for (const std::uint32_t t : triangles) moments.add(all.corners(t), origin);
-  WideOrientedBox box(moments);
-  for (const std::uint32_t t : triangles)
-    for (const double* const corner : all.corners(t).p) box.extend(corner);
-  return box;
-}
-
-std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented_boxes(const Tree& tree,
-                                                           const TrianglesToSort& all) {
-  constexpr std::size_t kMost = 1024;
-  auto boxes = std::make_unique_for_overwrite<OrientedBoxes<kBvhWidth>[]>(tree.nodes.size());
-  tbb::parallel_for(std::size_t{0}, tree.nodes.size(), [&](std::size_t node) {
-    std::vector<std::uint32_t> triangles;
-    for (int i = 0; i < kBvhWidth; ++i) {
-      triangles.clear();
-      gather(tree, tree.nodes[node].child[i], kMost, triangles);
-      oriented_box(all, triangles, kMost).write_to(boxes[node], i);
-    }
-  });
-  return boxes;
-}
-
 }  // namespace
 
 Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> corners) {
@@ -557,16 +506,16 @@ Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> c
   const Tree tree = tree_of({all, extent_of_many(all), 0});
   items.reset();
   bvh.root = tree.root;
-  if (mean_slenderness(count, [&](std::size_t t) {
-        return triangles.corners(static_cast<std::uint32_t>(t));
-      }) > kSlender)
-    bvh.oriented = oriented_boxes(tree, triangles);
   bvh.nodes = std::make_unique_for_overwrite<BvhNode[]>(tree.nodes.size());
   bvh.blocks = std::make_unique_for_overwrite<TriangleBlock[]>(tree.leaves.size());
   tbb::parallel_for(std::size_t{0}, tree.nodes.size(),
                     [&](std::size_t i) { bvh.nodes[i] = tree.nodes[i]; });
   tbb::parallel_for(std::size_t{0}, tree.leaves.size(),
                     [&](std::size_t i) { bvh.blocks[i] = triangles.block(tree.leaves[i]); });
+  bvh.oriented = oriented_boxes(
+      {vertices.data(), corners.data(), static_cast<std::uint32_t>(vertices.size() / 3), count,
+       bvh.nodes.get(), bvh.blocks.get(), bvh.root},
+      tree.nodes.size());
   return bvh;
 }
 
