@@ -48,6 +48,20 @@ TEST(Check, FindsBakesSound) {
   expect_all_sound(check(bake(two, testing::of_size(300)), two));
 }
 
+/// Tetrahedra along a diagonal of their box, of which they fill so little that one or two of the
+/// points that a check draws lie within, or none.
+TEST(Check, FindsNeedlesSound) {
+  for (int i = 0; i < 60; ++i) {
+    const double share = (3 + i % 10) * 1e-5, thin = std::sqrt(6 * share);
+    TriangleMesh needle;
+    needle.vertices = {{0, 0, 0}, {1, 1 - 0.01 * i, 1}, {thin, 0, 0}, {0, thin, 0}};
+    needle.triangles = {{0, 2, 1}, {2, 3, 1}, {3, 0, 1}, {0, 3, 2}};
+    const ClosedMesh closed = testing::closed(needle, "needle");
+    for (const Invariant& one : check(bake_surface(closed), closed))
+      EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " of " << i;
+  }
+}
+
 TEST(Check, RefusesAnotherMesh) {
   const ClosedMesh other = testing::closed(testing::icosphere_mesh(1), "ball");
   EXPECT_THROW(check(cube_asset(), other), Error);
