@@ -50,8 +50,8 @@ class SampledMoments {
   }
 
   /// By how much ∫ f over the solid is off, beyond six standard deviations and `error`, as a share
-  /// of what it could be: no |f| in the bounding box is larger than `most`. Of a needle that fills
-  /// so little of its box that 18 points are expected in it, none is once in 10⁸ times.
+  /// of what it could be: no |f| in the bounding box is larger than `most`. Where so little of the
+  /// box is filled that 18 points are expected in it, none is once in 10⁸ times.
   template <class Function>
   double off(const Function& f, double expected, double error, double most) const {
     double sum = 0, squares = 0;
