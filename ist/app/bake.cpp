@@ -104,10 +104,15 @@ void bake_robot(const BakeOptions& options, const BakeSettings& settings) {
     write_text(index_file, json_text(all.index) + "\n");
   }
   exit_if_interrupted();
+  for (std::size_t i = 0; i < assets.size(); ++i)
+    for (const std::string& warning : warnings_of(assets[i].view()))
+      for (const std::string& link : all.links[i]) meshes.warn(link, warning);
+  meshes.finish();
   const double seconds = seconds_since(start);
   if (options.json) {
     Json result = {{"index", index_file}};
     result.update(all.index);
+    result["warnings"] = meshes.said();
     result["seconds"] = seconds;
     fmt::print("{}\n", json_text(result));
   } else if (!options.quiet) {

@@ -81,12 +81,15 @@ void LinkMeshes::warn(const std::string& link, const std::string& note) {
   if (warning.links.empty() || warning.links.back() != link) warning.links.push_back(link);
 }
 
-void LinkMeshes::finish() const {
-  for (const auto& [kind, warning] : warnings_)
-    spdlog::warn(
-        "{}: {} {}: {}{}", robot_, warning.links.size() == 1 ? "link" : "links",
-        fmt::join(warning.links, ", "), warning.note,
-        warning.differs ? fmt::format(" (the numbers are those of {})", warning.link) : "");
+void LinkMeshes::finish() {
+  for (const auto& [kind, warning] : warnings_) {
+    said_.push_back(fmt::format(
+        "{} {}: {}{}", warning.links.size() == 1 ? "link" : "links", fmt::join(warning.links, ", "),
+        warning.note,
+        warning.differs ? fmt::format(" (the numbers are those of {})", warning.link) : ""));
+    spdlog::warn("{}: {}", robot_, said_.back());
+  }
+  warnings_.clear();
   if (faults_.size() == 1) throw Error(faults_[0]);
   if (faults_.empty()) return;
   for (const std::string& fault : faults_) spdlog::error("{}", fault);

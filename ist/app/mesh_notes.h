@@ -35,12 +35,16 @@ class LinkMeshes {
   /// Whether one of these links is to be repaired.
   bool repairs(const std::vector<std::string>& links) const;
 
-  /// Throws Error if any link failed.
-  void finish() const;
-
- private:
+  /// A finding about a link, which finish() says.
   void warn(const std::string& link, const std::string& note);
 
+  /// Says what was found since it was last called. Throws Error if any link failed.
+  void finish();
+
+  /// All that finish() said.
+  const std::vector<std::string>& said() const { return said_; }
+
+ private:
   struct Warning {
     /// The first of its kind by its letters, so that of the lowest confidence, and whose it is.
     std::string note, link;
@@ -50,7 +54,7 @@ class LinkMeshes {
   const std::string robot_;
   const MeshSettings settings_;
   const std::vector<std::string> repaired_;
-  std::vector<std::string> faults_;
+  std::vector<std::string> faults_, said_;
   std::map<std::string, Warning> warnings_;
 };
 

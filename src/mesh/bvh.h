@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -14,7 +15,12 @@ struct Bvh {
   std::unique_ptr<BvhNode[]> nodes;
   std::unique_ptr<TriangleBlock[]> blocks;
   std::uint32_t root = kBvhEmpty;
+  std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented;  ///< of meshes of needles
 };
+
+/// Oriented boxes of a hierarchy's `nodes`, around the few triangles below each child, where the
+/// mesh is of needles; null where it is not.
+std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented_boxes(const MeshView& mesh, std::size_t nodes);
 
 /// Builds over `triangles` (three indices each) of exact unit-frame vertices (three doubles each).
 Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> triangles);

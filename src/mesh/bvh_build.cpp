@@ -512,6 +512,10 @@ Bvh build_bvh(std::span<const double> vertices, std::span<const std::uint32_t> c
                     [&](std::size_t i) { bvh.nodes[i] = tree.nodes[i]; });
   tbb::parallel_for(std::size_t{0}, tree.leaves.size(),
                     [&](std::size_t i) { bvh.blocks[i] = triangles.block(tree.leaves[i]); });
+  bvh.oriented = oriented_boxes(
+      {vertices.data(), corners.data(), static_cast<std::uint32_t>(vertices.size() / 3), count,
+       bvh.nodes.get(), bvh.blocks.get(), bvh.root},
+      tree.nodes.size());
   return bvh;
 }
 

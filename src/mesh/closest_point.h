@@ -52,8 +52,9 @@ using FloatLanes = float;
 #endif
 constexpr int kFloatLanes = sizeof(FloatLanes) / sizeof(float);
 
-IST_HD inline FloatLanes load_lanes(const float* from) {
-  FloatLanes lanes;
+template <class Lanes = FloatLanes>
+IST_HD inline Lanes load_lanes(const float* from) {
+  Lanes lanes;
   std::memcpy(&lanes, from, sizeof lanes);
   return lanes;
 }
@@ -77,6 +78,37 @@ IST_HD inline void child_distances2(const BvhNode& node, const float p[3],
     }
     store_lanes(sum, distance2 + i);
   }
+}
+
+/// The directions of the oriented boxes from `child` on, in three rows.
+template <class Lanes, int kWidth>
+IST_HD inline void load_axes(const OrientedBoxes<kWidth>& boxes, int child, Lanes axis[3][3]) {
+  for (int k = 0; k < 3; ++k) {
+    axis[0][k] = load_lanes<Lanes>(boxes.n[k] + child);
+    axis[1][k] = load_lanes<Lanes>(boxes.u[k] + child);
+  }
+  cross3(axis[0], axis[1], axis[2]);
+}
+
+/// Squared distances from p to the oriented boxes from `child` on. Never above the exact ones:
+/// twice the error of a float distance is taken off for the roundings here and for directions that
+/// are not quite orthogonal unit vectors.
+template <class Lanes, int kWidth>
+IST_HD inline Lanes oriented_distance2(const OrientedBoxes<kWidth>& boxes, int child,
+                                       const float p[3], float error) {
+  Lanes axis[3][3];
+  load_axes(boxes, child, axis);
+  const Lanes zero{};
+  Lanes sum = zero;
+  for (int k = 0; k < 3; ++k) {
+    const Lanes off = axis[k][0] * p[0] + axis[k][1] * p[1] + axis[k][2] * p[2] -
+                      load_lanes<Lanes>(boxes.middle[k] + child);
+    const Lanes outside =
+        (off < zero ? -off : off) - load_lanes<Lanes>(boxes.half[k] + child) - 2 * error;
+    const Lanes gap = outside > zero ? outside : zero;
+    sum += gap * gap;
+  }
+  return sum;
 }
 
 /// Closest points of a block's triangles, in their frames.
@@ -148,6 +180,12 @@ IST_HD void for_triangles_near(const MeshView& mesh, const float p[3], float rad
       const BvhNode& node = mesh.nodes[at];
       float d2[kBvhWidth];
       child_distances2(node, p, d2);
+      if (mesh.oriented != nullptr)
+        for (int i = 0; i < kBvhWidth; i += kFloatLanes) {
+          const FloatLanes along_axes = load_lanes(d2 + i);
+          const FloatLanes own = oriented_distance2<FloatLanes>(mesh.oriented[at], i, p, error);
+          store_lanes(own > along_axes ? own : along_axes, d2 + i);
+        }
       const int base = top;
       for (int i = 0; i < kBvhWidth; ++i) {
         if (!(d2[i] <= bound) || node.child[i] == kBvhEmpty) continue;

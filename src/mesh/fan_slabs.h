@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -13,24 +14,34 @@ namespace ist {
 
 using FloatPoint = std::array<float, 3>;
 
-/// What is known of the triangles under a node besides its box, where there are large fans: their
-/// triangles are long and thin, and their boxes meet nearly all others'.
+/// What is known of the triangles under a node besides its box, where there are large fans or other
+/// needles: their triangles are long and thin, and their boxes meet nearly all others'.
 struct Slab {
   std::uint32_t owner = kNoIndex;  ///< the vertex in whose spread fan all of them are
   Eigen::Vector3d centre;          ///< of a box around them
   Eigen::Matrix3d axes;            ///< its axes, in columns
   Eigen::Vector3d half;            ///< and half its sizes
 
-  /// A plane along a side of either box has them on different sides.
+  /// A plane along a side of either box, or along an edge of both, has them on different sides.
   bool apart_from(const Slab& other) const {
     constexpr double kRounding = 1e-6;  // of coordinates within [0, 1], rounded to float, and more
     const Eigen::Vector3d between = other.centre - centre;
-    const Eigen::Matrix3d turn = (axes.transpose() * other.axes).cwiseAbs();
-    const Eigen::Vector3d reach = half + turn * other.half;
-    const Eigen::Vector3d reach_of_other = other.half + turn.transpose() * half;
-    return (((axes.transpose() * between).cwiseAbs() - reach).array() > kRounding).any() ||
-           (((other.axes.transpose() * between).cwiseAbs() - reach_of_other).array() > kRounding)
-               .any();
+    const Eigen::Vector3d off = axes.transpose() * between;
+    const Eigen::Matrix3d turn = axes.transpose() * other.axes, size = turn.cwiseAbs();
+    if (((off.cwiseAbs() - half - size * other.half).array() > kRounding).any() ||
+        (((other.axes.transpose() * between).cwiseAbs() - other.half - size.transpose() * half)
+             .array() > kRounding)
+            .any())
+      return true;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+        const double reach = half[i1] * size(i2, j) + half[i2] * size(i1, j) +
+                             other.half[j1] * size(i, j2) + other.half[j2] * size(i, j1);
+        if (std::abs(off[i2] * turn(i1, j) - off[i1] * turn(i2, j)) - reach > kRounding)
+          return true;
+      }
+    return false;
   }
 };
 
@@ -40,8 +51,9 @@ std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
                                      const std::vector<std::uint32_t>& spread);
 
 /// A box around a group of triangles, one of whose axes is along their longest side, one along
-/// their normal. `points`: vertices, in [0, 1].
+/// their normal. `points`: vertices, in [0, 1]. `margin`: by which one of two boxes is wider.
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners);
+             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
+             double margin);
 
 }  // namespace ist

@@ -110,7 +110,8 @@ std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
 }
 
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-             const std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners) {
+             const std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
+             const double margin) {
   Slab slab;
   slab.owner = owners[group[0]];
   const auto point = [&](const std::uint32_t v) {
@@ -136,7 +137,7 @@ Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& tr
   Eigen::AlignedBox3d box;
   for (const std::uint32_t i : group)
     for (const std::uint32_t v : triangles[i]) box.extend(slab.axes.transpose() * point(v));
-  slab.half = box.sizes() / 2;
+  slab.half = box.sizes() / 2 + Eigen::Vector3d::Constant(margin);
   slab.centre = slab.axes * box.center();
   return slab;
 }

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
 #include "mesh/ray_crossing.h"
+#include "mesh/triangle_strip.h"
 #include "numerics/host_device.h"
 
 namespace ist {
@@ -21,10 +23,12 @@ struct LineLattice {
   double shift = 0;               ///< of every row against the one before, over the step
   std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
 
-  IST_HD double y(std::uint32_t i, std::uint32_t j) const {
-    const double turned = offset + j * shift;
-    return y0 + (i + (shift == 0 ? turned : turned - std::floor(turned))) * step_y;
+  /// Of the first line of row j from the lower corner, over the step.
+  IST_HD double turned(std::uint32_t j) const {
+    const double all = offset + j * shift;
+    return shift == 0 ? all : all - static_cast<double>(static_cast<std::int64_t>(all));
   }
+  IST_HD double y(std::uint32_t i, std::uint32_t j) const { return y0 + (i + turned(j)) * step_y; }
   IST_HD double z(std::uint32_t j) const { return z0 + (j + offset) * step_z; }
   IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
 };
@@ -70,6 +74,25 @@ IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t
   if (low > high) return {0, -3, lattice.ny};
   const double first = lattice.y(0, j);
   return {(low - first) / lattice.step_y, (high - first) / lattice.step_y, lattice.ny};
+}
+
+/// A triangle in the (y, z) plane in steps of a lattice, seen from row 0 of its line 0.
+inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
+  std::array<double, 3> y, z;
+  for (std::size_t k = 0; k < 3; ++k) {
+    y[k] = (t.p[k][1] - lattice.y0) / lattice.step_y;
+    z[k] = (t.p[k][2] - lattice.z0) / lattice.step_z - lattice.offset;
+  }
+  return {y, z};
+}
+
+/// Whether a line of row j may lie within. Most rows of a needle have none, which this tells for
+/// less than lines_of() does.
+inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
+  constexpr double kRoom = 2e-6;  // more than a LatticeRange's
+  const double at = strip.at(j) - lattice.turned(j);
+  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kRoom)) >=
+         at + strip.left - kRoom;
 }
 
 /// Order of crossings along a line: by x, equal x: +1 first.

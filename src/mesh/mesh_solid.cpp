@@ -147,6 +147,7 @@ const MeshView& MeshSolid::view() const {
     view_.nodes = bvh_.nodes.get();
     view_.blocks = bvh_.blocks.get();
     view_.root = bvh_.root;
+    view_.oriented = bvh_.oriented.get();
   });
   return view_;
 }

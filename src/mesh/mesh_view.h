@@ -17,6 +17,16 @@ struct alignas(64) BvhNode {
   std::uint32_t child[kBvhWidth];  ///< node index, kBvhLeaf | block index, or kBvhEmpty
 };
 
+/// A node's children's boxes in directions of their own, side by side: the points x with
+/// |a · x − middle[k]| ≤ half[k] for a = n, u, n × u. A patch of a curved surface is flat, but
+/// seldom flat along the axes, and a needle is thin.
+template <int kWidth>
+struct alignas(4 * kWidth) OrientedBoxes {
+  float n[3][kWidth], u[3][kWidth];
+  float middle[3][kWidth];
+  float half[3][kWidth];
+};
+
 /// Up to four triangles as TriangleFrame<float>s side by side, frames made in double from the
 /// exact vertices and rounded once. Absent ones lie at 1e18 and carry kNoTriangle.
 struct alignas(64) TriangleBlock {
@@ -35,7 +45,8 @@ struct MeshView {
 
   const BvhNode* nodes = nullptr;
   const TriangleBlock* blocks = nullptr;
-  std::uint32_t root = kBvhEmpty;  ///< coded like BvhNode::child
+  std::uint32_t root = kBvhEmpty;                      ///< coded like BvhNode::child
+  const OrientedBoxes<kBvhWidth>* oriented = nullptr;  ///< one for each node, or none at all
 };
 
 /// Where a line parallel to x pierces the surface.

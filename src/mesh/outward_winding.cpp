@@ -26,8 +26,37 @@ namespace {
 constexpr double kFullAngle = 12.566370614359172;  ///< 4π
 constexpr double kFar = 3;  ///< distance of what counts together over its radius
 
-/// Signed solid angle of a triangle, positive where p sees its back (van Oosterom & Strackee).
-double solid_angle(const Corners& t, const double p[3]) {
+/// A sum of angles that are given by the sides of right triangles. Their directions are multiplied,
+/// as complex numbers, as long as they are narrow: an angle costs more than all else.
+class AngleSum {
+ public:
+  void add(const double opposite, const double adjacent) {
+    if (!is_narrow(opposite, adjacent)) {
+      sum_ += angle_of(opposite, adjacent);
+      return;
+    }
+    const double tangent = opposite / adjacent, re = re_ - im_ * tangent;
+    im_ += re_ * tangent;
+    re_ = re;
+    if (is_narrow(im_, re_) && re_ < kLarge) return;
+    sum_ += angle_of(im_, re_);
+    re_ = 1;
+    im_ = 0;
+  }
+  double value() const { return sum_ + angle_of(im_, re_); }
+
+ private:
+  /// Below 42°: two of them are less than a right angle.
+  static bool is_narrow(const double opposite, const double adjacent) {
+    return std::abs(opposite) < 0.9 * adjacent;
+  }
+  static constexpr double kLarge = 1e100;
+  double sum_ = 0, re_ = 1, im_ = 0;
+};
+
+/// Adds half the signed solid angle of a triangle, positive where p sees its back (van Oosterom &
+/// Strackee).
+void add_solid_angle(const Corners& t, const double p[3], AngleSum& sum) {
   double v[3][3], length[3];
   for (int c = 0; c < 3; ++c) {
     for (int k = 0; k < 3; ++k) v[c][k] = t.p[c][k] - p[k];
@@ -39,8 +68,8 @@ double solid_angle(const Corners& t, const double p[3]) {
   const double volume = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) -
                         v[0][1] * (v[1][0] * v[2][2] - v[1][2] * v[2][0]) +
                         v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
-  return 2 * angle_of(volume, length[0] * length[1] * length[2] + dot(0, 1) * length[2] +
-                                  dot(1, 2) * length[0] + dot(2, 0) * length[1]);
+  sum.add(volume, length[0] * length[1] * length[2] + dot(0, 1) * length[2] +
+                      dot(1, 2) * length[0] + dot(2, 0) * length[1]);
 }
 
 /// Lines of sight along each side of a view: two or more a triangle, if triangles are alike.
@@ -263,9 +292,10 @@ SoupWinding::Far SoupWinding::far_of(std::uint32_t child, const BvhNode& parent,
 
 double SoupWinding::at(const double p[3]) const {
   double sum = 0;
+  AngleSum angles;
   const auto add_block = [&](std::uint32_t block) {
     for (const std::uint32_t triangle : mesh_.blocks[block].triangle)
-      if (triangle != kNoTriangle) sum += solid_angle(corners_of(mesh_, triangle), p);
+      if (triangle != kNoTriangle) add_solid_angle(corners_of(mesh_, triangle), p, angles);
   };
   if (mesh_.root == kBvhEmpty) return 0;
   std::uint32_t stack[kBvhStackSize];
@@ -296,7 +326,7 @@ double SoupWinding::at(const double p[3]) const {
       sum += (first + trace - 3 * second / r2) / (r2 * std::sqrt(r2));
     }
   }
-  return sum / kFullAngle;
+  return (sum + 2 * angles.value()) / kFullAngle;
 }
 
 std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh) {

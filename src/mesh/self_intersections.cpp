@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "mesh/fan_slabs.h"
+#include "mesh/slenderness.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/usable_mesh.h"
 #include "numerics/hashing.h"
@@ -124,7 +125,8 @@ class TriangleBoxes {
   std::vector<std::uint32_t> order_;
   std::size_t start_ = 0;                        ///< level
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
-  std::vector<std::vector<Slab>> slabs_;  ///< of the nodes up to the starting level; or none at all
+  /// Of the nodes up to the starting level, where there are large fans or needles; or none at all.
+  std::vector<std::vector<Slab>> slabs_;
 };
 
 constexpr std::uint64_t kLeftOut = UINT64_MAX;
@@ -202,11 +204,18 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   tbb::parallel_for(std::size_t{0}, order_.size(), [&](const std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
   });
-  const std::vector<std::uint32_t> owners = owners_of(triangles, spread);
-  if (!owners.empty())
+  std::vector<std::uint32_t> owners = owners_of(triangles, spread);
+  if (!owners.empty()) {
     std::stable_sort(
         order_.begin(), order_.end(),
         [&](const std::uint32_t a, const std::uint32_t b) { return owners[a] < owners[b]; });
+  } else if (
+      mean_slenderness(triangles.size(), [&](const std::size_t t) {
+        const Triangle& of = triangles[t];
+        return Corners{{vertices[of[0]].data(), vertices[of[1]].data(), vertices[of[2]].data()}};
+      }) > kSlender) {
+    owners.assign(triangles.size(), kNoIndex);
+  }
 
   levels_.push_back(in_eights(order_.size(), [&](const std::size_t i, const std::size_t k) {
     const Triangle& t = triangles[order_[i]];
@@ -227,9 +236,9 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
     std::vector<Slab>& slabs = slabs_.emplace_back(levels_[level].size());
     tbb::parallel_for(std::size_t{0}, slabs.size(), [&](const std::size_t node) {
       const std::span<const std::uint32_t> all(order_);
-      slabs[node] =
-          slab_of(points, triangles,
-                  all.subspan(size * node, std::min(size, all.size() - size * node)), owners);
+      slabs[node] = slab_of(points, triangles,
+                            all.subspan(size * node, std::min(size, all.size() - size * node)),
+                            owners, double{wider});
     });
   }
 }

@@ -11,6 +11,7 @@
 
 #include "mesh/edge_table.h"
 #include "mesh/item_groups.h"
+#include "mesh/triangle_strip.h"
 
 namespace ist {
 
@@ -37,8 +38,27 @@ class TriangleColumns {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         const Eigen::AlignedBox2d box = box_of(triangles[t]);
         const auto from = cell(box.min()), to = cell(box.max());
-        for (std::size_t y = from[1]; y <= to[1]; ++y)
-          for (std::size_t x = from[0]; x <= to[0]; ++x) visit(y * cells_ + x, t);
+        const auto row = [&](const std::size_t y, const std::size_t first, const std::size_t last) {
+          for (std::size_t x = first; x <= last; ++x) visit(y * cells_ + x, t);
+        };
+        if (to[1] < from[1] + 2 || to[0] < from[0] + 2) {
+          for (std::size_t y = from[1]; y <= to[1]; ++y) row(y, from[0], to[0]);
+          continue;
+        }
+        std::array<double, 3> x, y;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Eigen::Vector2d at =
+              (seen(position(triangles[t][k])) - low_).cwiseProduct(per_unit_);
+          x[k] = at[0];
+          y[k] = at[1];
+        }
+        const TriangleStrip strip(x, y);
+        for (std::size_t r = from[1]; r <= to[1]; ++r) {
+          constexpr double kRoom = 1e-6;  // above all rounding
+          const double one = strip.at(static_cast<double>(r)), next = one + strip.slope;
+          row(r, std::max(from[0], place(std::min(one, next) + strip.left - kRoom)),
+              std::min(to[0], place(std::max(one, next) + strip.right + kRoom)));
+        }
       }
     });
   }
@@ -54,11 +74,12 @@ class TriangleColumns {
 
   /// Grows with the coordinates, whatever is rounded.
   std::array<std::size_t, 2> cell(const Eigen::Vector2d& p) const {
-    const auto along = [&](const int i) {
-      const double at = (p[i] - low_[i]) * per_unit_[i];
-      return at > 0 ? std::min(cells_ - 1, static_cast<std::size_t>(at)) : 0;
-    };
+    const auto along = [&](const int i) { return place((p[i] - low_[i]) * per_unit_[i]); };
     return {along(0), along(1)};
+  }
+
+  std::size_t place(const double at) const {
+    return at > 0 ? std::min(cells_ - 1, static_cast<std::size_t>(at)) : 0;
   }
 
   int axes_[2];

@@ -133,7 +133,8 @@ struct WideOrientedBox {
     }
   }
 
-  IST_HD void write_to(WideOriented& boxes, int child) const {
+  template <int kWidth>
+  IST_HD void write_to(OrientedBoxes<kWidth>& boxes, int child) const {
     for (int k = 0; k < 3; ++k) {
       const bool empty = !(lower[k] <= upper[k]);
       const float middle = empty ? 0 : (lower[k] + upper[k]) / 2;

@@ -57,8 +57,9 @@ struct WideBall {
   IST_HD std::uint32_t limit() const { return last; }
   IST_HD std::uint32_t key(std::uint32_t node, int child) const {
     const std::uint32_t oriented_from = tree.last_level();
-    return bits_of(node < oriented_from ? box_distance2(tree.node(node), child)
-                                        : oriented_distance2(tree.oriented_node(node), child));
+    return bits_of(node < oriented_from
+                       ? box_distance2(tree.node(node), child)
+                       : oriented_distance2<float>(tree.oriented_node(node), child, p, error));
   }
 
   IST_HD float box_distance2(const WideNode& node, int child) const {
@@ -67,25 +68,6 @@ struct WideBall {
       const float below = node.lower[k][child] - p[k];
       const float above = p[k] - node.upper[k][child];
       const float outside = below > above ? below : above;
-      const float gap = outside > 0 ? outside : 0;
-      sum += gap * gap;
-    }
-    return sum;
-  }
-
-  /// Never above the exact distance: twice the error of a float distance is taken off for the
-  /// roundings here and for directions that are not quite orthogonal unit vectors.
-  IST_HD float oriented_distance2(const WideOriented& boxes, int child) const {
-    float axis[3][3];
-    for (int k = 0; k < 3; ++k) {
-      axis[0][k] = boxes.n[k][child];
-      axis[1][k] = boxes.u[k][child];
-    }
-    cross3(axis[0], axis[1], axis[2]);
-    float sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      const float off = dot3(axis[k], p) - boxes.middle[k][child];
-      const float outside = (off < 0 ? -off : off) - boxes.half[k][child] - 2 * error;
       const float gap = outside > 0 ? outside : 0;
       sum += gap * gap;
     }

@@ -24,14 +24,8 @@ struct alignas(128) WideNode {
   float upper[3][kWideWidth];
 };
 
-/// The same blocks' boxes in directions of their own, for the nodes of the last level: the points x
-/// with |a · x − middle[k]| ≤ half[k] for a = n, u, n × u. A patch of a curved surface is flat, but
-/// seldom flat along the axes. half = −∞ where there is no block.
-struct alignas(128) WideOriented {
-  float n[3][kWideWidth], u[3][kWideWidth];
-  float middle[3][kWideWidth];
-  float half[3][kWideWidth];
-};
+/// The blocks' boxes for the nodes of the last level. half = −∞ where there is no block.
+using WideOriented = OrientedBoxes<kWideWidth>;
 
 /// 32 triangles side by side, their frames made in double from the exact vertices and rounded once,
 /// as in TriangleBlock. Lanes beyond the last triangle lie at 1e18 and carry kNoTriangle.

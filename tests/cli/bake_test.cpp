@@ -1,5 +1,6 @@
 #include <ist/gpu.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -119,6 +120,25 @@ TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {
       ist({"bake", "plate.obj", "-o", "plate.ist", "--spheres", "200", "--scale", "1,1,0.001"});
   EXPECT_NE(hopeless.err.find("too coarse for thin parts"), std::string::npos) << hopeless.err;
   EXPECT_NE(hopeless.err.find("no number of spheres is enough"), std::string::npos);
+}
+
+TEST_F(BakeCommand, PartsOfALinkThatTouchAreToldOf) {
+  write("boxes.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+        "v 0 0 2\nv 1 0 2\nv 1 1 2\nv 0 1 2\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+        "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+        "f 16 15 14 13\nf 9 10 11 12\nf 13 14 10 9\nf 14 15 11 10\nf 15 16 12 11\nf 16 13 9 12\n");
+  write("r.urdf",
+        "<robot name='r'><link name='a'><collision><geometry><mesh filename='boxes.obj'/>"
+        "</geometry></collision></link></robot>");
+  const Outcome outcome = ist({"bake", "r.urdf", "-o", "out", "--surface-only", "--json"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string text = "link a: parts of the mesh touch";
+  EXPECT_NE(outcome.err.find("r.urdf: " + text), std::string::npos) << outcome.err;
+  const nlohmann::json told = nlohmann::json::parse(outcome.out).at("warnings");
+  EXPECT_TRUE(std::any_of(told.begin(), told.end(), [&](const nlohmann::json& one) {
+    return one.get<std::string>().starts_with(text);
+  })) << told;
 }
 
 TEST_F(BakeCommand, ATargetPicksTheSphereCount) {

@@ -73,12 +73,12 @@ TEST_F(Faults, KilledAtRandomMoments) {
   const std::chrono::duration<double> whole = std::chrono::steady_clock::now() - start;
   std::mt19937_64 random(3);
   int killed = 0, left = 0;
-  for (int i = 0; i < 50; ++i) {
+  for (int i = 0; i < 30; ++i) {
     write("out.ist", old_);
     const double first = i % 2 == 0 ? 0.01 : 0.8;
     RunOptions options;
     options.stop_after = std::uniform_real_distribution<double>(first, 1.1)(random) * whole.count();
-    options.stop_signal = i < 40 ? SIGKILL : SIGTERM;
+    options.stop_signal = i < 24 ? SIGKILL : SIGTERM;
     const int exit_code = ist(bake_to("out.ist"), options).exit_code;
     // A request to end is an interrupt, once the program listens.
     constexpr int kInterrupted = 130;
@@ -95,7 +95,7 @@ TEST_F(Faults, KilledAtRandomMoments) {
       std::filesystem::remove(folder_ / name);
     }
   }
-  EXPECT_GT(killed, 8);
+  EXPECT_GT(killed, 5);
   // The new file has no name until it is whole: what can be left is a bake killed in the few
   // microseconds between that and the renaming. File systems without such files keep more.
   if (has_nameless_files()) {
@@ -108,7 +108,7 @@ TEST_F(Faults, InterruptedAtManyMoments) {
   ASSERT_EQ(ist(bake_to("out.ist")).exit_code, 0);
   const std::chrono::duration<double> whole = std::chrono::steady_clock::now() - start;
   std::mt19937_64 random(4);
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < 20; ++i) {
     write("out.ist", old_);
     const double first = i % 2 == 0 ? 0.01 : 0.8;
     RunOptions options;

@@ -20,7 +20,8 @@ void add_paths(const nlohmann::json& json, const std::string& prefix, Paths& pat
   } else if (json.is_array() && !json.empty() && json[0].is_object()) {
     for (const auto& entry : json) add_paths(entry, prefix + "[]", paths);
   } else if (!json.is_array() || !json.empty() || prefix == "notes" || prefix == "left_out" ||
-             prefix == "taken_as_fixed" || prefix.starts_with("default_pose.")) {
+             prefix == "taken_as_fixed" || prefix == "warnings" ||
+             prefix.starts_with("default_pose.")) {
     paths.insert(prefix);
   }
 }

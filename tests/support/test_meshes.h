@@ -1,9 +1,10 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -101,6 +102,25 @@ inline TriangleMesh torus_mesh(double major, double minor, std::uint32_t around,
 }
 
 /// The triangles of both, side by side: shells may overlap.
+/// A tube of needles along no axis, 2 long, between radii `inner` and 1.
+inline TriangleMesh needle_tube(std::uint32_t sides, double inner) {
+  TriangleMesh mesh;
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.3, -0.5, 0.1).normalized();
+  for (const auto& [radius, z] : {std::pair{1.0, -1.0}, {1.0, 1.0}, {inner, 1.0}, {inner, -1.0}})
+    for (std::uint32_t i = 0; i < sides; ++i) {
+      const double angle = 2 * std::numbers::pi * i / sides;
+      mesh.vertices.push_back(
+          turn * Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z));
+    }
+  for (std::uint32_t ring = 0; ring < 4; ++ring)
+    for (std::uint32_t i = 0; i < sides; ++i) {
+      const std::uint32_t next = (i + 1) % sides, a = ring * sides, b = (ring + 1) % 4 * sides;
+      mesh.triangles.push_back({a + i, a + next, b + i});
+      mesh.triangles.push_back({a + next, b + next, b + i});
+    }
+  return mesh;
+}
+
 inline TriangleMesh joined(TriangleMesh a, const TriangleMesh& b) {
   const auto offset = static_cast<std::uint32_t>(a.vertices.size());
   a.vertices.insert(a.vertices.end(), b.vertices.begin(), b.vertices.end());

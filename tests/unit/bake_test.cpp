@@ -48,6 +48,23 @@ TEST(Check, FindsBakesSound) {
   expect_all_sound(check(bake(two, testing::of_size(300)), two));
 }
 
+/// Tetrahedra that fill so little of their boxes that two of the points that a check draws are
+/// expected in them, and often there is none.
+TEST(Check, FindsThinSolidsSound) {
+  for (int i = 0; i < 60; ++i) {
+    const double a = i / 60.0, b = i % 7 / 7.0, c = i % 11 / 11.0;
+    TriangleMesh thin;
+    thin.vertices = {{0, 0, a}, {1, b, 0}, {c, 1, 1}};
+    const Eigen::Vector3d normal =
+        (thin.vertices[1] - thin.vertices[0]).cross(thin.vertices[2] - thin.vertices[0]);
+    thin.vertices.push_back(thin.vertices[0] + 2.4e-4 * normal / normal.squaredNorm());
+    thin.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+    const ClosedMesh closed = testing::closed(thin, "thin");
+    for (const Invariant& one : check(bake_surface(closed), closed))
+      EXPECT_EQ(one.violations, 0u) << one.name << ": " << one.worst << " of " << i;
+  }
+}
+
 TEST(Check, RefusesAnotherMesh) {
   const ClosedMesh other = testing::closed(testing::icosphere_mesh(1), "ball");
   EXPECT_THROW(check(cube_asset(), other), Error);

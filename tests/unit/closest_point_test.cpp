@@ -208,8 +208,9 @@ ist::TriangleMesh plate_and_needle() {
 }
 
 std::vector<ist::TriangleMesh> search_meshes() {
-  return {cube_mesh(), torus_mesh(2, 0.5, 40, 20), icosphere_mesh(3), overlapping_cubes_mesh(),
-          plate_and_needle()};
+  return {cube_mesh(),        torus_mesh(2, 0.5, 40, 20),
+          icosphere_mesh(3),  overlapping_cubes_mesh(),
+          plate_and_needle(), needle_tube(150, 0.3)};
 }
 
 TEST(NearestTriangle, IsTheMinimumOverAllOfThem) {

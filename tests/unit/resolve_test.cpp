@@ -392,8 +392,8 @@ TEST(Resolve, SameBytesForAnyNumberOfThreads) {
 
 /// A hundred thousand pairs: told of on the caller's thread, and ended where it is told to.
 TEST(Resolve, ReportsAndIsCancelled) {
-  const ClosedMesh closed = balls(40, 3);
-  ASSERT_GT(closed.meeting_pairs->size(), 90'000u);
+  const ClosedMesh closed = balls(26, 3);
+  ASSERT_GT(closed.meeting_pairs->size(), 35'000u);
   std::vector<double> told;
   const auto caller = std::this_thread::get_id();
   const ProgressCallback listen = [&](const Progress& now) {

@@ -226,6 +226,19 @@ TriangleMesh fan_body(const std::uint32_t n, const bool cone, const bool about_c
   return weld(mesh, 0);
 }
 
+TEST(SelfIntersections, OfNeedles) {
+  TriangleMesh other = testing::needle_tube(50, 0.2);
+  for (Eigen::Vector3d& v : other.vertices) v = Eigen::Vector3d(v.y(), 0.6 * v.z(), v.x());
+  const TriangleMesh two = testing::joined(testing::needle_tube(60, 0.5), other);
+  expect_all_found(two);
+  EXPECT_GT(find_self_intersections(two.vertices, two.triangles)->count, 100u);
+  // By their boxes along the axes, more pairs meet than are looked at.
+  const TriangleMesh large = testing::needle_tube(10'000, 0.3);
+  const auto none = find_self_intersections(large.vertices, large.triangles);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->count, 0u);
+}
+
 TEST(SelfIntersections, OfLargeFans) {
   std::mt19937_64 random(55);
   std::normal_distribution<double> any;
@@ -238,13 +251,13 @@ TEST(SelfIntersections, OfLargeFans) {
                          .normalized()
                    : Eigen::Quaterniond::Identity();
         // Larger than any search of all pairs could be.
-        TriangleMesh large = fan_body(cone && about_corner ? 4'000 : 20'000, cone, about_corner);
+        TriangleMesh large = fan_body(cone && about_corner ? 4'000 : 12'000, cone, about_corner);
         for (Eigen::Vector3d& v : large.vertices) v = turn * v;
         const auto none = find_self_intersections(large.vertices, large.triangles);
         ASSERT_TRUE(none);
         EXPECT_EQ(none->count, 0u);
         // A spike through it is found.
-        TriangleMesh pierced = fan_body(150, cone, about_corner);
+        TriangleMesh pierced = fan_body(80, cone, about_corner);
         const auto first = static_cast<std::uint32_t>(pierced.vertices.size());
         for (const auto& [x, y, z] : {std::array{0.5, 0.1, 1.0},
                                       {0.52, 0.13, -1.0},

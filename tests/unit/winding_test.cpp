@@ -49,6 +49,12 @@ std::list<MeshSolid> random_solids() {
     solids.emplace_back(closed(joined(potato(seed), other), "two potatoes"));
     solids.emplace_back(closed(joined(potato(seed), inverted(other)), "one minus the other"));
   }
+  // The hierarchy has oriented boxes over needles alone.
+  ist::TriangleMesh other = needle_tube(90, 0.2);
+  for (Vector3d& v : other.vertices) v = Vector3d(v.y(), 0.6 * v.z(), v.x());
+  solids.emplace_back(closed(joined(needle_tube(120, 0.5), other), "two tubes"));
+  EXPECT_NE(solids.back().view().oriented, nullptr);
+  EXPECT_EQ(solids.front().view().oriented, nullptr);
   return solids;
 }
 
