@@ -151,19 +151,12 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
     more.insert(more.begin(), {a, "cube.ist", "--pose", kAtOrigin});
     expect_exit(2, more, message);
   };
-  refused("ball:1", {"--surface", "never"},
-          "never cannot be combined with ball:1, a field without spheres");
+  refused("ball:1", {"--spheres-only"}, "--spheres-only: has no effect where A is a field");
   refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
-  refused("cube.ist", {"--surface", "always", "--measure", "inner"}, "--surface: has no effect");
-  refused("cube.ist", {"--surface", "some"}, "{auto,never,always}");
-  ASSERT_EQ(
-      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
-      0);
-  expect_exit(1, {"cube.ist", "bare.ist", "--pose", kAtOrigin, "--surface", "always"},
-              "bare.ist: has no surface");
+  refused("cube.ist", {"--spheres-only", "--measure", "inner"}, "--spheres-only: has no effect");
 }
 
-/// Once, and only where the coarser one could have had a surface.
+/// Once, and only where meshes could have answered.
 TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
   ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--surface", "none"})
                 .exit_code,
@@ -183,9 +176,9 @@ TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
   EXPECT_EQ(warnings(asked, {}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.3"}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--repeat", "3"}), 1u);
-  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--surface", "never"}), 0u);
+  EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--spheres-only"}), 0u);
   EXPECT_EQ(warnings(asked, {"--scale-b", "0.2", "--measure", "inner"}), 0u);
-  EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 0u);  // the coarser one has a surface
+  EXPECT_EQ(warnings(asked, {"--scale-b", "5"}), 1u);
   EXPECT_NE(ist({"query", "bare.ist", "cube.ist", "--pose", kAtOrigin, "--scale-b", "0.1"})
                 .err.find("bare.ist: its spheres are 10 times as coarse"),
             std::string::npos);

@@ -348,8 +348,7 @@ TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
     all.insert(all.end(), more.begin(), more.end());
     expect_exit(2, all, message);
   };
-  refused({"--surface", "always"}, "--surface: has no effect with --measure exact");
-  refused({"--surface", "never"}, "--surface: has no effect with --measure exact");
+  refused({"--spheres-only"}, "--spheres-only: has no effect with --measure exact");
   refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
   expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
               "exact needs the meshes of two assets, and A is a field: plane:0,0,1,0");

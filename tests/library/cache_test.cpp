@@ -186,7 +186,7 @@ TEST_F(Cache, AFullDiskIsAnErrorOfEachAsset) {
   RunOptions options;
   options.in_child = [] {
     std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit small = {20'000, 20'000};
+    const rlimit small = {5'000, 5'000};
     setrlimit(RLIMIT_FSIZE, &small);
   };
   const Outcome outcome = bake("out", {"--cache", "cache"}, options);

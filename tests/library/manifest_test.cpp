@@ -186,7 +186,7 @@ TEST_F(Mistakes, ButDefaultsMayBeOfNoUseToSome) {
   write("fine.toml", R"([defaults]
 at-overlap = "1%"
 world-up = "Y"
-surface = "0.1%"
+surface = "all"
 spheres = 20
 
 [[asset]]

@@ -91,7 +91,7 @@ TEST(SceneRecord, HoldsEveryKindOfBodyAndWhatMetBefore) {
   const std::array<TreeView, 1> assets = {cube().view()};
   for (int step = 0; step < 3; ++step) {
     Scene again = Scene::replay(mixed.scene.record(), assets, 3);
-    EXPECT_EQ(again.size(), 10u);
+    EXPECT_EQ(again.size(), 9u);
     EXPECT_EQ(again.record(), mixed.scene.record());
     const std::uint64_t bits = bits_of(mixed.scene);
     EXPECT_EQ(bits_of(again), bits);

@@ -291,7 +291,7 @@ TEST(GpuFields, RoomChangesNoBit) {
   const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < count; ++f)
-    for (const BatchPair& pair : pairs_with(f, 40, 90 + f)) pairs.push_back(pair);
+    for (const BatchPair& pair : pairs_with(f, 80, 90 + f)) pairs.push_back(pair);
   for (std::uint32_t f = 0; f < count; ++f) {  // and some of which much meets
     BatchPair pair = pairs_with(f, 1, 90)[0];
     pair.pose_b = pair.pose_a;
@@ -376,7 +376,7 @@ TEST(GpuFields, ABatchMixesPairsInAnyOrder) {
   const std::vector<BatchPair> of_trees = RandomPairs(19).pairs(40);
   std::vector<BatchPair> of_fields, pairs;
   for (std::uint32_t f = 0; kFirstField + f < solids.size(); ++f)
-    for (const BatchPair& pair : pairs_with(f, 12, 190 + f)) of_fields.push_back(pair);
+    for (const BatchPair& pair : pairs_with(f, 24, 190 + f)) of_fields.push_back(pair);
   std::vector<Penetration> expected = HostBatch(batch_solids()).run(of_trees, Measure::matched, 1);
   pairs = of_trees;
   std::size_t crossed = 0;

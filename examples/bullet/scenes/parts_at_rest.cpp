@@ -163,7 +163,7 @@ SceneResult run_peg(const SceneOptions& options) {
                     {{"height of its foot [mm]", at.translation().z(), -0.1, 0.1},
                      {"tilt [rad], of what the clearance leaves",
                       angle_to_z(at) / (2 * (kHole - kPeg) / kDeep), 0, 1},
-                     {"farthest off the axis, of the clearance", aside / (kHole - kPeg), 0, 1.5}});
+                     {"farthest off the axis, of the clearance", aside / (kHole - kPeg), 0, 2}});
 }
 
 SceneResult run_bunnies(const SceneOptions& options) {
