@@ -127,7 +127,8 @@ HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32
 /// The planes of a block.
 inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t number,
                                          const Similarity* map, PlacedMesh& kept) {
-  const auto [out, held] = kept.planes.find(number);
+  const auto [found, held] = kept.planes.find(number);
+  auto& out = found;  // clang 14 captures no structured binding
   if (held) return out;
   const MeshBlock& block = tree.blocks[number];
   const PlacedVertices& vertices = placed_vertices(tree, number, map, kept);
