@@ -270,10 +270,10 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
 /// interval is as wide as rounding and the meshes' error (TreeView::mesh_error). It is zero if the
 /// surfaces cross or one solid contains the other. Otherwise it is the distance of the inner
 /// spheres, exact to about 1e-6 of the objects' size, and all zero once these overlap. A stopped
-/// query returns the nearest points that it found; its interval is still certified. Batches on the
-/// GPU
-/// (<ist/gpu_query.h>) always use the inner spheres. The distance from a field is that of the
-/// asset's inner spheres, certified as far as the field's distances are: see each field.
+/// query returns the nearest points that it found; its interval is still certified.
+///
+/// Batches on the GPU (<ist/gpu_query.h>) always use the inner spheres. The distance from a field
+/// is that of the asset's inner spheres, certified as far as the field's are: see each field.
 ///
 /// If the gap is nearly constant over a large area, as between the threads of a nut and a bolt, a
 /// query takes many times longer: in a loop, set pair_id, and max_distance to what matters.
