@@ -334,6 +334,34 @@ std::optional<uint32_t> measure_of(const Instance& a, const Instance& b) {
   return std::nullopt;
 }
 
+/// Where one solid is wholly inside the other no force of the overlap leads out: a contact that
+/// pushes the inner one to the nearest face, as deep as its own size at most.
+bool find_way_out(const ist_placed_t& a, const ist_placed_t& b, const ist_penetration_t& whole,
+                  mjPreContact& out) {
+  constexpr double kWhole = 0.99, kNone = 0.01;
+  const double size = std::cbrt(whole.volume);
+  if (a.tree == nullptr || !(mju_norm3(whole.translation_gradient) < kNone * size * size))
+    return false;
+  for (const bool inner_is_b : {false, true}) {
+    const ist_placed_t &inner = inner_is_b ? b : a, &outer = inner_is_b ? a : b;
+    ist_tree_info_t info = {};
+    info.size = sizeof info;
+    ist_bounds_t box = {};
+    box.size = sizeof box;
+    ist_surface_point_t near = {};
+    if (ist_tree_get_info(inner.tree, &info) < 0 || ist_placed_bounds(&inner, &box) < 0 ||
+        !(whole.volume > kWhole * info.volume * std::pow(inner.scale, 3)) ||
+        ist_closest_point(&outer, box.centre, 1, &near, sizeof near) < 0)
+      continue;
+    out.dist = -std::min(size, box.radius - near.distance);
+    mju_copy3(out.pos, box.centre);
+    mju_scl3(out.normal, near.gradient, inner_is_b ? 1 : -1);
+    mju_zero3(out.tangent);
+    return true;
+  }
+  return false;
+}
+
 /// MuJoCo's collision function of two geoms of which the second is of type sdf: types come in the
 /// order of mjtGeom, and sdf is the last.
 int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtNum margin) {
@@ -405,6 +433,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     complain_once("ist.solid: a limit stopped an exact query: there the hulls collide");
     return collide_hull(m, d, out, g1, g2, margin);
   }
+  if (whole.volume > 0 && find_way_out(a, b, whole, *out)) return 1;
   int count = 0;
   for (size_t i = 0; i < patches.count; ++i)
     if (memory.patches[i].area > 0) write_contact(memory.patches[i], out[count++]);

@@ -3,6 +3,7 @@
 import concurrent.futures
 import json
 import os
+import pathlib
 import subprocess
 import sys
 
@@ -13,6 +14,9 @@ import ist
 
 mujoco = pytest.importorskip("mujoco")
 import ist.mujoco  # noqa: E402
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "examples/mujoco"))
+import drops  # noqa: E402
 
 CUBE = """
 <mujoco>
@@ -197,6 +201,13 @@ def test_small_meshes_are_exact_by_default(folder):
     assert np.abs(data.qvel).max() < 1e-2 and np.abs(places[:, :2]).max() < 1e-6
     assert np.abs(places[:, 4:6]).max() < 1e-6  # upright
     assert places[:, 2].min() == pytest.approx(-0.2108, abs=2e-4)  # matched spheres: 2 mm and more higher
+
+
+@pytest.mark.parametrize("hz", [240, 1000])
+def test_impacts_gain_no_energy(hz):
+    """The short form of examples/mujoco/drops.py. A plate of 10 mm is wholly inside the table in one step."""
+    for name, worst, gains, passed in drops.drops("ist", hz, 3, names=["plate", "ring"]):
+        assert (worst <= drops.MOST, gains, passed) == (True, 0, 0), (name, worst)
 
 
 def test_models_side_by_side_do_not_meet(folder):
