@@ -348,9 +348,10 @@ ist_status_t ist_workspace_make(size_t capacity, const ist_allocator_t* allocato
                                 ist_workspace_t* workspace);
 ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 
-/* A capacity that suffices for two solids at any pose, except for the exact measure and
- * ist_time_of_impact(): workspace_capacity() in ist/query.h. Poses are ignored, scales are not. It
- * allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two fields. */
+/* A capacity that suffices for two solids at any pose by spheres alone: not for the exact measure,
+ * the meshes that answer for unlike sizes (ist_penetration_settings_t::spheres_only) and
+ * ist_time_of_impact(), see workspace_capacity() in ist/query.h. Poses are ignored, scales are not.
+ * It allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two fields. */
 ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b, size_t* capacity);
 
 /* --- Settings: a null pointer means the defaults, all 0 except `size` ------------------------ */

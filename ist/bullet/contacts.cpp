@@ -98,6 +98,14 @@ Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
   return motion;
 }
 
+/// [u] The motion that points follow.
+double motion_until_asked(const Contact& contact, const Settings& settings, const Spring& spring) {
+  // Corners of fixed areas bear three times the torque of a face that tilts on its springs.
+  constexpr double kFlat = 0.1;
+  if (contact.flat) return kFlat * settings.follow * spring.rest;
+  return std::min(settings.follow * std::max(spring.rest, mean_depth(contact)), spring.rest);
+}
+
 /// Where a patch pushes: a force on its wrench's axis has no twist left but that about itself. The
 /// axis runs away where a patch pushes both ways, so no farther from its middle than it is wide.
 Eigen::Vector3d place_of(const ContactPatch& patch) {
@@ -125,6 +133,7 @@ struct PairAlgorithm::State {
   btTransform second_in_first;                        // when last asked
   double closing = 0;  // [u/s] of an impact, forgotten as the bodies part
   double still = -1;   // [u] until a point has moved by more than this that answer holds
+  bool apart = true;   // it has no points
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -265,8 +274,18 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
                                      const btDispatcherInfo& info, btManifoldResult* result) {
   if (!state_->meeting.is_met()) return;
   const btCollisionObject &first = *a->getCollisionObject(), &second = *b->getCollisionObject();
-  const Settings settings = contacts_.settings_of(first, second);
   const btTransform &at_first = a->getWorldTransform(), &at_second = b->getWorldTransform();
+  const btTransform second_in_first = at_first.inverseTimes(at_second);
+  const bool holds =
+      state_->still > 0 &&
+      state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still;
+  const bool placed = first.isKinematicObject() || second.isKinematicObject();
+  // Most pairs of a heap are apart and stay so.
+  if (holds && state_->apart && !placed && typeid(*result) == typeid(btManifoldResult)) {
+    state_->before.reset();
+    return;
+  }
+  const Settings settings = contacts_.settings_of(first, second);
   if (typeid(*result) != typeid(btManifoldResult)) {
     // contactTest() and its like collect points through a manifold.
     Contact contact;
@@ -296,7 +315,6 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     }
     return;
   }
-  const btTransform second_in_first = at_first.inverseTimes(at_second);
   const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
   if (state_->before) {
     const auto time = static_cast<btScalar>(step);
@@ -304,16 +322,16 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
                       unsaid_motion(second, (*state_->before)[1], at_second, time)};
   }
   state_->before = Places{at_first, at_second};
-  if (state_->still > 0 &&
-      state_->meeting.largest_motion(state_->second_in_first, second_in_first) <= state_->still) {
+  if (holds) {
     state_->move_points(first, second, step);
   } else {
     const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     Contact contact;
-    state_->meeting.find(at_first, at_second, settings, contact);
+    state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
     state_->fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
-    state_->still = std::max(settings.follow * spring.rest, contact.clearance);
+    state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
+    state_->apart = state_->points() == 0;
   }
   if (gContactProcessedCallback == nullptr) return;
   for (btPersistentManifold* manifold : state_->manifolds) {

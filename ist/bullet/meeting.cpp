@@ -44,16 +44,12 @@ Body body_of(const btCollisionObject& object) {
 constexpr double kReach = 0.02;
 
 /// Of two assets whose meshes do not overlap: a push where they touch or are nearest, for
-/// SupportPolygon; nothing beyond `reach`.
-std::optional<Penetration> push_across(const PlacedSolid& a, const PlacedSolid& b,
-                                       const Penetration& apart, double reach,
-                                       std::uint32_t pair_id) {
+/// SupportPolygon.
+std::optional<Penetration> push_across(const Penetration& apart, const Separation& gap,
+                                       double reach, const Eigen::Vector3d& origin_b) {
   Penetration push = apart;
   Eigen::Vector3d normal = push.contact_normal;
   if (!push.touching) {
-    const Separation gap =
-        separation(a, b, {.max_distance = reach, .pair_id = pair_id}, workspace());
-    if (!(gap.distance > 0 && gap.distance < reach)) return std::nullopt;
     push.centroid = (gap.point_a + gap.point_b) / 2;
     normal = gap.normal;
   }
@@ -62,8 +58,7 @@ std::optional<Penetration> push_across(const PlacedSolid& a, const PlacedSolid& 
   const Eigen::Vector3d force = kHardly * (reach * reach) * normal;
   push.volume = 0;
   push.translation_gradient = -force;
-  push.rotation_gradient =
-      force.cross(push.centroid - Eigen::Vector3d(std::get<PlacedTree>(b.placed).pose.t));
+  push.rotation_gradient = force.cross(push.centroid - origin_b);
   return push;
 }
 
@@ -92,10 +87,13 @@ Meeting::Solids Meeting::placed(const Places& at, const Places& to,
     upper.setMax(to[i].inverseTimes(to[1 - i]).getOrigin());
     const auto reach = static_cast<btScalar>(other.reach());
     return partner_->placed(at[i], lower - btVector3(reach, reach, reach),
-                            upper + btVector3(reach, reach, reach),
-                            settings.thickness > 0 ? settings.thickness : std::cbrt(volume()));
+                            upper + btVector3(reach, reach, reach), thickness_of(settings));
   };
   return {one(0), one(1)};
+}
+
+double Meeting::thickness_of(const Settings& settings) const {
+  return settings.thickness > 0 ? settings.thickness : std::cbrt(volume());
 }
 
 double Meeting::volume() const {
@@ -122,11 +120,14 @@ double Meeting::largest_motion(const btTransform& before, const btTransform& now
 }
 
 void Meeting::find(const btTransform& first, const btTransform& second, const Settings& settings,
-                   Contact& contact) const {
+                   Contact& contact, bool likely_apart) const {
   const auto& [a, b] = placed({first, second}, {first, second}, settings);
   const std::span room(contact.patches.data(), std::min(settings.patches, Settings::kPatches));
   contact.origin = std::visit([](const auto& at) { return Eigen::Vector3d(at.pose.t); }, b.placed);
   contact.clearance = 0;
+  contact.whole = {};
+  contact.count = 0;
+  contact.flat = contact.inside = false;
   ContactSettings query = settings.query;
   query.pair_id = pair_id_;
   const auto keeps_mesh = [](const Shape* shape) {
@@ -139,27 +140,40 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   };
   // How far apart flat faces may be and push: as spheres do that stick out, and meshes shall.
   const double reach = exact ? kReach * std::cbrt(volume()) : blur(first_) + blur(second_);
-  const ContactPatches found = contact_patches(a, b, query, workspace(), room);
-  if (first_ != nullptr && second_ != nullptr && found.penetration.volume_max <= 0) {
+  if (likely_apart) {
     // A lower bound suffices: the first few nodes give one.
     constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
-    contact.clearance = separation(a, b, kGlance, workspace()).distance_min - reach;
+    double bound = separation(a, b, kGlance, workspace()).distance_min;
+    if (std::isnan(bound)) bound = 0;  // no spheres
+    if (partner_) bound = std::min(bound, partner_->clearance(thickness_of(settings)));
+    if (bound > reach) {
+      contact.clearance = bound - reach;
+      return;
+    }
   }
-  if (std::isnan(found.penetration.volume)) {
+  const ContactPatches found = contact_patches(a, b, query, workspace(), room);
+  contact.whole = found.penetration;
+  contact.count = found.count;
+  if (std::isnan(contact.whole.volume)) {
     warn(
         "A contact query gave no answer, so two bodies pass through each other: a transform is not "
         "finite, or Settings::query needs what an asset does not hold.",
         world_);
-    contact.clearance = 0;
+    return;
   }
-  contact.whole = found.penetration;
-  contact.count = found.count;
-  contact.inside = found.penetration.volume > 0 && find_way_out({a, b}, {first, second}, contact);
-  const bool waits = exact && !(found.penetration.volume > 0);
+  contact.inside = contact.whole.volume > 0 && find_way_out({a, b}, {first, second}, contact);
+  const bool waits = exact && !(contact.whole.volume > 0);
   std::optional<Penetration> whole = contact.whole;
   if (waits) {
-    if (contact.clearance > 0) return;
-    whole = push_across(a, b, contact.whole, reach, pair_id_);
+    Separation gap;
+    if (!contact.whole.touching) {
+      gap = separation(a, b, {.max_distance = 2 * reach, .pair_id = pair_id_}, workspace());
+      contact.clearance = gap.distance_min - reach;
+      if (contact.clearance > 0 || !(gap.distance > 0)) return;
+      // Faces that do not look at each other now may do so halfway.
+      contact.clearance = gap.distance_min / 2;
+    }
+    whole = push_across(contact.whole, gap, reach, contact.origin);
     if (!whole) return;
   } else {
     // Patches of a flat contact push alike.
@@ -181,7 +195,11 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     if (polygon.add(of_second, solid)) continue;
     if (partner_) partner_->add_faces(std::get<PlacedField>(solid.placed), of_second, polygon);
   }
-  contact.count = polygon.corners(room).value_or(contact.count);
+  const std::optional<std::size_t> corners = polygon.corners(room);
+  if (!corners) return;
+  contact.count = *corners;
+  contact.flat = true;
+  contact.clearance = 0;
 }
 
 bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& contact) const {
@@ -272,11 +290,12 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
     const Places shapes = at * in_body;
     Contact contact;
     find(shapes[0], shapes[1], settings, contact);
-    double area = 0;
-    for (std::size_t i = 0; i < contact.count; ++i) area += contact.patches[i].area;
-    return contact.whole.volume > 0 ? contact.whole.volume / area : 0;
+    return mean_depth(contact);
   };
-  const double most = std::max(depth_after(0), kDepth * threshold);
+  // Two that are deeper already are their springs' task: where nothing may go deeper, a heap of
+  // bodies stands still and keeps its speeds.
+  const double deep = kDepth * threshold, begins = depth_after(0);
+  const double most = begins < deep ? deep : begins + deep;
   const double least = stride / 8;  // or two bodies that turn into each other would stop for good
   double share = 0, next = stride;
   for (int looks = 0; looks < kLooks && share < 1 && next >= least; ++looks) {
@@ -288,6 +307,12 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
     }
   }
   return std::max(share, std::min(1.0, least));
+}
+
+double mean_depth(const Contact& contact) {
+  double area = 0;
+  for (std::size_t i = 0; i < contact.count; ++i) area += contact.patches[i].area;
+  return area > 0 ? contact.whole.volume / area : 0;
 }
 
 bool find_contact(const btCollisionObject& first, const btCollisionObject& second,

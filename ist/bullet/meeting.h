@@ -25,9 +25,10 @@ class Meeting {
   bool has_shape() const { return first_ != nullptr || second_ != nullptr; }
   bool is_met() const { return partner_.has_value() || (first_ != nullptr && second_ != nullptr); }
 
-  /// The shapes' transforms are given. The contact pushes the second.
+  /// The shapes' transforms are given. The contact pushes the second. `likely_apart`: looks first
+  /// whether the shapes are; it changes no contact.
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
-            Contact& contact) const;
+            Contact& contact, bool likely_apart = false) const;
 
   /// The share [0, 1] of a motion of two bodies after which their shapes have met, or in contact
   /// have got too deep: see Contacts::updateAction(). `in_body`: the shapes, as children of these.
@@ -44,6 +45,7 @@ class Meeting {
 
  private:
   using Solids = std::array<PlacedSolid, 2>;
+  double thickness_of(const Settings& settings) const;  ///< [u] Settings::thickness, or its default
   /// Of overlapping solids: whether one is wholly inside the other, and then the way out.
   bool find_way_out(const Solids& solids, const Places& at, Contact& contact) const;
   /// At the beginning of a motion.
@@ -58,6 +60,9 @@ class Meeting {
   const Shape* second_ = nullptr;
   std::optional<Partner> partner_;
 };
+
+/// [u] Volume over area; 0 without an overlap.
+double mean_depth(const Contact& contact);
 
 /// The motion of an object that is placed anew in every step and given no speed: Bullet's solver
 /// does not see it.

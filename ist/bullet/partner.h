@@ -4,6 +4,7 @@
 #include <LinearMath/btTransform.h>
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -75,6 +76,11 @@ class Partner {
   /// the thread's next call.
   PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
+
+  /// [u] What placed() says of distances holds for motions up to this.
+  double clearance(double thickness) const {
+    return mesh_ != nullptr ? thickness : std::numeric_limits<double>::infinity();
+  }
 
   /// Its flat faces, where SupportPolygon::add() does not know them. `placed`: by placed(), in the
   /// same thread and not before another.

@@ -1,5 +1,6 @@
 #include "peer_shapes.h"
 
+#include <BulletCollision/CollisionShapes/btShapeHull.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
 #ifdef IST_HAVE_HACD
@@ -23,6 +24,22 @@ std::unique_ptr<PeerShape> make_gimpact_shape(const Part& part, double margin) {
   auto shape = std::make_unique<btGImpactMeshShape>(peer->mesh.get());
   shape->setMargin(margin);
   shape->updateBound();
+  peer->shape = std::move(shape);
+  return peer;
+}
+
+std::unique_ptr<PeerShape> make_hull_shape(const Part& part, double margin) {
+  btConvexHullShape all;
+  for (const Eigen::Vector3d& v : part.vertices_in_body())
+    all.addPoint(ist::bullet::to_bullet(v), false);
+  all.recalcLocalAabb();
+  all.setMargin(0);
+  btShapeHull hull(&all);
+  hull.buildHull(0);
+  auto peer = std::make_unique<PeerShape>();
+  auto shape = std::make_unique<btConvexHullShape>(
+      reinterpret_cast<const btScalar*>(hull.getVertexPointer()), hull.numVertices());
+  shape->setMargin(margin);
   peer->shape = std::move(shape);
   return peer;
 }

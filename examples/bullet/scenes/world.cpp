@@ -50,9 +50,9 @@ btCollisionShape* SceneWorld::shape_of(const Part& part) {
   }
   std::unique_ptr<PeerShape>& shape = peer_shapes_[&part];
   if (shape == nullptr) {
-    shape = settings_.way == Way::gimpact
-                ? make_gimpact_shape(part, settings_.margin)
-                : make_hulls_shape(part, settings_.hulls, settings_.margin);
+    shape = settings_.way == Way::gimpact ? make_gimpact_shape(part, settings_.margin)
+            : settings_.hulls == 0        ? make_hull_shape(part, settings_.margin)
+                                   : make_hulls_shape(part, settings_.hulls, settings_.margin);
     if (shape == nullptr)
       throw std::runtime_error("no convex decomposition here: dev setup --bullet");
   }

@@ -28,7 +28,7 @@ struct WorldSettings {
   Eigen::Vector3d gravity = {0, 0, -kGravity};
   ist::bullet::Settings ist;  ///< `response` follows `way`
   double margin = 0;          ///< [u] of GImpact's triangles and of hulls
-  std::size_t hulls = 16;     ///< a part's, at least
+  std::size_t hulls = 16;     ///< a part's, at least; 0: one about all of it
 };
 
 /// A btDiscreteDynamicsWorld whose parts collide in one way, and what can be measured of it.

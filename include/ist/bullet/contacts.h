@@ -63,10 +63,12 @@ struct Settings {
   /// softer spring).
   double push_out = 0;
   /// Solver only: two objects are queried again once a point of one has moved relative to the other
-  /// by more than this share of the depth at which the lighter body rests. Until then their patches
-  /// move along: the motion changes their depths, and their areas stay. A new contact may be found
-  /// late by this motion. 0: queried in every step.
-  double follow = 0.02;
+  /// by more than this share of the contact's mean depth, or of the depth at which the lighter body
+  /// rests if that is more, and in any case by more than the latter. Flat contacts
+  /// (SupportPolygon): by a tenth of this share of the resting depth. Until then their patches move
+  /// along: the motion changes their depths, and their areas stay. A new contact may be found late
+  /// by this motion. 0: queried in every step.
+  double follow = 0.2;
 };
 
 /// A contact of two objects: forces and normals push the second.
@@ -75,6 +77,7 @@ struct Contact {
   Penetration whole;                                 ///< the contact as one
   std::size_t count = 0;
   std::array<ContactPatch, Settings::kPatches> patches;
+  bool flat = false;  ///< the patches are the corners of a SupportPolygon
   /// One solid is wholly inside the other: no force of the volume leads out. The one patch has the
   /// way out in its place: `depth` along `normal` parts them, or brings the smaller solid across
   /// the nearest face of the other; `area` is a face of the smaller asset's size.
@@ -110,7 +113,8 @@ class Contacts : public btActionInterface {
   void register_with(btCollisionDispatcher& dispatcher);
 
   Settings settings;  ///< change between steps
-  /// Changes a copy of the settings for a pair; called in every step, on the pair's thread.
+  /// Changes a copy of the settings for a pair; called in every step in which the pair may touch,
+  /// on the pair's thread.
   std::function<void(const btCollisionObject& first, const btCollisionObject& second,
                      Settings& settings)>
       of_pair;
@@ -118,8 +122,8 @@ class Contacts : public btActionInterface {
   /// Called by the world after a step's motion. Pairs in which a body has a
   /// getCcdMotionThreshold(), and in which a point moves by more relative to the other body, are
   /// moved back to where they overlap by a quarter of the threshold. Bodies in contact keep
-  /// moving while they are no deeper than that. The rest of the motion is lost, as with Bullet's
-  /// own sweeps, and with it the speed that gravity gave.
+  /// moving while their mean depth is below that, and deeper ones while it grows by less. The rest
+  /// of the motion is lost, as with Bullet's own sweeps, and with it the speed that gravity gave.
   ///
   /// Response::solver only. A compound is stopped by its children, by the table of
   /// docs/engines.md. Links of multibodies are not stopped, since Bullet's broad phase does not
