@@ -51,18 +51,17 @@ class Winding {
       const Vector across[3] = {b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2],
                                 b[0] * c[1] - b[1] * c[0]};
       const Vector opposite = dot(a, across);
-      const Vector adjacent =
-          ((la * lb * lc + dot(a, b) * lc) + dot(b, c) * la) + dot(c, a) * lb;
+      const Vector adjacent = ((la * lb * lc + dot(a, b) * lc) + dot(b, c) * la) + dot(c, a) * lb;
       const Vector re = hn::Load(d, re_ + i), im = hn::Load(d, im_ + i);
       const Vector new_im = re * opposite + im * adjacent;
       // A turn of less than a half that begins above the negative real axis and ends below it, or
       // the other way.
       const Vector zero = hn::Zero(d), one = hn::Set(d, 1);
       const auto above = im >= zero, now_above = new_im >= zero;
-      const Vector on = hn::IfThenElseZero(
-          hn::AndNot(now_above, hn::And(above, opposite > zero)), one);
-      const Vector back = hn::IfThenElseZero(
-          hn::AndNot(above, hn::And(now_above, opposite < zero)), one);
+      const Vector on =
+          hn::IfThenElseZero(hn::AndNot(now_above, hn::And(above, opposite > zero)), one);
+      const Vector back =
+          hn::IfThenElseZero(hn::AndNot(above, hn::And(now_above, opposite < zero)), one);
       hn::Store(re * adjacent - im * opposite, d, re_ + i);
       hn::Store(new_im, d, im_ + i);
       hn::Store(hn::Load(d, turns_ + i) + (on - back), d, turns_ + i);
