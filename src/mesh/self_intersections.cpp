@@ -286,7 +286,7 @@ constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 10'000'000;
 
 /// The boxes of needles meet those of many others.
 constexpr std::size_t most_candidates(const std::size_t triangles) {
-  return std::max(std::size_t{50'000'000}, 200 * triangles);
+  return std::max(std::size_t{50'000'000}, 600 * triangles);
 }
 
 /// What the parts of a search add to. Integers only: their sums do not depend on the order.
