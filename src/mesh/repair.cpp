@@ -228,8 +228,13 @@ bool any_crowded(const EdgeTable& edges) {
   return false;
 }
 
-/// Drops patches that hang on others and leave fewer odd edges when they go, best first. What is
-/// right for one changes what is right for its neighbours, so those wait. Returns how many went.
+double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
+}
+
+/// Drops patches that hang on others and leave fewer odd edges when they go, those first that leave
+/// the fewest for their area: a body with holes has many itself. What is right for one changes what
+/// is right for its neighbours, so those wait. Returns how many went.
 std::size_t drop_fins_once(Surface& surface) {
   TriangleMesh& mesh = surface.mesh;
   const EdgeTable& edges = surface.edges;
@@ -239,8 +244,12 @@ std::size_t drop_fins_once(Surface& surface) {
   std::vector<std::uint32_t> order;
   for (std::uint32_t patch = 0; patch < gain.size(); ++patch)
     if (gain[patch] > 0 && !shared_edges[patch].empty()) order.push_back(patch);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](const std::uint32_t a, const std::uint32_t b) { return gain[a] > gain[b]; });
+  std::vector<double> size(gain.size(), 0);
+  for (std::uint32_t t = 0; t < size.size(); ++t)
+    size[patches.find(t)] += area(mesh.vertices, mesh.triangles[t]);
+  std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
+    return gain[a] * size[b] > gain[b] * size[a];
+  });
   std::vector<bool> changed(edges.size(), false), dropped(mesh.triangles.size(), false);
   std::size_t count = 0;
   for (const std::uint32_t patch : order) {
@@ -264,10 +273,6 @@ std::size_t drop_fins(Surface& surface) {
   std::size_t total = 0;
   while (const std::size_t dropped = drop_fins_once(surface)) total += dropped;
   return total;
-}
-
-double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
-  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
 }
 
 /// Gives each piece vertices of its own, so that no walk along a border leaves its piece.
@@ -374,6 +379,11 @@ std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges) 
 }
 
 void repair(Surface& surface, const std::string& name, MeshReport& report) {
+  if (report.repaired) {  // by walls that went, which may have left copies
+    Surface tidied{surface.mesh};
+    tidy(tidied);
+    if (count_odd_edges(tidied.edges) < count_odd_edges(surface.edges)) surface = std::move(tidied);
+  }
   report.repaired = true;
   close_cracks(surface, report);
   if (const std::size_t fins = drop_fins(surface); fins > 0)
