@@ -147,24 +147,15 @@ void rename_triangles(const std::vector<std::uint32_t>& dropped, Pairs& pairs) {
                                       dropped.begin());
 }
 
-/// Triangles, their edges and what is known of how they meet, as they change on the way.
-struct Surface {
-  TriangleMesh mesh;
-  EdgeTable edges{mesh.triangles};
-  std::optional<SelfIntersections> met = {};
-
-  void triangles_changed() { edges = EdgeTable(mesh.triangles); }
-};
-
 /// Degenerate and coincident triangles (docs/design.md 3.6).
-void reduce(Surface& surface, MeshReport& report) {
+void reduce(Surface& surface, std::optional<SelfIntersections>& met, MeshReport& report) {
   TriangleMesh& mesh = surface.mesh;
   if (report.degenerate_triangles > 0) {
     const std::vector<std::uint32_t> dropped =
         drop_degenerate(mesh.vertices, mesh.triangles, surface.edges);
     if (!dropped.empty()) {
       report.notes.push_back(counted(dropped.size(), "degenerate triangle") + " dropped");
-      if (surface.met && surface.met->pairs) rename_triangles(dropped, *surface.met->pairs);
+      if (met && met->pairs) rename_triangles(dropped, *met->pairs);
       surface.triangles_changed();
     }
   }
@@ -252,17 +243,18 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   weld_usable(input, name);
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
+  std::optional<SelfIntersections> met;
   const auto look_for_intersections = [&] {
-    if (facing == Facing::any) surface.met = find_self_intersections(mesh.vertices, mesh.triangles);
+    if (facing == Facing::any) met = find_self_intersections(mesh.vertices, mesh.triangles);
   };
   MeshReport report;
   tbb::parallel_invoke(look_for_intersections, [&] { report = survey(mesh, surface.edges); });
   report.notes = std::move(mesh.notes);
-  report.self_intersections = surface.met ? surface.met->count : 0;
-  report.self_intersections_counted = surface.met.has_value();
+  report.self_intersections = met ? met->count : 0;
+  report.self_intersections_counted = met.has_value();
   if (facing == Facing::any) refuse_unusable_coordinates(name, report);
   note_findings(report);
-  reduce(surface, report);
+  reduce(surface, met, report);
   if (mesh.triangles.empty())
     throw Error(name +
                 ": flat: every face has a second one back to back, and they enclose no volume. "
@@ -270,10 +262,9 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   TriangleMesh unrepaired;
   if (count_odd_edges(surface.edges) > 0) {
     if (policy == OpenMeshPolicy::refuse) refuse_open(mesh, surface.edges, name);
-    drop_inner_walls(mesh, report);
+    drop_inner_walls(surface, report);
     unrepaired = mesh;
-    mesh = repair(std::move(mesh), name, report);
-    surface.triangles_changed();
+    repair(surface, name, report);
   }
   if (facing == Facing::any) {
     orient_faces(surface, name, report);
@@ -283,14 +274,11 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   }
   // Dropped degenerate triangles never counted; other changes may add or remove intersections.
   if (report.repaired || report.coincident_triangles > 0) look_for_intersections();
-  report.meets_itself = !surface.met || surface.met->count > 0;
+  report.meets_itself = !met || met->count > 0;
   report.closed = true;
-  if (report.repaired)
-    mesh = weld(std::move(mesh), 0);
-  else if (mesh.triangles.size() != report.triangles)
-    drop_unused(mesh);
+  if (report.repaired || mesh.triangles.size() != report.triangles) drop_unused(mesh);
   ClosedMesh closed = {std::move(mesh), std::move(report), name,
-                       surface.met ? std::move(surface.met->pairs) : std::nullopt};
+                       met ? std::move(met->pairs) : std::nullopt};
   if (closed.report.repaired) judge_repair(unrepaired, closed);
   return closed;
 }

@@ -13,11 +13,11 @@
 namespace ist {
 namespace {
 
-/// A side at its smaller vertex.
-struct Entry {
-  std::uint32_t high, side;
-  auto operator<=>(const Entry&) const = default;
-};
+/// A side at its smaller vertex: the larger one, and the side below it.
+using Entry = std::uint64_t;
+
+std::uint32_t high_of(const Entry entry) { return static_cast<std::uint32_t>(entry >> 32); }
+std::uint32_t side_of(const Entry entry) { return static_cast<std::uint32_t>(entry); }
 
 /// One more than the largest index; 0 where there are no triangles.
 std::uint32_t vertex_count(std::span<const Triangle> triangles) {
@@ -53,12 +53,12 @@ EdgeTable::EdgeTable(std::span<const Triangle> triangles) {
       if (has_repeated_corner(t)) return;
       for (std::size_t k = 0; k < 3; ++k)
         visit(std::min(t[k], t[(k + 1) % 3]),
-              Entry{std::max(t[k], t[(k + 1) % 3]), static_cast<std::uint32_t>(3 * i + k)});
+              Entry{std::max(t[k], t[(k + 1) % 3])} << 32 | (3 * i + k));
     });
   });
   std::vector<std::uint32_t> first_edge(std::size_t{vertices} + 1, 0);
   const auto starts_edge = [&](const std::uint32_t low, const std::uint32_t i) {
-    return i == at.first[low] || at.items[i].high != at.items[i - 1].high;
+    return i == at.first[low] || high_of(at.items[i]) != high_of(at.items[i - 1]);
   };
   tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
     for (std::uint32_t i = at.first[low]; i < at.first[low + 1]; ++i)
@@ -70,9 +70,9 @@ EdgeTable::EdgeTable(std::span<const Triangle> triangles) {
   tbb::parallel_for(std::uint32_t{0}, vertices, [&](const std::uint32_t low) {
     std::uint32_t edge = first_edge[low];
     for (std::uint32_t i = at.first[low]; i < at.first[low + 1]; ++i) {
-      if (starts_edge(low, i)) edges_[edge++] = {low, at.items[i].high, i};
-      sides_[i] = at.items[i].side;
-      edge_of_side_[at.items[i].side] = edge - 1;
+      if (starts_edge(low, i)) edges_[edge++] = {low, high_of(at.items[i]), i};
+      sides_[i] = side_of(at.items[i]);
+      edge_of_side_[sides_[i]] = edge - 1;
     }
   });
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mesh/edge_table.h"
+#include "numerics/angle.h"
 #include "stage/raw_array.h"
 
 namespace ist {
@@ -17,10 +18,21 @@ using FloatPoint = std::array<float, 3>;
 /// What is known of the triangles under a node besides its box, where there are large fans or other
 /// needles: their triangles are long and thin, and their boxes meet nearly all others'.
 struct Slab {
-  std::uint32_t owner = kNoIndex;  ///< the vertex in whose spread fan all of them are
+  std::uint32_t owner = kNoIndex;  ///< the vertex of many triangles that all of them have
+  bool spread = false;             ///< its fan is spread: none of them meet
+  Eigen::Vector3d direction;       ///< the middle of a cone from the owner around them
+  double angle = 0;                ///< [rad] and half its opening
   Eigen::Vector3d centre;          ///< of a box around them
   Eigen::Matrix3d axes;            ///< its axes, in columns
   Eigen::Vector3d half;            ///< and half its sizes
+
+  /// Seen from the vertex that all have they lie in different directions, or are known not to meet.
+  bool apart_about_owner(const Slab& other) const {
+    if (owner != other.owner || owner == kNoIndex) return false;
+    constexpr double kRounding = 2.5e-4;  // of directions to points that are rounded to float
+    return spread || angle_of(direction.cross(other.direction).norm(),
+                              direction.dot(other.direction)) > angle + other.angle + kRounding;
+  }
 
   /// A plane along a side of either box, or along an edge of both, has them on different sides.
   bool apart_from(const Slab& other) const {
@@ -45,15 +57,13 @@ struct Slab {
   }
 };
 
-/// [triangle] The corner with the largest spread fan (as spread_fans() has them), if that is large;
-/// nothing at all if none is.
-std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
-                                     const std::vector<std::uint32_t>& spread);
+/// [triangle] The corner with the most triangles, if these are many; nothing at all if none has.
+std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std::size_t vertices);
 
 /// A box around a group of triangles, one of whose axes is along their longest side, one along
 /// their normal. `points`: vertices, in [0, 1]. `margin`: by which one of two boxes is wider.
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
              std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
-             double margin);
+             const std::vector<std::uint32_t>& spread, double margin);
 
 }  // namespace ist

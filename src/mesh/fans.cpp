@@ -94,24 +94,59 @@ std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& verti
 }
 
 std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
-                                     const std::vector<std::uint32_t>& spread) {
-  constexpr std::uint32_t kLarge = 64;
-  std::vector<std::uint32_t> owners;
-  if (std::none_of(spread.begin(), spread.end(), [](const auto n) { return n >= kLarge; }))
+                                     const std::size_t vertices) {
+  constexpr std::uint32_t kMany = 64;
+  std::vector<std::uint32_t> count(vertices, 0), owners;
+  for (const Triangle& t : triangles)
+    for (const std::uint32_t v : t) ++count[v];
+  if (std::none_of(count.begin(), count.end(), [](const auto n) { return n >= kMany; }))
     return owners;
   owners.resize(triangles.size());
   tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
     const auto corner = *std::max_element(
         triangles[t].begin(), triangles[t].end(),
-        [&](const std::uint32_t a, const std::uint32_t b) { return spread[a] < spread[b]; });
-    owners[t] = spread[corner] >= kLarge ? corner : kNoIndex;
+        [&](const std::uint32_t a, const std::uint32_t b) { return count[a] < count[b]; });
+    owners[t] = count[corner] >= kMany ? corner : kNoIndex;
   });
   return owners;
 }
 
+namespace {
+
+constexpr double kFullCone = 4;  ///< [rad] no angle is larger
+
+/// A cone from the owner around what else the group has: less than half of all directions, or all.
+void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+              const std::span<const std::uint32_t> group, Slab& slab) {
+  const auto for_each_direction = [&](const auto& visit) {
+    const FloatPoint& o = points[slab.owner];
+    for (const std::uint32_t i : group)
+      for (const std::uint32_t v : triangles[i]) {
+        if (v == slab.owner) continue;
+        const FloatPoint& p = points[v];
+        const Eigen::Vector3d off(double{p[0]} - double{o[0]}, double{p[1]} - double{o[1]},
+                                  double{p[2]} - double{o[2]});
+        const double length = off.norm();
+        constexpr double kShort = 1e-3;  // else rounding to float turns it too far
+        visit(length > kShort ? Eigen::Vector3d(off / length) : Eigen::Vector3d::Zero());
+      }
+  };
+  slab.direction.setZero();
+  for_each_direction([&](const Eigen::Vector3d& to) { slab.direction += to; });
+  const double length = slab.direction.norm();
+  if (length > 0) slab.direction /= length;
+  for_each_direction([&](const Eigen::Vector3d& to) {
+    const double along = slab.direction.dot(to);
+    slab.angle = along > 0 ? std::max(slab.angle, angle_of(slab.direction.cross(to).norm(), along))
+                           : kFullCone;
+  });
+}
+
+}  // namespace
+
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
              const std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
-             const double margin) {
+             const std::vector<std::uint32_t>& spread, const double margin) {
   Slab slab;
   slab.owner = owners[group[0]];
   const auto point = [&](const std::uint32_t v) {
@@ -129,6 +164,10 @@ Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& tr
       length = side.squaredNorm();
       longest = side;
     }
+  }
+  if (slab.owner != kNoIndex) {
+    slab.spread = spread[slab.owner] != 0;
+    add_cone(points, triangles, group, slab);
   }
   longest.normalize();
   normal -= longest * longest.dot(normal);

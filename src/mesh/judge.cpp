@@ -10,9 +10,7 @@
 #include <cstdio>
 #include <iterator>
 #include <memory>
-#include <numeric>
 #include <optional>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -24,12 +22,12 @@
 namespace ist {
 namespace {
 
-constexpr std::size_t kBlock = 1024;    ///< points that are summed in order
-constexpr std::size_t kOnLine = 8;      ///< of them on a line along x
-constexpr std::size_t kFewest = 16;     ///< blocks of volume samples
-constexpr std::size_t kMost = 512;      ///< the same, where the solid fills little of its box
-constexpr double kEnough = 4096;        ///< samples in solid or winding number
-constexpr std::size_t kSurface = 8192;  ///< samples of a surface
+constexpr int kOnLine = kWindingPoints;  ///< points on a line along x
+constexpr std::size_t kLines = 128;      ///< whose points are summed in order, a block
+constexpr std::size_t kFewest = 16;      ///< blocks of volume samples
+constexpr std::size_t kMost = 512;       ///< the same, where the solid fills little of its box
+constexpr double kEnough = 4096;         ///< samples in solid or winding number
+constexpr std::size_t kSurface = 8192;   ///< samples of a surface
 
 /// Part of i·step after the point: multiples of the golden ratio's kin spread evenly.
 double spread(std::size_t i, double step) {
@@ -59,19 +57,9 @@ class TwoMeshes {
   using Corners = std::array<std::uint32_t, 3>;
 
   TwoMeshes(const TriangleMesh& a, const TriangleMesh& b) : first_of_b_(a.vertices.size()) {
-    const auto point = [&](const std::uint32_t v) {
-      const Eigen::Vector3d& p = v < first_of_b_ ? a.vertices[v] : b.vertices[v - first_of_b_];
-      return std::tuple(p.x(), p.y(), p.z());
-    };
-    std::vector<std::uint32_t> order(a.vertices.size() + b.vertices.size());
-    std::iota(order.begin(), order.end(), 0u);
-    tbb::parallel_sort(order.begin(), order.end(),
-                       [&](const auto v, const auto w) { return point(v) < point(w); });
-    number_.resize(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
-      const bool is_new = i == 0 || point(order[i]) != point(order[i - 1]);
-      number_[order[i]] = is_new ? order[i] : number_[order[i - 1]];
-    }
+    std::vector<Eigen::Vector3d> points = a.vertices;
+    points.insert(points.end(), b.vertices.begin(), b.vertices.end());
+    number_ = first_equal(points, std::vector<std::uint8_t>(points.size(), 1));
   }
 
   /// A triangle of either by those numbers, turned so that the smallest comes first.
@@ -139,25 +127,29 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
     const std::size_t first = blocks.size(), last = std::max(kFewest, 2 * first);
     blocks.resize(last);
     tbb::parallel_for(first, last, [&](std::size_t b) {
-      Eigen::Vector3d place, x;
+      WindingPlaces x;
       std::vector<Crossing> crossings;
-      for (std::size_t i = b * kBlock; i < (b + 1) * kBlock; ++i) {
-        if (i % kOnLine == 0) {
-          place = cube_point(i / kOnLine);
-          x = low + size.cwiseProduct(place);
-          const Eigen::Vector3d unit = made.frame().to_unit(x);
-          line_crossings(made.view(), unit.y(), unit.z(), crossings);
+      for (std::size_t line = b * kLines; line < (b + 1) * kLines; ++line) {
+        const Eigen::Vector3d place = cube_point(line);
+        const Eigen::Vector3d start = low + size.cwiseProduct(place);
+        const Eigen::Vector3d unit = made.frame().to_unit(start);
+        line_crossings(made.view(), unit.y(), unit.z(), crossings);
+        for (int i = 0; i < kOnLine; ++i) {
+          const double along = place.x() + static_cast<double>(i) / kOnLine;
+          x.row(i) = start.transpose();
+          x(i, 0) = low.x() + size.x() * (along - std::floor(along));
         }
-        const double along = place.x() + static_cast<double>(i % kOnLine) / kOnLine;
-        x.x() = low.x() + size.x() * (along - std::floor(along));
-        const double here = made.frame().to_unit(x).x();
-        int winding = 0;
-        for (const Crossing& crossing : crossings)
-          if (crossing.x <= here) winding += crossing.sign;
-        const bool inside = winding >= 1;
-        const double w = std::clamp(rest.at(x) + (add_solid ? winding : 0), 0.0, 1.0);
-        const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
-        blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
+        const WindingNumbers of_rest = rest.at_each(x);
+        for (int i = 0; i < kOnLine; ++i) {
+          const double here = made.frame().to_unit(x.row(i).transpose()).x();
+          int winding = 0;
+          for (const Crossing& crossing : crossings)
+            if (crossing.x <= here) winding += crossing.sign;
+          const bool inside = winding >= 1;
+          const double w = std::clamp(of_rest[i] + (add_solid ? winding : 0), 0.0, 1.0);
+          const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
+          blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
+        }
       }
     });
     for (std::size_t b = first; b < last; ++b) met += blocks[b].all;
@@ -182,13 +174,15 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
     area += (from.vertices[b] - corner).cross(from.vertices[c] - corner).norm() / 2;
     area_to[t] = area;
   }
-  std::vector<double> distance(kSurface);
-  tbb::parallel_for(std::size_t{0}, kSurface, [&](std::size_t i) {
+  std::vector<std::array<std::size_t, 2>> apart;  // sample, triangle
+  for (std::size_t i = 0, t = 0; i < kSurface; ++i) {
     const double place = (static_cast<double>(i) + 0.5) / double{kSurface} * area;
-    const auto found = std::lower_bound(area_to.begin(), area_to.end(), place);
-    const auto t = static_cast<std::size_t>(
-        std::min<std::ptrdiff_t>(found - area_to.begin(), std::ssize(area_to) - 1));
-    if (shared[t] != 0) return;
+    while (t + 1 < area_to.size() && area_to[t] < place) ++t;
+    if (shared[t] == 0) apart.push_back({i, t});
+  }
+  std::vector<double> distance(kSurface);
+  tbb::parallel_for(std::size_t{0}, apart.size(), [&](std::size_t which) {
+    const auto [i, t] = apart[which];
     double u = spread(i, 0.7548776662466927), v = spread(i, 0.5698402909980532);
     if (u + v > 1) {
       u = 1 - u;

@@ -18,64 +18,29 @@
 #include "mesh/line_lattice.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
-#include "numerics/angle.h"
 
 namespace ist {
 namespace {
 
-constexpr double kFullAngle = 12.566370614359172;  ///< 4π
 constexpr double kFar = 3;  ///< distance of what counts together over its radius
 
-/// A sum of angles that are given by the sides of right triangles. Their directions are multiplied,
-/// as complex numbers, as long as they are narrow: an angle costs more than all else.
-class AngleSum {
- public:
-  void add(const double opposite, const double adjacent) {
-    if (!is_narrow(opposite, adjacent)) {
-      sum_ += angle_of(opposite, adjacent);
-      return;
-    }
-    const double tangent = opposite / adjacent, re = re_ - im_ * tangent;
-    im_ += re_ * tangent;
-    re_ = re;
-    if (is_narrow(im_, re_) && re_ < kLarge) return;
-    sum_ += angle_of(im_, re_);
-    re_ = 1;
-    im_ = 0;
+/// Lines of sight along each side of a view: some eight for the smallest patch, but for triangles
+/// that are alike at most two each.
+std::uint32_t lines_to_see(const TriangleMesh& soup, DisjointSets& patches) {
+  std::vector<double> area(soup.triangles.size(), 0);
+  double all = 0, least = HUGE_VAL;
+  for (std::uint32_t t = 0; t < area.size(); ++t) {
+    const auto& [a, b, c] = soup.triangles[t];
+    const Eigen::Vector3d& p = soup.vertices[a];
+    const double size = (soup.vertices[b] - p).cross(soup.vertices[c] - p).norm();
+    area[patches.find(t)] += size;
+    all += size;
   }
-  double value() const { return sum_ + angle_of(im_, re_); }
-
- private:
-  /// Below 42°: two of them are less than a right angle.
-  static bool is_narrow(const double opposite, const double adjacent) {
-    return std::abs(opposite) < 0.9 * adjacent;
-  }
-  static constexpr double kLarge = 1e100;
-  double sum_ = 0, re_ = 1, im_ = 0;
-};
-
-/// Adds half the signed solid angle of a triangle, positive where p sees its back (van Oosterom &
-/// Strackee).
-void add_solid_angle(const Corners& t, const double p[3], AngleSum& sum) {
-  double v[3][3], length[3];
-  for (int c = 0; c < 3; ++c) {
-    for (int k = 0; k < 3; ++k) v[c][k] = t.p[c][k] - p[k];
-    length[c] = std::sqrt(v[c][0] * v[c][0] + v[c][1] * v[c][1] + v[c][2] * v[c][2]);
-  }
-  const auto dot = [&](int a, int b) {
-    return v[a][0] * v[b][0] + v[a][1] * v[b][1] + v[a][2] * v[b][2];
-  };
-  const double volume = v[0][0] * (v[1][1] * v[2][2] - v[1][2] * v[2][1]) -
-                        v[0][1] * (v[1][0] * v[2][2] - v[1][2] * v[2][0]) +
-                        v[0][2] * (v[1][0] * v[2][1] - v[1][1] * v[2][0]);
-  sum.add(volume, length[0] * length[1] * length[2] + dot(0, 1) * length[2] +
-                      dot(1, 2) * length[0] + dot(2, 0) * length[1]);
-}
-
-/// Lines of sight along each side of a view: two or more a triangle, if triangles are alike.
-std::uint32_t lines_to_see(const std::size_t triangles) {
+  for (const double size : area)
+    if (size > 0) least = std::min(least, size);
+  const double most = 2 * std::sqrt(static_cast<double>(area.size()));
   return static_cast<std::uint32_t>(
-      std::clamp(2 * std::sqrt(static_cast<double>(triangles)), 64.0, 200.0));
+      std::clamp(std::min(most, 4 * std::sqrt(all) / std::sqrt(least)), 64.0, 200.0));
 }
 
 /// What is seen first along a line, from one of its ends.
@@ -97,11 +62,11 @@ struct Votes {
 /// Adds what is seen of each patch along one axis; corners are `points`, unit frame, with that axis
 /// first.
 void look_along(const std::vector<std::array<double, 3>>& points,
-                const std::vector<Triangle>& triangles, DisjointSets& patches,
-                std::vector<Votes>& votes) {
+                const std::vector<Triangle>& triangles, const std::uint32_t lines,
+                DisjointSets& patches, std::vector<Votes>& votes) {
   LineLattice lattice;
   lattice.y0 = lattice.z0 = -1;
-  lattice.ny = lattice.nz = lines_to_see(triangles.size());
+  lattice.ny = lattice.nz = lines;
   lattice.step_y = lattice.step_z = 2.0 / lattice.ny;
   lattice.offset = kGoldenRatio;
   std::vector<Seen> low(lattice.lines()), high(lattice.lines());
@@ -132,6 +97,7 @@ UnitFrame frame_of(const TriangleMesh& soup) {
 
 /// What is seen of each patch from far away, along the three axes both ways.
 std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const UnitFrame& frame) {
+  const std::uint32_t lines = lines_to_see(soup, patches);
   std::array<std::vector<Votes>, 3> along;
   tbb::parallel_for(0, 3, [&](const int axis) {
     std::vector<std::array<double, 3>> points(soup.vertices.size());
@@ -141,7 +107,7 @@ std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const U
     }
     std::vector<Votes>& votes = along[static_cast<std::size_t>(axis)];
     votes.resize(soup.triangles.size());
-    look_along(points, soup.triangles, patches, votes);
+    look_along(points, soup.triangles, lines, patches, votes);
   });
   std::vector<Votes>& votes = along[0];
   for (const std::size_t axis : {1, 2})
@@ -220,14 +186,27 @@ void orient_soup(TriangleMesh& soup) {
 
 }  // namespace
 
+double SoupWinding::at(const Eigen::Vector3d& x) const {
+  return at_each(WindingPlaces(x.transpose().replicate<kWindingPoints, 1>()))[0];
+}
+
+WindingNumbers SoupWinding::at_each(const WindingPlaces& x) const {
+  WindingNumbers numbers;
+  double points[3][kWindingPoints];
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < x.rows(); ++i) points[k][i] = x(i, k);
+  wind_about(mesh_, of_children_.data(), points, numbers.data());
+  return numbers;
+}
+
 SoupWinding::SoupWinding(const MeshView& mesh) : mesh_(mesh) {
   if (mesh.root == kBvhEmpty || (mesh.root & kBvhLeaf) != 0) return;
   BvhNode around = {};
   far_of(mesh.root, around, 0);
 }
 
-SoupWinding::Far SoupWinding::far_of_block(std::uint32_t block) const {
-  Far far;
+FarTriangles SoupWinding::far_of_block(std::uint32_t block) const {
+  FarTriangles far;
   double centroid[kBvhWidth][3], normal[kBvhWidth][3];
   int count = 0;
   for (const std::uint32_t triangle : mesh_.blocks[block].triangle) {
@@ -256,21 +235,22 @@ SoupWinding::Far SoupWinding::far_of_block(std::uint32_t block) const {
 }
 
 /// `place`: which child of `parent` it is; the parent's box bounds it.
-SoupWinding::Far SoupWinding::far_of(std::uint32_t child, const BvhNode& parent, int place) {
-  Far far;
+FarTriangles SoupWinding::far_of(std::uint32_t child, const BvhNode& parent, int place) {
+  FarTriangles far;
   if ((child & kBvhLeaf) != 0) {
     far = far_of_block(child & ~kBvhLeaf);
   } else {
     const BvhNode& node = mesh_.nodes[child];
-    std::array<Far, kBvhWidth> below;
+    FarChildren below;
     for (int i = 0; i < kBvhWidth; ++i) {
       if (node.child[i] == kBvhEmpty) continue;
-      const Far& part = below[static_cast<std::size_t>(i)] = far_of(node.child[i], node, i);
+      const FarTriangles& part = below[static_cast<std::size_t>(i)] =
+          far_of(node.child[i], node, i);
       far.area += part.area;
       for (int k = 0; k < 3; ++k) far.centre[k] += part.area * part.centre[k];
     }
     for (double& x : far.centre) x = far.area > 0 ? x / far.area : 0;
-    for (const Far& part : below)
+    for (const FarTriangles& part : below)
       for (int i = 0; i < 3; ++i) {
         far.dipole[i] += part.dipole[i];
         for (int j = 0; j < 3; ++j)
@@ -288,45 +268,6 @@ SoupWinding::Far SoupWinding::far_of(std::uint32_t child, const BvhNode& parent,
   }
   far.reach2 = kFar * kFar * squares;
   return far;
-}
-
-double SoupWinding::at(const double p[3]) const {
-  double sum = 0;
-  AngleSum angles;
-  const auto add_block = [&](std::uint32_t block) {
-    for (const std::uint32_t triangle : mesh_.blocks[block].triangle)
-      if (triangle != kNoTriangle) add_solid_angle(corners_of(mesh_, triangle), p, angles);
-  };
-  if (mesh_.root == kBvhEmpty) return 0;
-  std::uint32_t stack[kBvhStackSize];
-  int top = 0;
-  stack[top++] = mesh_.root;
-  while (top > 0) {
-    const std::uint32_t at = stack[--top];
-    if ((at & kBvhLeaf) != 0) {
-      add_block(at & ~kBvhLeaf);
-      continue;
-    }
-    const BvhNode& node = mesh_.nodes[at];
-    for (int i = 0; i < kBvhWidth; ++i) {
-      if (node.child[i] == kBvhEmpty) continue;
-      const Far& far = of_children_[at][static_cast<std::size_t>(i)];
-      const double r[3] = {far.centre[0] - p[0], far.centre[1] - p[1], far.centre[2] - p[2]};
-      const double r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-      if (!(r2 > far.reach2)) {
-        stack[top++] = node.child[i];
-        continue;
-      }
-      double first = 0, second = 0, trace = 0;
-      for (int k = 0; k < 3; ++k) {
-        first += far.dipole[k] * r[k];
-        trace += far.second[4 * k];
-        for (int j = 0; j < 3; ++j) second += r[k] * far.second[3 * k + j] * r[j];
-      }
-      sum += (first + trace - 3 * second / r2) / (r2 * std::sqrt(r2));
-    }
-  }
-  return (sum + 2 * angles.value()) / kFullAngle;
 }
 
 std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh) {
@@ -377,10 +318,12 @@ TriangleWinding::TriangleWinding(TriangleMesh mesh) {
   winding_.emplace(surface_->view());
 }
 
-double TriangleWinding::at(const Eigen::Vector3d& x) const {
-  if (!winding_) return 0;
-  const Eigen::Vector3d unit = surface_->frame().to_unit(x);
-  return winding_->at(unit.data());
+WindingNumbers TriangleWinding::at_each(const WindingPlaces& x) const {
+  if (!winding_) return WindingNumbers::Zero();
+  WindingPlaces unit;
+  for (int i = 0; i < x.rows(); ++i)
+    unit.row(i) = surface_->frame().to_unit(x.row(i).transpose()).transpose();
+  return winding_->at_each(unit);
 }
 
 }  // namespace ist

@@ -2,7 +2,6 @@
 
 #include <ist/mesh.h>
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -12,8 +11,13 @@
 #include "mesh/disjoint_sets.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/mesh_view.h"
+#include "mesh/winding_kernel.h"
 
 namespace ist {
+
+/// A place a row, and the winding number there.
+using WindingPlaces = Eigen::Matrix<double, kWindingPoints, 3>;
+using WindingNumbers = Eigen::Array<double, kWindingPoints, 1>;
 
 /// The generalised winding number of any triangles (Jacobson et al. 2013): the sum of their signed
 /// solid angles over 4π. About a closed surface it is the winding number; about an open one it
@@ -26,24 +30,16 @@ class SoupWinding {
   /// `mesh`: with its hierarchy; it must outlive this.
   explicit SoupWinding(const MeshView& mesh);
 
-  /// `p`: unit frame.
-  double at(const double p[3]) const;
+  /// Places in the unit frame.
+  WindingNumbers at_each(const WindingPlaces& x) const;
+  double at(const Eigen::Vector3d& x) const;
 
  private:
-  /// Triangles seen from afar.
-  struct Far {
-    double centre[3] = {};
-    double area = 0;
-    double reach2 = -1;     ///< beyond this squared distance of the centre they count together
-    double dipole[3] = {};  ///< Σ area · normal
-    double second[9] = {};  ///< Σ area · normal ⊗ (centroid − centre), rows by the normal's axis
-  };
-
-  Far far_of_block(std::uint32_t block) const;
-  Far far_of(std::uint32_t child, const BvhNode& parent, int place);
+  FarTriangles far_of_block(std::uint32_t block) const;
+  FarTriangles far_of(std::uint32_t child, const BvhNode& parent, int place);
 
   const MeshView& mesh_;
-  std::vector<std::array<Far, kBvhWidth>> of_children_;  ///< by node
+  std::vector<FarChildren> of_children_;  ///< by node
 };
 
 /// Any triangles, to be asked for closest points; inside() and volume() mean nothing.
@@ -58,7 +54,10 @@ class [[gnu::visibility("hidden")]] TriangleWinding {
   explicit TriangleWinding(TriangleMesh mesh);
 
   /// `x`: [u]. 0 where there are no triangles.
-  double at(const Eigen::Vector3d& x) const;
+  WindingNumbers at_each(const WindingPlaces& x) const;
+  double at(const Eigen::Vector3d& x) const {
+    return at_each(WindingPlaces(x.transpose().replicate<kWindingPoints, 1>()))[0];
+  }
 
  private:
   std::unique_ptr<MeshSolid> surface_;

@@ -4,12 +4,15 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "mesh/border_vertices.h"
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
 #include "mesh/import/polygon_mesh.h"
@@ -86,165 +89,94 @@ std::vector<bool> border_vertices(const TriangleMesh& mesh, const EdgeTable& edg
   return border;
 }
 
-/// Border vertices in a k-d tree: the middle one of a range parts it, along x, y and z in turn.
-class BorderVertices {
- public:
-  BorderVertices(const TriangleMesh& mesh, const std::vector<bool>& border) : mesh_(mesh) {
-    for (std::uint32_t v = 0; v < border.size(); ++v)
-      if (border[v]) order_.push_back(v);
-    part(0, order_.size(), 0);
-  }
-
-  /// Those within `tolerance` of the segment from u to v but not of its ends, in its order.
-  std::vector<std::uint32_t> on_segment(const std::uint32_t u, const std::uint32_t v,
-                                        const double tolerance) const {
-    const Eigen::Vector3d& a = mesh_.vertices[u];
-    const Eigen::Vector3d& b = mesh_.vertices[v];
-    const double length = (b - a).norm();
-    const Eigen::Vector3d along = (b - a) / length;
-    std::vector<std::pair<double, std::uint32_t>> found;
-    visit_near(
-        Range{0, order_.size(), 0}, a, along, -tolerance, length + tolerance, tolerance,
-        [&](const std::uint32_t w) {
-          if (w == u || w == v) return;
-          const Eigen::Vector3d p = mesh_.vertices[w] - a;
-          const double at = p.dot(along);
-          if (at > tolerance && at < length - tolerance && (p - at * along).norm() <= tolerance)
-            found.emplace_back(at, w);
-        });
-    std::sort(found.begin(), found.end());
-    std::vector<std::uint32_t> result;
-    result.reserve(found.size());
-    for (const auto& [at, w] : found) result.push_back(w);
-    return result;
-  }
-
- private:
-  struct Range {
-    std::size_t first, last;
-    int axis;
-  };
-
-  double coordinate(const std::uint32_t v, const int axis) const { return mesh_.vertices[v][axis]; }
-
-  void part(const std::size_t first, const std::size_t last, const int axis) {
-    if (last - first < 2) return;
-    const std::size_t middle = first + (last - first) / 2;
-    const auto at = [&](const std::size_t i) {
-      return order_.begin() + static_cast<std::ptrdiff_t>(i);
-    };
-    std::nth_element(at(first), at(middle), at(last), [&](const auto v, const auto w) {
-      return std::pair(coordinate(v, axis), v) < std::pair(coordinate(w, axis), w);
-    });
-    part(first, middle, (axis + 1) % 3);
-    part(middle + 1, last, (axis + 1) % 3);
-  }
-
-  /// The vertices near the part from `begin` to `end` of the line from a, and some others.
-  template <class Visit>
-  void visit_near(const Range range, const Eigen::Vector3d& a, const Eigen::Vector3d& along,
-                  const double begin, const double end, const double tolerance,
-                  const Visit& visit) const {
-    if (range.first == range.last || !(begin <= end)) return;
-    const std::size_t middle = range.first + (range.last - range.first) / 2;
-    visit(order_[middle]);
-    const double plane = coordinate(order_[middle], range.axis);
-    const double slope = along[range.axis];
-    const int next = (range.axis + 1) % 3;
-    // Where the line is below `plane` + tolerance, and above `plane` − tolerance.
-    for (const double side : {-1.0, 1.0}) {
-      const double room = side * (a[range.axis] - plane) + 2 * tolerance;  // ≥ −side·slope·t
-      double from = begin, to = end;
-      if (side * slope > 0)
-        from = std::max(from, -room / (side * slope));
-      else if (side * slope < 0)
-        to = std::min(to, -room / (side * slope));
-      else if (room < 0)
-        continue;
-      visit_near(side < 0 ? Range{range.first, middle, next} : Range{middle + 1, range.last, next},
-                 a, along, from, to, tolerance, visit);
-    }
-  }
-
-  const TriangleMesh& mesh_;
-  std::vector<std::uint32_t> order_;
-};
-
-/// Splits border triangles at border vertices on their sides, one side a triangle. Returns whether
-/// there was any to split.
-bool split_once(TriangleMesh& mesh, const double tolerance) {
-  const EdgeTable edges(mesh.triangles);
-  const BorderVertices border(mesh, border_vertices(mesh, edges));
+/// Splits border triangles at border vertices on their sides, one side a triangle: of `asked` ones,
+/// which become those that were split, and their pieces. Returns whether there was any to split.
+bool split_once(Surface& surface, const BorderVertices& border, const double tolerance,
+                std::vector<bool>& asked) {
+  TriangleMesh& mesh = surface.mesh;
+  const EdgeTable& edges = surface.edges;
+  const std::vector<bool> is_border = border_vertices(mesh, edges);
+  std::vector<bool> split(asked.size(), false);
   std::vector<Triangle> pieces;
   for (std::size_t e = 0; e < edges.size(); ++e) {
     if (edges.sides(e).size() != 1) continue;
     const std::uint32_t side = edges.sides(e)[0];
+    if (!asked[side / 3]) continue;
     Triangle& t = mesh.triangles[side / 3];
     const std::uint32_t u = t[side % 3], v = t[(side + 1) % 3], tip = t[(side + 2) % 3];
     if (edges.edge_of(side) != e ||
         std::pair(std::min(u, v), std::max(u, v)) != std::pair(edges.low(e), edges.high(e)))
       continue;  // already split at another side
     std::vector<std::uint32_t> stops = border.on_segment(u, v, tolerance);
-    std::erase(stops, tip);
+    std::erase_if(stops, [&](const std::uint32_t w) { return w == tip || !is_border[w]; });
     if (stops.empty()) continue;
     stops.push_back(v);
+    split[side / 3] = true;
     t = {u, stops[0], tip};
     for (std::size_t i = 0; i + 1 < stops.size(); ++i)
       pieces.push_back({stops[i], stops[i + 1], tip});
   }
+  if (pieces.empty()) return false;
   mesh.triangles.insert(mesh.triangles.end(), pieces.begin(), pieces.end());
-  return !pieces.empty();
+  surface.triangles_changed();
+  asked = std::move(split);
+  asked.resize(mesh.triangles.size(), true);
+  return true;
 }
 
 /// Closes cracks: joins border vertices that lie within `tolerance` [u] of each other, and splits
 /// border triangles where a border vertex lies within it of their side (T-junctions). Interior
 /// vertices stay. Border: edges with an odd number of sides.
-TriangleMesh stitch(const TriangleMesh& mesh, const double tolerance) {
-  TriangleMesh result =
-      weld_among(mesh, tolerance, border_vertices(mesh, EdgeTable(mesh.triangles)));
+Surface stitch(const Surface& surface, const double tolerance) {
+  Surface result{weld_among(surface.mesh, tolerance, border_vertices(surface.mesh, surface.edges))};
+  const BorderVertices border(result.mesh, border_vertices(result.mesh, result.edges));
+  std::vector<bool> asked(result.mesh.triangles.size(), true);
   constexpr int kMostRounds = 8;  // each splits one side a triangle
-  for (int round = 0; round < kMostRounds && split_once(result, tolerance); ++round) {
+  for (int round = 0; round < kMostRounds && split_once(result, border, tolerance, asked);
+       ++round) {
   }
   return result;
 }
 
-void tidy(TriangleMesh& mesh) {
-  drop_degenerate(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
-  reduce_coincident(mesh.triangles, EdgeTable(mesh.triangles));
+void tidy(Surface& surface) {
+  TriangleMesh& mesh = surface.mesh;
+  if (!drop_degenerate(mesh.vertices, mesh.triangles, surface.edges).empty())
+    surface.triangles_changed();
+  if (reduce_coincident(mesh.triangles, surface.edges) > 0) surface.triangles_changed();
 }
 
-std::size_t odd_edges(const TriangleMesh& mesh) {
-  return count_odd_edges(EdgeTable(mesh.triangles));
-}
-
-/// Whether stitch() may change anything by a tolerance up to the widest crack. A vertex on a side
-/// that is too near to its end for the widest tolerance is within twice that of the end.
-bool may_have_cracks(const TriangleMesh& mesh, const EdgeTable& edges, const double tolerance) {
-  return weld_among(mesh, 2 * tolerance, border_vertices(mesh, edges)).triangles !=
-             mesh.triangles ||
-         count_t_junctions(mesh, edges) > 0;
+/// The least tolerance up to `most` by which stitch() changes anything; infinity where none does.
+double least_crack(const Surface& surface, const double most) {
+  const EdgeTable& edges = surface.edges;
+  const BorderVertices border(surface.mesh, border_vertices(surface.mesh, edges));
+  double least = HUGE_VAL;
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (edges.sides(e).size() % 2 == 1)
+      least = std::min(least,
+                       border.least_tolerance(edges.low(e), edges.high(e), std::min(least, most)));
+  return least;
 }
 
 /// Of all tolerances up to 1e-5 of the diagonal, the smallest that leaves the fewest odd edges.
-void close_cracks(TriangleMesh& mesh, MeshReport& report) {
-  const EdgeTable edges(mesh.triangles);
-  if (!may_have_cracks(mesh, edges, kWidestCrack * report.bounds.diagonal().norm())) return;
-  const std::size_t before = count_odd_edges(edges);
+void close_cracks(Surface& surface, MeshReport& report) {
+  const double diagonal = report.bounds.diagonal().norm();
+  const double least = least_crack(surface, kWidestCrack * diagonal);
+  const std::size_t before = count_odd_edges(surface.edges);
   std::size_t fewest = before;
   double best_fraction = 0;
-  TriangleMesh best;
+  std::optional<Surface> best;
   for (const double fraction : {1e-9, 1e-8, 1e-7, 1e-6, kWidestCrack}) {
-    if (fewest == 0) break;
-    TriangleMesh candidate = stitch(mesh, fraction * report.bounds.diagonal().norm());
+    if (fewest == 0 || fraction * diagonal < least) continue;
+    Surface candidate = stitch(surface, fraction * diagonal);
     tidy(candidate);
-    const std::size_t left = odd_edges(candidate);
+    const std::size_t left = count_odd_edges(candidate.edges);
     if (left >= fewest) continue;
     fewest = left;
     best_fraction = fraction;
     best = std::move(candidate);
   }
-  if (best_fraction == 0) return;
-  mesh = std::move(best);
+  if (!best) return;
+  surface = std::move(*best);
   report.notes.push_back("repair: cracks up to " + shortest(best_fraction) +
                          " of the diagonal closed: " + counted(before - fewest, "open edge") +
                          " fewer");
@@ -289,17 +221,35 @@ struct HangingPatches {
   }
 };
 
-/// Drops patches that hang on others and leave fewer odd edges when they go, best first. What is
-/// right for one changes what is right for its neighbours, so those wait. Returns how many went.
-std::size_t drop_fins_once(TriangleMesh& mesh) {
-  const EdgeTable edges(mesh.triangles);
+/// Whether there are edges of three and more faces: without any, nothing hangs on anything.
+bool any_crowded(const EdgeTable& edges) {
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (edges.sides(e).size() > 2) return true;
+  return false;
+}
+
+double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
+}
+
+/// Drops patches that hang on others and leave fewer odd edges when they go, those first that leave
+/// the fewest for their area: a body with holes has many itself. What is right for one changes what
+/// is right for its neighbours, so those wait. Returns how many went.
+std::size_t drop_fins_once(Surface& surface) {
+  TriangleMesh& mesh = surface.mesh;
+  const EdgeTable& edges = surface.edges;
+  if (!any_crowded(edges)) return 0;
   HangingPatches hanging(mesh, edges);
   auto& [patches, gain, shared_edges] = hanging;
   std::vector<std::uint32_t> order;
   for (std::uint32_t patch = 0; patch < gain.size(); ++patch)
     if (gain[patch] > 0 && !shared_edges[patch].empty()) order.push_back(patch);
-  std::stable_sort(order.begin(), order.end(),
-                   [&](const std::uint32_t a, const std::uint32_t b) { return gain[a] > gain[b]; });
+  std::vector<double> size(gain.size(), 0);
+  for (std::uint32_t t = 0; t < size.size(); ++t)
+    size[patches.find(t)] += area(mesh.vertices, mesh.triangles[t]);
+  std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
+    return gain[a] * size[b] > gain[b] * size[a];
+  });
   std::vector<bool> changed(edges.size(), false), dropped(mesh.triangles.size(), false);
   std::size_t count = 0;
   for (const std::uint32_t patch : order) {
@@ -313,22 +263,21 @@ std::size_t drop_fins_once(TriangleMesh& mesh) {
   std::vector<Triangle> kept;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
     if (!dropped[patches.find(t)]) kept.push_back(mesh.triangles[t]);
+  if (count == 0) return 0;
   mesh.triangles = std::move(kept);
+  surface.triangles_changed();
   return count;
 }
 
-std::size_t drop_fins(TriangleMesh& mesh) {
+std::size_t drop_fins(Surface& surface) {
   std::size_t total = 0;
-  while (const std::size_t dropped = drop_fins_once(mesh)) total += dropped;
+  while (const std::size_t dropped = drop_fins_once(surface)) total += dropped;
   return total;
 }
 
-double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
-  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
-}
-
 /// Gives each piece vertices of its own, so that no walk along a border leaves its piece.
-void separate(TriangleMesh& mesh, DisjointSets& pieces) {
+void separate(Surface& surface, DisjointSets& pieces) {
+  TriangleMesh& mesh = surface.mesh;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> copies;  // vertex, piece
   std::vector<std::uint32_t> owner(mesh.vertices.size(), kNoIndex);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -345,15 +294,17 @@ void separate(TriangleMesh& mesh, DisjointSets& pieces) {
       v = copy->second;
     }
   }
+  if (!copies.empty()) surface.triangles_changed();
 }
 
 /// Caps every loop of odd edges; but a piece that would be capped with nearly as much surface as it
 /// has is an open sheet, no solid with a hole, and is dropped.
-void cap_holes(TriangleMesh& mesh, MeshReport& report) {
+void cap_holes(Surface& surface, MeshReport& report) {
   constexpr double kSheet = 0.95;  // caps to own area
-  DisjointSets pieces = connected_pieces(EdgeTable(mesh.triangles));
-  separate(mesh, pieces);
-  const EdgeTable edges(mesh.triangles);
+  TriangleMesh& mesh = surface.mesh;
+  const EdgeTable& edges = surface.edges;
+  DisjointSets pieces = connected_pieces(edges);
+  separate(surface, pieces);
   const auto loops = border_loops(edges);
   std::vector<std::vector<Triangle>> caps;
   std::vector<double> own_area(mesh.triangles.size(), 0), cap_area(mesh.triangles.size(), 0);
@@ -383,6 +334,7 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
   }
   mesh.triangles = std::move(result);
   mesh = weld(std::move(mesh), 0);
+  surface.triangles_changed();
   if (sheets > 0)
     report.notes.push_back("repair: " + counted(sheets, "open sheet") +
                            " removed: they enclose no volume");
@@ -392,9 +344,10 @@ void cap_holes(TriangleMesh& mesh, MeshReport& report) {
 
 }  // namespace
 
-void drop_inner_walls(TriangleMesh& mesh, MeshReport& report) {
-  const EdgeTable edges(mesh.triangles);
-  HangingPatches hanging(mesh, edges);
+void drop_inner_walls(Surface& surface, MeshReport& report) {
+  TriangleMesh& mesh = surface.mesh;
+  if (!any_crowded(surface.edges)) return;
+  HangingPatches hanging(mesh, surface.edges);
   std::vector<bool> asked(mesh.triangles.size());
   for (std::uint32_t patch = 0; patch < asked.size(); ++patch)
     asked[patch] = !hanging.shared_edges[patch].empty();
@@ -406,8 +359,11 @@ void drop_inner_walls(TriangleMesh& mesh, MeshReport& report) {
     if (!inner[t]) kept.push_back(mesh.triangles[t]);
     walls += inner[t] && hanging.sets.find(t) == t ? 1 : 0;
   }
-  if (walls == 0 || count_odd_edges(EdgeTable(kept)) >= count_odd_edges(edges)) return;
+  if (walls == 0) return;
+  EdgeTable edges(kept);
+  if (count_odd_edges(edges) >= count_odd_edges(surface.edges)) return;
   mesh.triangles = std::move(kept);
+  surface.edges = std::move(edges);
   report.repaired = true;
   report.notes.push_back("repair: " + counted(walls, "inner wall") +
                          " removed: there is solid on both sides");
@@ -422,20 +378,24 @@ std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges) 
   });
 }
 
-TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report) {
+void repair(Surface& surface, const std::string& name, MeshReport& report) {
+  if (report.repaired) {  // by walls that went, which may have left copies
+    Surface tidied{surface.mesh};
+    tidy(tidied);
+    if (count_odd_edges(tidied.edges) < count_odd_edges(surface.edges)) surface = std::move(tidied);
+  }
   report.repaired = true;
-  close_cracks(mesh, report);
-  if (const std::size_t fins = drop_fins(mesh); fins > 0)
+  close_cracks(surface, report);
+  if (const std::size_t fins = drop_fins(surface); fins > 0)
     report.notes.push_back("repair: " + counted(fins, "patch", "patches") +
                            " removed at edges with three or more faces");
-  cap_holes(mesh, report);
-  tidy(mesh);
-  if (mesh.triangles.empty())
+  cap_holes(surface, report);
+  tidy(surface);
+  if (surface.mesh.triangles.empty())
     throw OpenMeshError(name + ": cannot be repaired: no part of it encloses a volume. " + kWrapIt);
-  if (const std::size_t left = odd_edges(mesh); left > 0)
+  if (const std::size_t left = count_odd_edges(surface.edges); left > 0)
     throw OpenMeshError(name + ": cannot be repaired: " +
                         counted(left, "edge remains open", "edges remain open") + ". " + kWrapIt);
-  return mesh;
 }
 
 }  // namespace ist

@@ -10,14 +10,22 @@
 
 namespace ist {
 
+/// Triangles and their edges, as they change on the way.
+struct Surface {
+  TriangleMesh mesh;
+  EdgeTable edges{mesh.triangles};
+
+  void triangles_changed() { edges = EdgeTable(mesh.triangles); }
+};
+
 /// Drops walls between parts of the solid that share them: patches at edges of three and more faces
 /// with solid on both sides, where fewer odd edges are left without them. Says so in the notes.
-void drop_inner_walls(TriangleMesh& mesh, MeshReport& report);
+void drop_inner_walls(Surface& surface, MeshReport& report);
 
 /// Makes a mesh with odd edges a closed surface: closes cracks with a growing tolerance up to 1e-5
 /// of the diagonal, drops fins and open sheets, caps the holes that are left. Says in the report's
 /// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.
-TriangleMesh repair(TriangleMesh mesh, const std::string& name, MeshReport& report);
+void repair(Surface& surface, const std::string& name, MeshReport& report);
 
 /// What an error says of a mesh that cannot be repaired.
 inline constexpr const char* kWrapIt =

@@ -50,14 +50,18 @@ struct alignas(64) EightBoxes {
 /// their width and rounded to float, all of which keeps their order: boxes that meet still do.
 class TriangleBoxes {
  public:
-  /// On the caller's TBB threads. At most 2^21 triangles. `spread`: as spread_fans() has it; the
-  /// triangles of a large spread fan stand together, and pairs of them are not visited where whole
-  /// nodes belong to it. `margin`: [u] boxes no further apart meet.
+  /// On the caller's TBB threads. At most 2^21 triangles. `spread`: as spread_fans() has it, or
+  /// nothing where pairs are asked for that do not meet; the triangles of a large fan stand
+  /// together, and pairs of them are not visited where whole nodes are known not to meet.
+  /// `margin`: [u] boxes no further apart meet. `oriented`: nodes have boxes along their triangles
+  /// in any case, not only where there are large fans or needles.
   TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                 const std::vector<Triangle>& triangles,
-                const std::vector<std::uint32_t>& spread = {}, double margin = 0);
+                const std::vector<std::uint32_t>& spread = {}, double margin = 0,
+                bool oriented = false);
 
   std::size_t size() const { return order_.size(); }
+  bool oriented() const { return !slabs_.empty(); }
   /// The triangle at a place of the curve.
   std::uint32_t triangle(const std::size_t place) const { return order_[place]; }
 
@@ -86,7 +90,7 @@ class TriangleBoxes {
 
   template <class Visit>
   void within(const std::size_t level, const std::size_t node, Visit& visit) const {
-    if (!slabs_.empty() && slabs_[level][node].owner != kNoIndex) return;
+    if (!slabs_.empty() && slabs_[level][node].spread) return;
     const EightBoxes& boxes = levels_[level][node];
     const std::size_t below = level == 0 ? order_.size() : levels_[level - 1].size();
     for (std::size_t k = 0; k < 8 && 8 * node + k < below; ++k) {
@@ -103,8 +107,7 @@ class TriangleBoxes {
     if (visit.done()) return;
     if (!slabs_.empty()) {
       const Slab &slab_a = slabs_[level][a], &slab_b = slabs_[level][b];
-      if (slab_a.owner == slab_b.owner && slab_a.owner != kNoIndex) return;
-      if (slab_a.apart_from(slab_b)) return;
+      if (slab_a.apart_about_owner(slab_b) || slab_a.apart_from(slab_b)) return;
     }
     const EightBoxes &of_a = levels_[level][a], &of_b = levels_[level][b];
     unsigned near_b = of_a.met_by(levels_[level + 1][b / 8], b % 8);
@@ -186,7 +189,8 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                              const std::vector<Triangle>& triangles,
-                             const std::vector<std::uint32_t>& spread, const double margin) {
+                             const std::vector<std::uint32_t>& spread, const double margin,
+                             const bool oriented) {
   const RawArray<FloatPoint> points = placed(vertices);
   float wider = 0;
   if (margin > 0) {
@@ -204,12 +208,14 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   tbb::parallel_for(std::size_t{0}, order_.size(), [&](const std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
   });
-  std::vector<std::uint32_t> owners = owners_of(triangles, spread);
+  std::vector<std::uint32_t> owners;
+  if (!spread.empty()) owners = owners_of(triangles, vertices.size());
   if (!owners.empty()) {
     std::stable_sort(
         order_.begin(), order_.end(),
         [&](const std::uint32_t a, const std::uint32_t b) { return owners[a] < owners[b]; });
   } else if (
+      oriented ||
       mean_slenderness(triangles.size(), [&](const std::size_t t) {
         const Triangle& of = triangles[t];
         return Corners{{vertices[of[0]].data(), vertices[of[1]].data(), vertices[of[2]].data()}};
@@ -238,7 +244,7 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
       const std::span<const std::uint32_t> all(order_);
       slabs[node] = slab_of(points, triangles,
                             all.subspan(size * node, std::min(size, all.size() - size * node)),
-                            owners, double{wider});
+                            owners, spread, double{wider});
     });
   }
 }
@@ -276,8 +282,12 @@ bool share_corner(const Triangle& a, const Triangle& b) {
   return shared;
 }
 
-constexpr std::size_t kMostTriangles = 2'000'000, kMostCandidates = 50'000'000;
-constexpr std::size_t kMostPairs = 10'000'000;
+constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 10'000'000;
+
+/// The boxes of needles meet those of many others.
+constexpr std::size_t most_candidates(const std::size_t triangles) {
+  return std::max(std::size_t{50'000'000}, 600 * triangles);
+}
 
 /// What the parts of a search add to. Integers only: their sums do not depend on the order.
 struct Sums {
@@ -297,7 +307,9 @@ class Visitor {
   Visitor& operator=(const Visitor&) = delete;
   ~Visitor() { sums_.candidates += candidates_; }
 
-  bool done() const { return sums_.candidates.load(std::memory_order_relaxed) > kMostCandidates; }
+  bool done() const {
+    return sums_.candidates.load(std::memory_order_relaxed) > most_candidates(boxes_.size());
+  }
 
   void operator()(const std::size_t i, const std::size_t j) {
     const Look found = look_at_(i, j);
@@ -326,7 +338,7 @@ std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt
     Visitor visitor(boxes, look_at, sums, of_threads.local());
     boxes.for_each_pair(part, visitor);
   });
-  if (sums.candidates > kMostCandidates) return std::nullopt;
+  if (sums.candidates > most_candidates(boxes.size())) return std::nullopt;
   SelfIntersections result{sums.met, std::nullopt};
   if (result.count > kMostPairs) return result;
   result.pairs.emplace();
@@ -342,15 +354,19 @@ std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
   if (triangles.size() > kMostTriangles) return std::nullopt;
   const std::vector<std::uint32_t> fans = spread_fans(vertices, triangles);
-  const TriangleBoxes boxes(vertices, triangles, fans);
-  const std::vector<Triangle> spread = spread_corners(triangles, fans, boxes);
-  return search(boxes, [&](const std::size_t i, const std::size_t j) {
-    if (share_corner(spread[i], spread[j])) return Look::candidates;
-    const Triangle &a = triangles[boxes.triangle(i)], &b = triangles[boxes.triangle(j)];
-    if (!boxes_meet(vertices, a, b)) return Look::apart;
-    return !seen_apart(vertices, a, b) && meet_elsewhere(vertices, a, b) ? Look::met
-                                                                         : Look::candidates;
-  });
+  for (const bool oriented : {false, true}) {
+    const TriangleBoxes boxes(vertices, triangles, fans, 0, oriented);
+    const std::vector<Triangle> spread = spread_corners(triangles, fans, boxes);
+    auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
+      if (share_corner(spread[i], spread[j])) return Look::candidates;
+      const Triangle &a = triangles[boxes.triangle(i)], &b = triangles[boxes.triangle(j)];
+      if (!boxes_meet(vertices, a, b)) return Look::apart;
+      return !seen_apart(vertices, a, b) && meet_elsewhere(vertices, a, b) ? Look::met
+                                                                           : Look::candidates;
+    });
+    if (found || boxes.oriented()) return found;
+  }
+  return std::nullopt;
 }
 
 std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(

@@ -37,8 +37,8 @@ struct SelfIntersections {
 };
 
 /// Degenerate triangles are left out. Nothing where looking would take too long: more than two
-/// million triangles, or a soup in which the boxes of more than 50 million pairs meet. Runs on the
-/// caller's TBB threads; the answer does not depend on their number.
+/// million triangles, or a soup in which the boxes of more than 50 million pairs, and of 600 a
+/// triangle, meet. Runs on the caller's TBB threads; the answer does not depend on their number.
 std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles);
 

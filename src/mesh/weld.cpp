@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
-#include <unordered_map>
 #include <vector>
 
 namespace ist {
@@ -40,9 +40,8 @@ void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* con
   }
 }
 
-/// [point] the smallest index among those that are used and have equal coordinates (−0 = 0);
-/// anything for points that are not used. `used` [point]: 0 or 1. Used coordinates must be finite.
-/// On the caller's TBB threads.
+}  // namespace
+
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
                                        const std::vector<std::uint8_t>& used) {
   // Chunks of points count what they have for each drawer, then put it there in order.
@@ -82,6 +81,8 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
   });
   return first;
 }
+
+namespace {
 
 /// [vertex] 1 where a triangle has it as a corner.
 std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
@@ -146,25 +147,47 @@ TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
-  // Kept vertices by the hash of their cell. Cells are as wide as the tolerance: what is near
-  // enough lies in one of 27.
-  std::unordered_multimap<std::uint64_t, std::uint32_t> kept;
+  // Kept vertices by the hash of their cell. Cells are so wide that what is near enough lies in one
+  // or two along each axis.
+  const double width = 4 * tolerance;
+  const auto count = static_cast<std::size_t>(std::count(among.begin(), among.end(), true));
+  const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;
+  std::vector<WeldEntry> table(mask + 1, WeldEntry{0, kNone});
+  const auto place_of = [&](const Eigen::Vector3d& cell) {
+    return static_cast<std::uint32_t>(hash_of_bits(cell));
+  };
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     if (used[i] == 0) continue;
     const Eigen::Vector3d& p = mesh.vertices[i];
-    const Eigen::Vector3d cell = (p / tolerance).array().floor();
     std::uint32_t first = kNone;
-    for (int k = 0; among[i] && k < 27; ++k) {
-      const Eigen::Vector3d step(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1);
-      const auto [begin, end] = kept.equal_range(hash_of_bits(cell + step));
-      for (auto near = begin; near != end; ++near)
-        if ((result.vertices[near->second] - p).norm() <= tolerance)
-          first = std::min(first, near->second);
+    const Eigen::Vector3d scaled = p / width, cell = scaled.array().floor();
+    if (among[i]) {
+      int low[3], high[3];
+      for (int k = 0; k < 3; ++k) {
+        const double within = scaled[k] - cell[k],
+                     reach = 0.25 + 1e-15 * std::abs(scaled[k]) + 1e-9;
+        low[k] = within <= reach ? -1 : 0;
+        high[k] = within >= 1 - reach ? 1 : 0;
+      }
+      for (int x = low[0]; x <= high[0]; ++x)
+        for (int y = low[1]; y <= high[1]; ++y)
+          for (int z = low[2]; z <= high[2]; ++z) {
+            const std::uint32_t hash = place_of(cell + Eigen::Vector3d(x, y, z));
+            for (std::size_t at = hash & mask; table[at].point != kNone; at = (at + 1) & mask)
+              if (table[at].hash == hash && table[at].point < first &&
+                  (result.vertices[table[at].point] - p).norm() <= tolerance)
+                first = table[at].point;
+          }
     }
     if (first == kNone) {
       first = static_cast<std::uint32_t>(result.vertices.size());
       result.vertices.emplace_back(p + Eigen::Vector3d::Zero());
-      if (among[i]) kept.emplace(hash_of_bits(cell), first);
+      if (among[i]) {
+        const std::uint32_t hash = place_of(cell);
+        std::size_t at = hash & mask;
+        while (table[at].point != kNone) at = (at + 1) & mask;
+        table[at] = {hash, first};
+      }
     }
     kept_as[i] = first;
   }

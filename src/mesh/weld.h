@@ -19,6 +19,12 @@ inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
   return hash;
 }
 
+/// [point] the smallest index among those that are used and have equal coordinates (−0 = 0);
+/// anything for points that are not used. `used` [point]: 0 or 1. Used coordinates must be finite.
+/// On the caller's TBB threads.
+std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
+                                       const std::vector<std::uint8_t>& used);
+
 /// One vertex for all that lie within `tolerance` [u] of the first of them in file order (0: equal
 /// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their
 /// order. Every referenced coordinate must be finite.

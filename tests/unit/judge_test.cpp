@@ -62,7 +62,7 @@ TEST(SoupWinding, IsTheWindingNumberOfClosedSurfaces) {
     for (int i = 0; i < 2000; ++i) {
       const Eigen::Vector3d x(2 * uniform(random) - 1, 2 * uniform(random) - 1,
                               2 * uniform(random) - 1);
-      EXPECT_NEAR(winding.at(x.data()), solid.winding_number(x), 0.01) << name;
+      EXPECT_NEAR(winding.at(x), solid.winding_number(x), 0.01) << name;
     }
   }
 }
@@ -78,8 +78,8 @@ TEST(SoupWinding, IsTheSolidAngleOfAnOpenSurface) {
     const double expected = std::asin(1 / (1 + h * h)) / std::numbers::pi;
     const Eigen::Vector3d below = solid->frame().to_unit({0, 0, -h});
     const Eigen::Vector3d above = solid->frame().to_unit({0, 0, h});
-    EXPECT_NEAR(winding.at(below.data()), expected, 1e-9);
-    EXPECT_NEAR(winding.at(above.data()), -expected, 1e-9);
+    EXPECT_NEAR(winding.at(below), expected, 1e-9);
+    EXPECT_NEAR(winding.at(above), -expected, 1e-9);
   }
 }
 

@@ -139,6 +139,17 @@ TEST(Repair, FinsAndSheetsAreDropped) {
   EXPECT_EQ(closed.mesh.triangles, cube_mesh().triangles);
 }
 
+TEST(Repair, ABodyWithAHoleKeepsWhatAFinHangsOn) {
+  // The hole has more open edges than the fin has.
+  TriangleMesh mesh = box_mesh(Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(2));
+  std::erase_if(mesh.triangles, [](const auto& t) { return t[0] == 4; });  // z = 2
+  mesh.vertices.push_back({-1, -1, 0.5});
+  mesh.triangles.push_back({0, 4, 8});
+  const ClosedMesh closed = repaired(mesh);
+  EXPECT_DOUBLE_EQ(closed.report.volume, 8);
+  EXPECT_EQ(closed.mesh.vertices.size(), 8u);
+}
+
 TEST(Repair, TellsWhetherTheClosedMeshMeetsItself) {
   // A post stands in the open side of a box: only the cap meets it.
   TriangleMesh box = box_mesh(Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(4));

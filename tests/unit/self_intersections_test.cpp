@@ -11,6 +11,7 @@
 #include <ist/mesh.h>
 
 #include "mesh/mesh_solid.h"
+#include "mesh/resolve/resolve.h"
 #include "mesh/surface_reduction.h"
 #include "mesh/weld.h"
 #include "support/test_meshes.h"
@@ -270,6 +271,71 @@ TEST(SelfIntersections, OfLargeFans) {
         expect_all_found(pierced);
         EXPECT_GT(find_self_intersections(pierced.vertices, pierced.triangles)->count, 3u);
       }
+}
+
+/// Cylinders of n sides on top of each other, each turned against the one below: their ends lie in
+/// one plane and share its middle, and all their corners where `turn` is 0.
+TriangleMesh stacked_fans(const std::uint32_t n, const std::uint32_t count, const double turn) {
+  TriangleMesh all;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    TriangleMesh one = fan_body(n, false, false);
+    const Eigen::AngleAxisd about(i * turn, Eigen::Vector3d::UnitZ());
+    for (Eigen::Vector3d& v : one.vertices) {
+      const double z = (v.z() > 0 ? 1.0 : 0.0) + double(i);
+      v = about * v;
+      v.z() = z;
+    }
+    all = testing::joined(all, one);
+  }
+  return weld(all, 0);
+}
+
+TEST(SelfIntersections, OfFansInOnePlane) {
+  for (const double turn : {0.0, 0.01, 0.3}) {
+    SCOPED_TRACE(turn);
+    expect_all_found(stacked_fans(70, 3, turn));
+    // Pairs about a middle are a hundred million.
+    constexpr std::uint32_t kMany = 10'000;
+    const TriangleMesh large = stacked_fans(kMany, 2, turn);
+    const auto found = find_self_intersections(large.vertices, large.triangles);
+    ASSERT_TRUE(found);
+    EXPECT_GE(found->count, kMany);
+  }
+}
+
+TEST(SelfIntersections, OfASunburst) {
+  // Long walls in all directions, whose boxes along the axes meet each other.
+  for (const std::uint32_t n : {60u, 20'000u}) {
+    TriangleMesh walls;
+    for (const double z : {0.0, 0.1})
+      for (std::uint32_t i = 0; i < n; ++i) {
+        const double angle = 2 * 3.14159265358979 * i / n, radius = i % 2 == 0 ? 1 : 0.2;
+        walls.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+      }
+    for (std::uint32_t i = 0; i < n; ++i) {
+      const std::uint32_t j = (i + 1) % n;
+      walls.triangles.push_back({i, j, n + j});
+      walls.triangles.push_back({i, n + j, n + i});
+    }
+    if (n < 1'000) {
+      expect_all_found(walls);
+      continue;
+    }
+    const auto none = find_self_intersections(walls.vertices, walls.triangles);
+    ASSERT_TRUE(none);
+    EXPECT_EQ(none->count, 0u);
+  }
+}
+
+TEST(SelfIntersections, FansInOnePlaneAreOneSolid) {
+  for (const double turn : {0.0, 1e-3, 0.3}) {
+    const ClosedMesh stack = close_mesh(stacked_fans(1'000, 2, turn), "stack");
+    const ResolvedMesh one = resolve(stack);
+    EXPECT_NE(one.resolution.how, Resolution::How::unresolved) << one.resolution.reason;
+    const double each = 0.5 * 1'000 * std::sin(2 * 3.14159265358979 / 1'000);
+    EXPECT_NEAR(MeshSolid(one).volume(), 2 * each, 1e-9) << turn;
+    EXPECT_EQ(one.mesh.report.shells, 1u);
+  }
 }
 
 }  // namespace

@@ -162,6 +162,7 @@ struct Segment {
   std::uint32_t from, to;
   std::uint32_t other = kNoIndex;
   std::vector<std::uint32_t> on = {};  ///< points on it, its ends among them
+  std::size_t like = 0;                ///< the first with the same ends, which alone has points
 
   bool is_side() const { return other == kNoIndex; }
 };
@@ -205,20 +206,37 @@ class ClusterWork {
   /// `crossings`: how many all clusters have so far.
   void meet(std::atomic<std::size_t>& crossings) {
     std::vector<Segment>& segments = cluster_.segments;
-    for (Segment& s : segments) s.on = {s.from, s.to};
     std::vector<std::size_t> order(segments.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    const auto ends = [&](const std::size_t i) {
+      return std::minmax(segments[i].from, segments[i].to);
+    };
+    std::stable_sort(order.begin(), order.end(),
+                     [&](const std::size_t i, const std::size_t j) { return ends(i) < ends(j); });
+    for (std::size_t i = 0; i < order.size(); ++i)
+      segments[order[i]].like =
+          i > 0 && ends(order[i]) == ends(order[i - 1]) ? segments[order[i - 1]].like : order[i];
+    std::erase_if(order, [&](const std::size_t i) { return segments[i].like != i; });
     std::vector<Range> x(segments.size()), y(segments.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
+    for (const std::size_t i : order) {
+      segments[i].on = {segments[i].from, segments[i].to};
       x[i] = range(segments[i], first());
       y[i] = range(segments[i], second());
     }
     std::stable_sort(order.begin(), order.end(),
                      [&](const std::size_t i, const std::size_t j) { return x[i].low < x[j].low; });
+    std::vector<std::uint32_t>& touched = cluster_.touched;
+    const auto place_of = [&](const std::uint32_t p) { return points_.rounded(p)[first()]; };
+    std::sort(touched.begin(), touched.end(), [&](const std::uint32_t p, const std::uint32_t q) {
+      return std::pair(place_of(p), p) < std::pair(place_of(q), q);
+    });
     for (std::size_t place = 0; place < order.size(); ++place) {
       stop_.look();
       const std::size_t i = order[place];
-      for (const std::uint32_t p : cluster_.touched) put(p, segments[i]);
+      for (auto p = std::partition_point(touched.begin(), touched.end(),
+                                         [&](const auto q) { return place_of(q) < x[i].low; });
+           p != touched.end() && place_of(*p) <= x[i].high; ++p)
+        put(*p, segments[i]);
       for (std::size_t next = place + 1; next < order.size(); ++next) {
         const std::size_t j = order[next];
         if (x[j].low > x[i].high) break;
@@ -231,26 +249,26 @@ class ClusterWork {
 
   void triangulate(const std::array<std::uint32_t, 3>& frame) {
     std::vector<std::uint32_t> inner = cluster_.touched;
+    const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
+      const int by_first = points_.compare(first(), p, q);
+      return by_first != 0 ? by_first < 0 : points_.compare(second(), p, q) < 0;
+    };
     for (Segment& s : cluster_.segments) {
       std::sort(s.on.begin(), s.on.end());
       s.on.erase(std::unique(s.on.begin(), s.on.end()), s.on.end());
       inner.insert(inner.end(), s.on.begin(), s.on.end());
+      std::sort(s.on.begin(), s.on.end(), along);
     }
     std::sort(inner.begin(), inner.end());
     inner.erase(std::unique(inner.begin(), inner.end()), inner.end());
     PlanarTriangulation plane(points_, cluster_.axis, frame, inner);
     for (std::size_t place = 0; place < cluster_.segments.size(); ++place) {
-      Segment& s = cluster_.segments[place];
+      const Segment& s = cluster_.segments[place];
       stop_.look();
-      const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
-        const int by_first = points_.compare(first(), p, q);
-        return by_first != 0 ? by_first < 0 : points_.compare(second(), p, q) < 0;
-      };
-      std::sort(s.on.begin(), s.on.end(), along);
-      const int step = !s.is_side() ? 0 : s.on.front() == s.from ? 1 : -1;
+      const std::vector<std::uint32_t>& on = cluster_.segments[s.like].on;
+      const int step = !s.is_side() ? 0 : on.front() == s.from ? 1 : -1;
       const std::size_t facing = s.is_side() ? facing_of(place) : 0;
-      for (std::size_t k = 0; k + 1 < s.on.size(); ++k)
-        plane.insert(s.on[k], s.on[k + 1], step, facing);
+      for (std::size_t k = 0; k + 1 < on.size(); ++k) plane.insert(on[k], on[k + 1], step, facing);
     }
     plane.make_round();
     cluster_.pieces = plane.covered();
@@ -293,6 +311,10 @@ class ClusterWork {
   /// Whether they cross between their ends.
   bool meet(const std::size_t i, const std::size_t j) {
     Segment &a = cluster_.segments[i], &b = cluster_.segments[j];
+    for (const auto& [shared, end] : {std::pair(a.from, a.to), std::pair(a.to, a.from)})
+      if ((shared == b.from || shared == b.to) &&
+          turn(shared, end, shared == b.from ? b.to : b.from) != 0)
+        return false;
     const int from = turn(a.from, a.to, b.from), to = turn(a.from, a.to, b.to);
     if (from * to > 0) return false;
     const int back_from = turn(b.from, b.to, a.from), back_to = turn(b.from, b.to, a.to);

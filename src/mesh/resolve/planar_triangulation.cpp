@@ -110,15 +110,20 @@ PlanarTriangulation::Place PlanarTriangulation::next_about(const Place place) co
   return {next, corners[0] == corner ? 0u : corners[1] == corner ? 1u : 2u};
 }
 
-/// The edge ab; no cell where there is none. `a` is no point of the frame.
+/// The edge ab; no cell where there is none. `a` is no point of the frame. About b, too, unless it
+/// is one: the end with fewer edges decides.
 PlanarTriangulation::Place PlanarTriangulation::edge_between(const std::uint32_t a,
                                                              const std::uint32_t b) const {
-  const Place first = place_of(a);
-  Place at = first;
+  const Place about_a = place_of(a), about_b = place_of(b);
+  Place at = about_a, at_b = about_b;
   do {
     if (cells_[at.cell].corner[after(at.corner)] == b) return {at.cell, before(at.corner)};
     at = next_about(at);
-  } while (at.cell != first.cell);
+    if (is_frame(b)) continue;
+    if (cells_[at_b.cell].corner[before(at_b.corner)] == a) return {at_b.cell, after(at_b.corner)};
+    at_b = next_about(at_b);
+    if (at_b.cell == about_b.cell) break;
+  } while (at.cell != about_a.cell);
   return {kNoIndex, 0};
 }
 
