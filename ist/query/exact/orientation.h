@@ -68,10 +68,10 @@ IST_HD inline Determinant exact_determinant(const Point& r1, const Point& r0, co
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
-/// The same, in doubles where these are certain.
-IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
-                                      const Point& u0, const Point& v1, const Point& v0, int moved,
-                                      const Point& aside) {
+/// The same in doubles: sign 0 where these are not certain.
+IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0, const Point& u1,
+                                               const Point& u0, const Point& v1, const Point& v0,
+                                               int moved, const Point& aside) {
   const Point r = r1 - r0, u = u1 - u0, v = v1 - v0;
   const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                bz = u.y * v.x;
@@ -81,9 +81,16 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
   const double value = dot(r, n), shift = moved * dot(aside, n);
   const double error = kFilter * absolute_dot(r, size);
   const double signed_value = value + shift;
-  if (std::abs(signed_value) > error + kFilter * absolute_dot(aside, size))
-    return {value, error, signed_value > 0 ? 1 : -1};
-  return exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
+  const bool certain = std::abs(signed_value) > error + kFilter * absolute_dot(aside, size);
+  return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+}
+
+/// The same, in doubles where these are certain.
+IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
+                                      const Point& u0, const Point& v1, const Point& v0, int moved,
+                                      const Point& aside) {
+  const Determinant found = filtered_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
+  return found.sign != 0 ? found : exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
