@@ -14,7 +14,9 @@ namespace ist::gpu {
 /// what that leaves undecided with exact signs and more memory; and what needs still more, by few.
 constexpr int kExactPasses = 3;
 /// [bytes] of a team's room beside what the largest mesh takes.
-constexpr std::size_t kExactRooms[kExactPasses] = {24u << 10, 96u << 10, 4u << 20};
+IST_HD constexpr std::size_t exact_room(int pass) {
+  return pass == 0 ? 24u << 10 : pass == 1 ? 96u << 10 : 4u << 20;
+}
 
 /// Zero at first.
 struct ExactCounters {
@@ -93,10 +95,10 @@ struct ExactArrays : SolidPairs {
   std::uint32_t most_blocks;  ///< of a solid's mesh
 
   IST_HD std::size_t bytes_of_team(int pass) const {
-    return ExactRoom::fixed(most_blocks) + kExactRooms[pass];
+    return ExactRoom::fixed(most_blocks) + exact_room(pass);
   }
   IST_HD ExactRoom room(int pass, std::uint32_t team) const {
-    return ExactRoom::at(rooms + team * bytes_of_team(pass), most_blocks, kExactRooms[pass]);
+    return ExactRoom::at(rooms + team * bytes_of_team(pass), most_blocks, exact_room(pass));
   }
 };
 

@@ -8,14 +8,15 @@
 namespace ist::gpu {
 
 /// What lies inside of each mesh once all crossings are known, and what it adds to the sums.
-template <class Team>
+template <class Team, bool kExactly>
 class ExactInsides {
  public:
   IST_HD ExactInsides(const Team& team, ExactMemory& memory, const ExactRoom& room,
                       std::uint32_t records, bool crossed)
       : team_(team), memory_(memory), room_(room), records_(records), crossed_(crossed) {}
 
-  IST_HD void run() {
+  /// False where doubles do not tell what is inside.
+  IST_HD bool run() {
     settle();
     for (int side = 0; side < 2; ++side) {
       const MeshTree& mesh = memory_.mesh[side];
@@ -23,6 +24,7 @@ class ExactInsides {
       sum_inside(side, static_cast<std::uint32_t>(mesh.top) << kShift);
     }
     sum_records();
+    return !unsure_;
   }
 
  private:
@@ -41,7 +43,8 @@ class ExactInsides {
     const MeshOfPair solid =
         side == 1 ? MeshOfPair{other}
                   : MeshOfPair{other, &memory_.place.a_from_b, &memory_.place.b_from_a};
-    return is_inside(team_, solid, place(side, vertex), memory_.aside, memory_.stack);
+    return is_inside<kExactly>(team_, solid, place(side, vertex), memory_.aside, memory_.stack,
+                               unsure_);
   }
 
   /// Which vertices of records are inside.
@@ -271,6 +274,7 @@ class ExactInsides {
   const ExactRoom& room_;
   std::uint32_t records_;
   bool crossed_;  ///< there is an origin
+  bool unsure_ = false;
 };
 
 }  // namespace ist::gpu

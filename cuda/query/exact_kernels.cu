@@ -60,7 +60,7 @@ void find_exact_grids(Grids& grids) {
 }
 
 std::size_t least_exact_bytes(std::uint32_t most_blocks) {
-  return kWarps * (ExactRoom::fixed(most_blocks) + kExactRooms[kExactPasses - 1]);
+  return kWarps * (ExactRoom::fixed(most_blocks) + exact_room(kExactPasses - 1));
 }
 
 void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream) {

@@ -23,32 +23,12 @@ struct PiercingEdge {
   double height_p, height_q, error;
 };
 
-/// Signs of determinants in doubles or, with `kExactly`, whatever it takes.
-template <bool kExactly>
-struct PairSigns {
-  IST_HD_COLD static exact::Determinant exactly(const exact::Point& r1, const exact::Point& r0,
-                                                const exact::Point& u1, const exact::Point& u0,
-                                                const exact::Point& v1, const exact::Point& v0,
-                                                int moved, const exact::Point& aside) {
-    return exact::exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
-  }
-  IST_HD static exact::Determinant of(const exact::Point& r1, const exact::Point& r0,
-                                      const exact::Point& u1, const exact::Point& u0,
-                                      const exact::Point& v1, const exact::Point& v0, int moved,
-                                      const exact::Point& aside) {
-    exact::Determinant found = exact::filtered_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
-    if constexpr (kExactly)
-      if (found.sign == 0) found = exactly(r1, r0, u1, u0, v1, v0, moved, aside);
-    return found;
-  }
-};
-
 /// Heights of corners over the other triangle's plane.
 template <bool kExactly>
 IST_HD inline exact::Determinant height_of(const exact::Point& p, const exact::Point (&plane)[3],
                                            bool of_b, const exact::Point& aside) {
-  return PairSigns<kExactly>::of(p, plane[0], plane[1], plane[0], plane[2], plane[0], of_b ? 1 : -1,
-                                 aside);
+  return exact::determinant_of<kExactly>(p, plane[0], plane[1], plane[0], plane[2], plane[0],
+                                         of_b ? 1 : -1, aside);
 }
 
 /// Whether doubles tell that a plane keeps them apart, B moved aside.
@@ -93,7 +73,7 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
     for (int j = 0; j < 3; ++j) {
       if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
       const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
-      const int sign = PairSigns<kExactly>::of(r, p, q, p, s, r, 1, aside).sign;
+      const int sign = exact::determinant_of<kExactly>(r, p, q, p, s, r, 1, aside).sign;
       unsure = unsure || sign == 0;
       positive[i] |= (sign > 0 ? 1u : 0u) << j;
     }

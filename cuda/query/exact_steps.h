@@ -171,12 +171,13 @@ IST_HD ExactState ask_exactly(const Team& team, const ExactArrays& batch, std::u
   const std::uint32_t blocks = ExactSearch<Team>(team, memory, room).run(visits);
   if (blocks == kNoRoom) return ExactState::no_room;
   ExactCrossings<Team, kExactly> crossings(team, memory, room);
-  const ExactState state = crossings.run(blocks);
-  if (state == ExactState::ok) {
-    team.sync();
-    ExactInsides<Team>(team, memory, room, crossings.records(), crossings.count() > 0).run();
-    write_exact(team, batch, i, memory, visits, crossings.count());
-  }
+  ExactState state = crossings.run(blocks);
+  team.sync();
+  if (state == ExactState::ok &&
+      !ExactInsides<Team, kExactly>(team, memory, room, crossings.records(), crossings.count() > 0)
+           .run())
+    state = ExactState::unsure;
+  if (state == ExactState::ok) write_exact(team, batch, i, memory, visits, crossings.count());
   clear_room(team, room, crossings.records());
   return state;
 }

@@ -27,10 +27,11 @@ struct InsideStack {
 
 /// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
 /// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one
-/// way or the other. All of a team together; `stack` is what its lanes share.
-template <class Team>
+/// way or the other. All of a team together; `stack` is what its lanes share. `unsure`: doubles do
+/// not tell, without `kExactly`.
+template <bool kExactly, class Team>
 IST_HD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Point& p,
-                      const exact::Point& aside, InsideStack& stack) noexcept {
+                      const exact::Point& aside, InsideStack& stack, bool& unsure) noexcept {
   using exact::Point;
   const MeshTree& mesh = solid.mesh;
   const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
@@ -66,6 +67,7 @@ IST_HD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Po
   const Point q = solid.is_b() ? map_point(*solid.to_a, beyond) : beyond;
 
   constexpr std::uint32_t kNumber = (1u << 28) - 1;
+  bool doubtful = false;
   int entered = 0, waiting = 1;
   if (team.lane() == 0) stack.node[0] = static_cast<std::uint32_t>(mesh.top) << 28;
   team.sync();
@@ -77,7 +79,7 @@ IST_HD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Po
         const Point corners[3] = {solid.place(block.vertex[block.corner[0][t]]),
                                   solid.place(block.vertex[block.corner[1][t]]),
                                   solid.place(block.vertex[block.corner[2][t]])};
-        entered += exact::enters(p, q, corners, !solid.is_b(), aside);
+        entered += exact::enters<kExactly>(p, q, corners, !solid.is_b(), aside, doubtful);
       }
       continue;
     }
@@ -96,6 +98,7 @@ IST_HD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Po
     }
     team.sync();
   }
+  if constexpr (!kExactly) unsure = team.any(doubtful) || unsure;
   return team.sum(entered) < 0;
 }
 

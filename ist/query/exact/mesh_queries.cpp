@@ -127,7 +127,8 @@ class Way {
 
 bool is_inside(const MeshOfPair& solid, const Point& p, const Point& aside) noexcept {
   InsideStack stack;
-  return is_inside(SerialTeam(), solid, p, aside, stack);
+  bool unsure = false;
+  return is_inside<true>(SerialTeam(), solid, p, aside, stack, unsure);
 }
 
 MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept {
