@@ -24,7 +24,7 @@ struct ExactCounters {
   std::uint32_t taken[kExactPasses];
 };
 
-/// A block of which triangles may cross others.
+/// A block of which triangles cross others.
 struct CrossedRef {
   std::uint32_t block;
   std::uint16_t inside;  ///< a bit a local vertex
@@ -46,6 +46,7 @@ struct CrossedRef {
 /// A team's memory on the device.
 struct ExactRoom {
   std::uint32_t* record[2];   ///< [blocks] of a block of A, of B: its record + 1; 0: none
+  std::uint32_t* near[2];     ///< a bit a block: boxes of triangles meet others
   std::uint32_t* pierced[2];  ///< a bit a block: edges of it are pierced
   std::uint32_t* inside[2];   ///< a bit a block: no edge is pierced, and it lies inside
   std::uint32_t* flood;       ///< [blocks]
@@ -58,7 +59,7 @@ struct ExactRoom {
   /// What the largest mesh takes, of `blocks`: zero before a pass.
   IST_HD static std::size_t fixed(std::uint32_t blocks) {
     const std::size_t words = (blocks + 31) / 32;
-    return (4 * (3 * std::size_t{blocks} + 4 * words) + 255) / 256 * 256;
+    return (4 * (3 * std::size_t{blocks} + 6 * words) + 255) / 256 * 256;
   }
   IST_HD static ExactRoom at(std::byte* from, std::uint32_t blocks, std::size_t bytes) {
     ExactRoom room;
@@ -70,12 +71,13 @@ struct ExactRoom {
       return part;
     };
     for (auto& record : room.record) record = take(blocks);
+    for (auto& bits : room.near) bits = take(room.words);
     for (auto& bits : room.pierced) bits = take(room.words);
     for (auto& bits : room.inside) bits = take(room.words);
     room.flood = take(blocks);
     std::byte* const rest = from + fixed(blocks);
-    room.most_waiting = static_cast<std::uint32_t>(bytes / 8 / sizeof(std::uint64_t));
-    room.most_pairs = static_cast<std::uint32_t>(bytes / 4 / sizeof(std::uint64_t));
+    room.most_waiting = static_cast<std::uint32_t>(bytes / 6 / sizeof(std::uint64_t));
+    room.most_pairs = 2 * kWidth * kWidth;
     room.waiting = reinterpret_cast<std::uint64_t*>(rest);
     room.pairs = room.waiting + room.most_waiting;
     room.records = reinterpret_cast<CrossedRef*>(room.pairs + room.most_pairs);

@@ -24,11 +24,15 @@ class ExactCrossings {
   IST_HD ExactCrossings(const Team& team, ExactMemory& memory, const ExactRoom& room)
       : team_(team), memory_(memory), room_(room) {}
 
+  /// Of the first so many of the room's pairs of blocks; some triangles may wait still.
   IST_HD ExactState run(std::uint32_t block_pairs) {
     for (std::uint32_t n = 0; n < block_pairs && state_ == ExactState::ok; ++n) {
       const std::uint64_t pair = room_.pairs[n];
       meet(static_cast<std::uint32_t>(pair >> 32), static_cast<std::uint32_t>(pair));
     }
+    return state_;
+  }
+  IST_HD ExactState end() {
     while (queued_[0] > 0 && state_ == ExactState::ok) sift();
     while (queued_[1] > 0 && state_ == ExactState::ok) cross();
     return state_;
@@ -71,25 +75,26 @@ class ExactCrossings {
       }
     }
     team_.sync();
-    bool marked = false;
+    const ExactTriangles &a = memory_.triangles[0], &b = memory_.triangles[1];
     const float reach = memory_.slack;
-    for (int first = 0; first < static_cast<int>(kWidth * kWidth); first += Team::kWidth) {
+    const int pairs = narrow_sides(team_, memory_, a.low, a.high, b.low, b.high, reach, b.low,
+                                   b.high, a.low, a.high, reach);
+    bool marked = false;
+    for (int first = 0; first < pairs; first += Team::kWidth) {
       const int k = first + team_.lane();
-      const auto i = static_cast<std::uint32_t>(k) / kWidth,
-                 j = static_cast<std::uint32_t>(k) % kWidth;
-      bool meets = true;
+      const int columns = memory_.count[1];
+      const std::uint32_t i = k < pairs ? memory_.left[0][k / columns] : 0,
+                          j = k < pairs ? memory_.left[1][k % columns] : 0;
+      bool meets = k < pairs;
       for (int axis = 0; axis < 3; ++axis)
-        meets = meets &&
-                memory_.triangles[0].low[axis][i] - reach <= memory_.triangles[1].high[axis][j] &&
-                memory_.triangles[0].high[axis][i] + reach >= memory_.triangles[1].low[axis][j];
+        meets = meets && a.low[axis][i] - reach <= b.high[axis][j] &&
+                a.high[axis][i] + reach >= b.low[axis][j];
       const std::uint32_t added = push(0, meets, kWidth * block_a + i, kWidth * block_b + j);
       if (added == 0) continue;
-      if (!marked) {
-        marked = true;
-        mark(0, block_a);
-        mark(1, block_b);
-        if (state_ != ExactState::ok) return;
-      }
+      if (!marked && team_.lane() == 0)
+        for (int side = 0; side < 2; ++side)
+          room_.near[side][block[side] / 32] |= 1u << block[side] % 32;
+      marked = true;
       while (queued_[0] >= kBatch) {
         sift();
         if (state_ != ExactState::ok) return;
@@ -137,23 +142,26 @@ class ExactCrossings {
       corners[k] = place(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
 
-  /// A block of which triangles may cross others gets a record.
-  IST_HD void mark(int side, std::uint32_t block) {
-    std::uint32_t& at = room_.record[side][block];
-    const std::uint32_t known = at;
-    team_.sync();
-    if (known != 0) return;
-    if (records_ == room_.most_records) {
-      state_ = ExactState::no_room;
-      return;
+  /// Blocks of which triangles cross others get records, in the order of the lanes.
+  IST_HD void mark(int side, bool crosses, std::uint32_t block) {
+    for (;;) {
+      const bool fresh = crosses && room_.record[side][block] == 0;
+      int waiting = 0;
+      const int next = team_.first(fresh, waiting);
+      if (next < 0) return;
+      if (records_ == room_.most_records) {
+        state_ = ExactState::no_room;
+        return;
+      }
+      const std::uint32_t made = team_.broadcast(block, next);
+      auto* const words = reinterpret_cast<std::uint32_t*>(room_.records + records_);
+      constexpr int kWords = sizeof(CrossedRef) / 4;
+      for (int w = team_.lane(); w < kWords; w += Team::kWidth)
+        words[w] = w == 0 ? made : w == 1 ? static_cast<std::uint32_t>(side) << 16 : 0;
+      ++records_;
+      if (team_.lane() == 0) room_.record[side][made] = records_;
+      team_.sync();
     }
-    auto* const words = reinterpret_cast<std::uint32_t*>(room_.records + records_);
-    constexpr int kWords = sizeof(CrossedRef) / 4;
-    for (int w = team_.lane(); w < kWords; w += Team::kWidth)
-      words[w] = w == 0 ? block : w == 1 ? static_cast<std::uint32_t>(side) << 16 : 0;
-    ++records_;
-    if (team_.lane() == 0) at = records_;
-    team_.sync();
   }
 
   /// Leaves out what a plane keeps apart.
@@ -205,6 +213,10 @@ class ExactCrossings {
       team_.sync();
     }
     crossings_ += static_cast<std::uint32_t>(total);
+    for (int side = 0; side < 2; ++side) {
+      mark(side, crosses, pair[side] / kWidth);
+      if (state_ != ExactState::ok) return;
+    }
     if (crosses) add(pair, corner, end, at);
   }
 

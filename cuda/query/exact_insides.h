@@ -24,6 +24,7 @@ class ExactInsides {
       sum_inside(side, static_cast<std::uint32_t>(mesh.top) << kShift);
     }
     sum_records();
+    bound_near();
     return !unsure_;
   }
 
@@ -225,8 +226,16 @@ class ExactInsides {
         moved_layer(memory_.moved[side], found.area, found.width);
   }
 
-  /// Of triangles of crossed blocks the cones over the edges opposite to their apexes, and of the
-  /// blocks what rounding and deviations there do to the volume.
+  /// What rounding and deviations of blocks that are near the other surface do to the volume.
+  IST_HD void bound_near() {
+    for (int side = 0; side < 2; ++side)
+      for (std::uint32_t w = static_cast<std::uint32_t>(team_.lane()); w < room_.words;
+           w += static_cast<std::uint32_t>(Team::kWidth))
+        for (std::uint32_t left = room_.near[side][w]; left != 0; left &= left - 1)
+          bound(side, 32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
+  }
+
+  /// Of triangles of crossed blocks the cones over the edges opposite to their apexes.
   IST_HD void sum_records() {
     const std::uint32_t triangles = kWidth * records_;
     for (std::uint32_t n = static_cast<std::uint32_t>(team_.lane()); n < triangles;
@@ -235,7 +244,6 @@ class ExactInsides {
       const std::uint32_t t = n % kWidth;
       const int side = record.of_b;
       const MeshBlock& block = memory_.mesh[side].blocks[record.block];
-      if (t == 0) bound(side, record.block);
       if (t >= block.triangles || record.all_pierced() == 0) continue;
       const exact::Point corner[3] = {
           place(side, block.vertex[block.corner[0][t]]) - memory_.origin,

@@ -13,6 +13,8 @@ namespace {
 constexpr unsigned kSiftThreads = 128;
 constexpr unsigned kWarps = 2;
 constexpr unsigned kThreads = 32 * kWarps;
+constexpr int kBlocksEach =
+    8;  ///< a multiprocessor, of the first pass; more leave too few registers
 
 /// Places every pair and lists those whose boxes meet.
 __global__ void __launch_bounds__(kSiftThreads) sift_meshes(const ExactArrays batch) {
@@ -24,7 +26,8 @@ __global__ void __launch_bounds__(kSiftThreads) sift_meshes(const ExactArrays ba
 }
 
 template <int kPass>
-__global__ void __launch_bounds__(kThreads) cross_meshes(const ExactArrays batch) {
+__global__ void __launch_bounds__(kThreads, kPass == 0 ? kBlocksEach : 4)
+    cross_meshes(const ExactArrays batch) {
   // Shared memory runs no constructors.
   __shared__ alignas(16) std::byte bytes[kWarps][sizeof(ExactMemory)];
   const unsigned warp = threadIdx.x / 32;

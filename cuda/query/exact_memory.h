@@ -54,6 +54,8 @@ struct ExactMemory {
     ExactTriangles triangles[2];
     InsideStack stack;
   };
+  std::uint8_t left[2][kWidth];              ///< of each side what may meet the other
+  int count[2];                              ///< how many
   std::uint32_t queue[2][kExactWaiting][2];  ///< of each stage: triangles, 16 · block + lane
   double sum[ExactSum::kCount][32];
   // Of the pair's work so far; the first lane writes.

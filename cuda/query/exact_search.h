@@ -10,28 +10,84 @@ namespace ist::gpu {
 
 constexpr std::uint32_t kNoRoom = 0xFFFFFFFFu;
 
+/// The box around sixteen.
+template <class Team>
+struct BoxOfAll {
+  float low[3], high[3];
+  IST_HD BoxOfAll(const Team& team, const float (&lows)[3][kWidth],
+                  const float (&highs)[3][kWidth]) {
+    for (int k = 0; k < 3; ++k) {
+      float least = kExactFar, most = -kExactFar;
+      for (int l = team.lane(); l < static_cast<int>(kWidth); l += Team::kWidth) {
+        least = std::fmin(least, lows[k][l]);
+        most = std::fmax(most, highs[k][l]);
+      }
+      low[k] = team.min(least);
+      high[k] = team.max(most);
+    }
+  }
+};
+
+/// Lists of each side the boxes that come within `reach` of the box around all of the other side,
+/// which is in this side's frame; how many pairs are left. All of a team together.
+template <class Team>
+IST_HD int narrow_sides(const Team& team, ExactMemory& memory, const float (&low_a)[3][kWidth],
+                        const float (&high_a)[3][kWidth], const float (&low_by_a)[3][kWidth],
+                        const float (&high_by_a)[3][kWidth], float reach_a,
+                        const float (&low_b)[3][kWidth], const float (&high_b)[3][kWidth],
+                        const float (&low_by_b)[3][kWidth], const float (&high_by_b)[3][kWidth],
+                        float reach_b) {
+  const BoxOfAll<Team> by_a(team, low_by_a, high_by_a), by_b(team, low_by_b, high_by_b);
+  int left[2] = {0, 0};
+  constexpr int kBoth = 2 * static_cast<int>(kWidth);
+  for (int first = 0; first < kBoth; first += Team::kWidth) {
+    const int k = first + team.lane();
+    const bool of_b = k >= static_cast<int>(kWidth);
+    const auto l = static_cast<std::uint32_t>(k) % kWidth;
+    const float(&low)[3][kWidth] = of_b ? low_b : low_a;
+    const float(&high)[3][kWidth] = of_b ? high_b : high_a;
+    const float reach = of_b ? reach_b : reach_a;
+    bool meets = true;
+    for (int axis = 0; axis < 3; ++axis)
+      meets = meets && low[axis][l] - reach <= (of_b ? by_b : by_a).high[axis] &&
+              high[axis][l] + reach >= (of_b ? by_b : by_a).low[axis];
+    for (int side = 0; side < 2; ++side) {
+      int total = 0;
+      const bool mine = meets && of_b == (side == 1);
+      const int before = team.exclusive_count(mine, total);
+      if (mine) memory.left[side][left[side] + before] = static_cast<std::uint8_t>(l);
+      left[side] += total;
+    }
+  }
+  if (team.lane() == 0) memory.count[0] = left[0], memory.count[1] = left[1];
+  team.sync();
+  return left[0] * left[1];
+}
+
 /// Pairs of blocks of both meshes whose boxes and slabs meet: both trees are opened together.
 template <class Team>
 class ExactSearch {
  public:
   IST_HD ExactSearch(const Team& team, ExactMemory& memory, const ExactRoom& room)
-      : team_(team), memory_(memory), room_(room) {}
-
-  /// How many are in the room's list, in an order that the pair alone decides; kNoRoom. Counts the
-  /// pairs of nodes that it opens.
-  IST_HD std::uint32_t run(std::uint32_t& visits) {
+      : team_(team), memory_(memory), room_(room) {
     if (team_.lane() == 0)
       room_.waiting[0] =
           std::uint64_t{node_of(memory_.mesh[0].top, 0)} << 32 | node_of(memory_.mesh[1].top, 0);
-    waiting_ = 1;
-    visits = 0;
-    for (; waiting_ > 0; ++visits) {
+  }
+
+  /// How many are in the room's list now, in an order that the pair alone decides: all that are
+  /// left or as many as there is room for; kNoRoom.
+  IST_HD std::uint32_t next() {
+    found_ = 0;
+    for (; waiting_ > 0 && found_ + kWidth * kWidth <= room_.most_pairs; ++visits_) {
       team_.sync();
       if (!open(room_.waiting[waiting_ - 1])) return kNoRoom;
     }
     team_.sync();
     return found_;
   }
+  IST_HD bool ended() const { return waiting_ == 0; }
+  IST_HD std::uint32_t visits() const { return visits_; }  ///< pairs of nodes opened
 
  private:
   static constexpr int kLevelShift = 28;
@@ -68,12 +124,13 @@ class ExactSearch {
     team_.sync();
     const int below[2] = {level[0] - opens[0], level[1] - opens[1]};
     const bool leaves = below[0] == 0 && below[1] == 0;
-    const int rows = opens[0] ? static_cast<int>(kWidth) : 1;
-    for (int first = 0; first < rows * static_cast<int>(kWidth); first += Team::kWidth) {
+    const int pairs = narrow();
+    for (int first = 0; first < pairs; first += Team::kWidth) {
       const int k = first + team_.lane();
-      const auto i = static_cast<std::uint32_t>(k) / kWidth,
-                 j = static_cast<std::uint32_t>(k) % kWidth;
-      const bool meets = i < kWidth && meet(i, j);
+      const int columns = memory_.count[1];
+      const std::uint32_t i = k < pairs ? memory_.left[0][k / columns] : 0,
+                          j = k < pairs ? memory_.left[1][k % columns] : 0;
+      const bool meets = k < pairs && meet(i, j);
       int total = 0;
       const auto before = static_cast<std::uint32_t>(team_.exclusive_count(meets, total));
       if (total == 0) continue;
@@ -88,6 +145,14 @@ class ExactSearch {
       count += static_cast<std::uint32_t>(total);
     }
     return true;
+  }
+
+  /// Lists of each side the boxes that meet the box around all of the other side; how many pairs
+  /// are left.
+  IST_HD int narrow() {
+    const ExactBoxes &a = memory_.boxes[0], &b = memory_.boxes[1];
+    return narrow_sides(team_, memory_, a.low, a.high, b.other_low, b.other_high, memory_.reach[0],
+                        b.low, b.high, a.other_low, a.other_high, memory_.reach[1]);
   }
 
   IST_HD static std::uint32_t child(int level, std::uint32_t number, std::uint32_t l, bool opened) {
@@ -191,7 +256,7 @@ class ExactSearch {
   const Team& team_;
   ExactMemory& memory_;
   const ExactRoom& room_;
-  std::uint32_t waiting_ = 0, found_ = 0;
+  std::uint32_t waiting_ = 1, found_ = 0, visits_ = 0;
 };
 
 }  // namespace ist::gpu

@@ -158,7 +158,7 @@ IST_HD void clear_room(const Team& team, const ExactRoom& room, std::uint32_t re
   for (int side = 0; side < 2; ++side)
     for (std::uint32_t w = static_cast<std::uint32_t>(team.lane()); w < room.words;
          w += static_cast<std::uint32_t>(Team::kWidth))
-      room.pierced[side][w] = room.inside[side][w] = 0;
+      room.near[side][w] = room.pierced[side][w] = room.inside[side][w] = 0;
   team.sync();
 }
 
@@ -167,17 +167,22 @@ template <bool kExactly, class Team>
 IST_HD ExactState ask_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
                               const ExactRoom& room, ExactMemory& memory) {
   load_meshes(team, batch, i, memory);
-  std::uint32_t visits = 0;
-  const std::uint32_t blocks = ExactSearch<Team>(team, memory, room).run(visits);
-  if (blocks == kNoRoom) return ExactState::no_room;
+  ExactSearch<Team> search(team, memory, room);
   ExactCrossings<Team, kExactly> crossings(team, memory, room);
-  ExactState state = crossings.run(blocks);
+  ExactState state = ExactState::ok;
+  while (!search.ended() && state == ExactState::ok) {
+    const std::uint32_t blocks = search.next();
+    state = blocks == kNoRoom ? ExactState::no_room : crossings.run(blocks);
+    team.sync();
+  }
+  if (state == ExactState::ok) state = crossings.end();
   team.sync();
   if (state == ExactState::ok &&
       !ExactInsides<Team, kExactly>(team, memory, room, crossings.records(), crossings.count() > 0)
            .run())
     state = ExactState::unsure;
-  if (state == ExactState::ok) write_exact(team, batch, i, memory, visits, crossings.count());
+  if (state == ExactState::ok)
+    write_exact(team, batch, i, memory, search.visits(), crossings.count());
   clear_room(team, room, crossings.records());
   return state;
 }

@@ -58,13 +58,17 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
                      vz = difference(v1.z, v0.z);
-  const Expansion<16> x = minor(uy, vz, uz, vy);
-  const Expansion<16> y = minor(uz, vx, ux, vz);
+  // In steps, so that few expansions are held at a time: on a GPU they lie in memory of each
+  // thread.
+  Expansion<64> shift_xy;
+  const auto xy = [&] {
+    const Expansion<16> x = minor(uy, vz, uz, vy), y = minor(uz, vx, ux, vz);
+    shift_xy = sum(scaled(x, aside.x), scaled(y, aside.y));
+    return sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y)));
+  }();
   const Expansion<16> z = minor(ux, vy, uy, vx);
-  const auto det = sum(sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y))),
-                       product(z, difference(r1.z, r0.z)));
-  const auto shift = sum(sum(scaled(x, aside.x), scaled(y, aside.y)), scaled(z, aside.z));
-  const int sign = sum(det, shift, moved).sign();
+  const auto det = [&] { return sum(xy, product(z, difference(r1.z, r0.z))); }();
+  const int sign = sign_of_sum(det, sum(shift_xy, scaled(z, aside.z)), moved);
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
