@@ -24,17 +24,25 @@ class ExactCrossings {
   IST_HD ExactCrossings(const Team& team, ExactMemory& memory, const ExactRoom& room)
       : team_(team), memory_(memory), room_(room) {}
 
-  /// Of the first so many of the room's pairs of blocks; some triangles may wait still.
-  IST_HD ExactState run(std::uint32_t block_pairs) {
-    for (std::uint32_t n = 0; n < block_pairs && state_ == ExactState::ok; ++n) {
-      const std::uint64_t pair = room_.pairs[n];
-      meet(static_cast<std::uint32_t>(pair >> 32), static_cast<std::uint32_t>(pair));
+  /// Of the first so many of the room's pairs of blocks; some triangles may wait still, unless it
+  /// `ends`. All in one loop: the code of each stage is there once and stays in the instruction
+  /// cache.
+  IST_HD ExactState run(std::uint32_t block_pairs, bool ends) {
+    std::uint32_t next = 0;
+    pairs_ = at_ = 0;
+    while (state_ == ExactState::ok) {
+      const bool last = ends && next == block_pairs && at_ >= pairs_;
+      if (queued_[1] >= kBatch || (last && queued_[0] == 0 && queued_[1] > 0))
+        cross();
+      else if (queued_[0] >= kBatch || (last && queued_[0] > 0))
+        sift();
+      else if (at_ < pairs_)
+        meet();
+      else if (next < block_pairs)
+        place_blocks(room_.pairs[next++]);
+      else
+        break;
     }
-    return state_;
-  }
-  IST_HD ExactState end() {
-    while (queued_[0] > 0 && state_ == ExactState::ok) sift();
-    while (queued_[1] > 0 && state_ == ExactState::ok) cross();
     return state_;
   }
 
@@ -46,8 +54,11 @@ class ExactCrossings {
   static_assert(kExactWaiting >= 2 * kBatch || kBatch < kWidth);
 
   /// Boxes of the triangles of two blocks.
-  IST_HD void meet(std::uint32_t block_a, std::uint32_t block_b) {
-    const std::uint32_t block[2] = {block_a, block_b};
+  IST_HD void place_blocks(std::uint64_t pair) {
+    const std::uint32_t block[2] = {static_cast<std::uint32_t>(pair >> 32),
+                                    static_cast<std::uint32_t>(pair)};
+    block_[0] = block[0];
+    block_[1] = block[1];
     team_.sync();
     constexpr int kBoth = 2 * static_cast<int>(kWidth);
     for (int k = team_.lane(); k < kBoth; k += Team::kWidth) {
@@ -76,30 +87,29 @@ class ExactCrossings {
     }
     team_.sync();
     const ExactTriangles &a = memory_.triangles[0], &b = memory_.triangles[1];
+    at_ = 0;
+    pairs_ = narrow_sides(team_, memory_, a.low, a.high, b.low, b.high, memory_.slack, b.low,
+                          b.high, a.low, a.high, memory_.slack);
+    marked_ = false;
+  }
+
+  /// The next of their pairs of triangles whose boxes meet.
+  IST_HD void meet() {
+    const ExactTriangles &a = memory_.triangles[0], &b = memory_.triangles[1];
     const float reach = memory_.slack;
-    const int pairs = narrow_sides(team_, memory_, a.low, a.high, b.low, b.high, reach, b.low,
-                                   b.high, a.low, a.high, reach);
-    bool marked = false;
-    for (int first = 0; first < pairs; first += Team::kWidth) {
-      const int k = first + team_.lane();
-      const int columns = memory_.count[1];
-      const std::uint32_t i = k < pairs ? memory_.left[0][k / columns] : 0,
-                          j = k < pairs ? memory_.left[1][k % columns] : 0;
-      bool meets = k < pairs;
-      for (int axis = 0; axis < 3; ++axis)
-        meets = meets && a.low[axis][i] - reach <= b.high[axis][j] &&
-                a.high[axis][i] + reach >= b.low[axis][j];
-      const std::uint32_t added = push(0, meets, kWidth * block_a + i, kWidth * block_b + j);
-      if (added == 0) continue;
-      if (!marked && team_.lane() == 0)
-        for (int side = 0; side < 2; ++side)
-          room_.near[side][block[side] / 32] |= 1u << block[side] % 32;
-      marked = true;
-      while (queued_[0] >= kBatch) {
-        sift();
-        if (state_ != ExactState::ok) return;
-      }
-    }
+    const int k = at_ + team_.lane(), columns = memory_.count[1];
+    const std::uint32_t i = k < pairs_ ? memory_.left[0][k / columns] : 0,
+                        j = k < pairs_ ? memory_.left[1][k % columns] : 0;
+    bool meets = k < pairs_;
+    for (int axis = 0; axis < 3; ++axis)
+      meets = meets && a.low[axis][i] - reach <= b.high[axis][j] &&
+              a.high[axis][i] + reach >= b.low[axis][j];
+    at_ += Team::kWidth;
+    if (push(0, meets, kWidth * block_[0] + i, kWidth * block_[1] + j) == 0 || marked_) return;
+    marked_ = true;
+    if (team_.lane() == 0)
+      for (int side = 0; side < 2; ++side)
+        room_.near[side][block_[side] / 32] |= 1u << block_[side] % 32;
   }
 
   /// Appends to a stage's queue, in the order of the lanes; how many.
@@ -138,6 +148,7 @@ class ExactCrossings {
   }
   IST_HD void load(int side, std::uint32_t triangle, exact::Point (&corners)[3]) const {
     const MeshBlock& block = in_global_memory(memory_.mesh[side].blocks)[triangle / kWidth];
+    IST_ROLLED
     for (int k = 0; k < 3; ++k)
       corners[k] = place(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
@@ -168,14 +179,23 @@ class ExactCrossings {
   IST_HD void sift() {
     std::uint32_t pair[2];
     bool left = pop(0, pair);
-    if (left) {
-      exact::Point a[3], b[3];
-      load(0, pair[0], a);
-      load(1, pair[1], b);
-      left = !are_apart(a, b, memory_.aside);
-    }
+    if (left) left = !(is_beside(1, pair) || is_beside(0, pair));
     push(1, left, pair[0], pair[1]);
-    if (queued_[1] >= kBatch) cross();
+  }
+
+  /// Whether doubles tell that a side's triangle lies on one side of the other's plane, B moved
+  /// aside.
+  IST_HD bool is_beside(int side, const std::uint32_t (&pair)[2]) const {
+    exact::Point plane[3];
+    load(1 - side, pair[1 - side], plane);
+    const MeshBlock& block = in_global_memory(memory_.mesh[side].blocks)[pair[side] / kWidth];
+    int sum = 0;
+    IST_ROLLED
+    for (int k = 0; k < 3; ++k) {
+      const exact::Point p = place(side, block.vertex[block.corner[k][pair[side] % kWidth]]);
+      sum += height_of<false>(p, plane, side == 1, memory_.aside).sign;
+    }
+    return sum == 3 || sum == -3;
   }
 
   IST_HD void cross() {
@@ -274,6 +294,9 @@ class ExactCrossings {
   ExactMemory& memory_;
   const ExactRoom& room_;
   ExactState state_ = ExactState::ok;
+  std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
+  int at_ = 0, pairs_ = 0;           ///< pairs of them
+  bool marked_ = false;
   std::uint32_t head_[2] = {0, 0}, queued_[2] = {0, 0};
   std::uint32_t crossings_ = 0, records_ = 0;
 };

@@ -31,17 +31,6 @@ IST_HD inline exact::Determinant height_of(const exact::Point& p, const exact::P
                                          of_b ? 1 : -1, aside);
 }
 
-/// Whether doubles tell that a plane keeps them apart, B moved aside.
-IST_HD inline bool are_apart(const exact::Point (&a)[3], const exact::Point (&b)[3],
-                             const exact::Point& aside) {
-  const auto apart = [&](const exact::Point(&plane)[3], const exact::Point(&of)[3], bool of_b) {
-    int sum = 0;
-    for (int k = 0; k < 3; ++k) sum += height_of<false>(of[k], plane, of_b, aside).sign;
-    return sum == 3 || sum == -3;
-  };
-  return apart(a, b, true) || apart(b, a, false);
-}
-
 /// Where they cross, the edges that leave at the start of the segment that they share, and at its
 /// end: A's edges leave B at the start and enter it at the end; B's enter A at the start.
 template <bool kExactly>
@@ -52,11 +41,13 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
   const auto alike = [](const exact::Determinant(&h)[3]) {
     return h[0].sign == h[1].sign && h[1].sign == h[2].sign && h[0].sign != 0;
   };
+  // Loops stay rolled: what runs seldom must not crowd the device's instruction cache.
+  IST_ROLLED
   for (int s = 1; s >= 0; --s) {
+    IST_ROLLED
     for (int k = 0; k < 3; ++k) {
       exact::Determinant& h = height[s][k];
-      h = s == 1 ? height_of<kExactly>(b[k], a, true, aside)
-                 : height_of<kExactly>(a[k], b, false, aside);
+      h = height_of<kExactly>(s == 1 ? b[k] : a[k], s == 1 ? a : b, s == 1, aside);
       unsure = unsure || h.sign == 0;
       // Where moving aside decides, the plane may lie on the other side of the corner.
       if (h.value * h.sign < 0) h.error += std::abs(h.value);
@@ -65,11 +56,14 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
   }
   if (unsure) return PairSays::unsure;
   std::uint32_t parts[2] = {0, 0};  // edges that go through the other's plane
+  IST_ROLLED
   for (int s = 0; s < 2; ++s)
     for (int k = 0; k < 3; ++k)
       parts[s] |= (height[s][k].sign != height[s][(k + 1) % 3].sign ? 1u : 0u) << k;
   std::uint32_t positive[3] = {0, 0, 0};  // of A's edge, a bit an edge of B's: the way round
+  IST_ROLLED
   for (int i = 0; i < 3; ++i)
+    IST_ROLLED
     for (int j = 0; j < 3; ++j) {
       if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
       const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
@@ -86,7 +80,9 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
         (positive[0] >> k & 1) + (positive[1] >> k & 1) + (positive[2] >> k & 1);
     return bits == 0 || bits == 3;
   };
+  IST_ROLLED
   for (int s = 0; s < 2; ++s)
+    IST_ROLLED
     for (int k = 0; k < 3; ++k) {
       if (!pierces(s, k)) continue;
       const int next = (k + 1) % 3;

@@ -13,7 +13,7 @@
 
 namespace ist::gpu {
 
-IST_HD inline bool place_exactly(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
+IST_HD_COLD bool place_exactly(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
   return place.place(solid_of(batch, batch.pairs.a, i).frame, pose_of(batch.pairs.a, i),
                      scale_of(batch.pairs.a, i), solid_of(batch, batch.pairs.b, i).frame,
                      pose_of(batch.pairs.b, i), scale_of(batch.pairs.b, i));
@@ -172,10 +172,9 @@ IST_HD ExactState ask_exactly(const Team& team, const ExactArrays& batch, std::u
   ExactState state = ExactState::ok;
   while (!search.ended() && state == ExactState::ok) {
     const std::uint32_t blocks = search.next();
-    state = blocks == kNoRoom ? ExactState::no_room : crossings.run(blocks);
+    state = blocks == kNoRoom ? ExactState::no_room : crossings.run(blocks, search.ended());
     team.sync();
   }
-  if (state == ExactState::ok) state = crossings.end();
   team.sync();
   if (state == ExactState::ok &&
       !ExactInsides<Team, kExactly>(team, memory, room, crossings.records(), crossings.count() > 0)

@@ -30,8 +30,8 @@ struct InsideStack {
 /// way or the other. All of a team together; `stack` is what its lanes share. `unsure`: doubles do
 /// not tell, without `kExactly`.
 template <bool kExactly, class Team>
-IST_HD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Point& p,
-                      const exact::Point& aside, InsideStack& stack, bool& unsure) noexcept {
+IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Point& p,
+                           const exact::Point& aside, InsideStack& stack, bool& unsure) noexcept {
   using exact::Point;
   const MeshTree& mesh = solid.mesh;
   const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;

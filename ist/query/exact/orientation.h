@@ -72,21 +72,28 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
-/// The same in doubles: sign 0 where these are not certain.
+/// The same in doubles, of rounded differences: sign 0 where these are not certain. `shift`: aside,
+/// or its opposite where r0 moves.
+IST_HD_ONCE inline Determinant filtered_determinant(double rx, double ry, double rz, double ux,
+                                                    double uy, double uz, double vx, double vy,
+                                                    double vz, double shift_x, double shift_y,
+                                                    double shift_z) {
+  const Point r = {rx, ry, rz}, by = {shift_x, shift_y, shift_z};
+  const double ax = uy * vz, bx = uz * vy, ay = uz * vx, by_ = ux * vz, az = ux * vy, bz = uy * vx;
+  const Point n = {ax - bx, ay - by_, az - bz};
+  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by_),
+                      std::abs(az) + std::abs(bz)};
+  const double value = dot(r, n);
+  const double error = kFilter * absolute_dot(r, size);
+  const double signed_value = value + dot(by, n);
+  const bool certain = std::abs(signed_value) > error + kFilter * absolute_dot(by, size);
+  return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+}
 IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0, const Point& u1,
                                                const Point& u0, const Point& v1, const Point& v0,
                                                int moved, const Point& aside) {
-  const Point r = r1 - r0, u = u1 - u0, v = v1 - v0;
-  const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
-               bz = u.y * v.x;
-  const Point n = {ax - bx, ay - by, az - bz};
-  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by),
-                      std::abs(az) + std::abs(bz)};
-  const double value = dot(r, n), shift = moved * dot(aside, n);
-  const double error = kFilter * absolute_dot(r, size);
-  const double signed_value = value + shift;
-  const bool certain = std::abs(signed_value) > error + kFilter * absolute_dot(aside, size);
-  return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+  const Point r = r1 - r0, u = u1 - u0, v = v1 - v0, by = moved * aside;
+  return filtered_determinant(r.x, r.y, r.z, u.x, u.y, u.z, v.x, v.y, v.z, by.x, by.y, by.z);
 }
 
 /// The same, in doubles where these are certain.
