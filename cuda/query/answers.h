@@ -19,6 +19,7 @@ struct PenetrationRow : WorldSums {
   Vec3 force, torque;  ///< on B
   QueryStatus status;
   std::uint32_t node_visits, sphere_pairs;
+  double volume_min, volume_max;
 };
 
 struct SeparationRow {
@@ -86,9 +87,10 @@ IST_HD inline WorldSums world_sums(const PairPlace& place, const LensTotals& tot
 
 IST_HD inline void write_answer(const GpuPenetrations& to, std::uint32_t i, const WorldSums& sums,
                                 const LensTotals& totals) {
-  write_row(to, i,
-            PenetrationRow{sums, -sums.translation_gradient, -sums.rotation_gradient,
-                           QueryStatus::ok, totals.visits, totals.spheres});
+  write_row(
+      to, i,
+      PenetrationRow{sums, -sums.translation_gradient, -sums.rotation_gradient, QueryStatus::ok,
+                     totals.visits, totals.spheres, sums.volume, sums.volume});
 }
 
 }  // namespace ist::gpu

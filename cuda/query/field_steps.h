@@ -17,6 +17,10 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   const FieldSides sides(batch, i);
   const FieldRef& field = solid_of(batch, sides.field, i).field;
   const SolidRef& asset = solid_of(batch, sides.tree, i);
+  if (!asset.has_spheres()) {
+    write_nothing(batch.answers, i, QueryStatus::not_held);
+    return -1;
+  }
   PairPlace place;
   if (field.kind == FieldKind::unusable || !place_pair(batch, sides.field, sides.tree, i, place)) {
     write_nothing(batch.answers, i, QueryStatus::invalid_input);

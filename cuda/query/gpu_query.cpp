@@ -82,8 +82,9 @@ struct GpuSolids::Impl {
   std::size_t size = 0;
   bool has_fields = false;
   bool has_group[gpu::kFieldGroups] = {};
-  bool has_details = false;     ///< some asset has coarser levels
-  std::uint32_t most_bins = 0;  ///< of a tree's contacts
+  bool has_details = false;       ///< some asset has coarser levels
+  std::uint32_t most_bins = 0;    ///< of a tree's contacts
+  std::uint32_t most_blocks = 0;  ///< of a mesh
 };
 
 struct GpuWorkspace::Impl {
@@ -95,6 +96,7 @@ struct GpuWorkspace::Impl {
   gpu::BatchArrays arrays{};
   gpu::SeparationArrays separations{};
   gpu::PatchArrays patches{};
+  gpu::ExactArrays exact{};
   std::size_t patch_room = 0;  ///< [bytes] at patches.rooms
   gpu::FieldCounters* field_counters = nullptr;
   gpu::TriangleRoom triangle_room{};
@@ -143,6 +145,7 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
     impl_->has_details = impl_->has_details || solid.details.coarser > 0;
     for (const gpu::CutsRef& cuts : solid.cuts)
       impl_->most_bins = std::max(impl_->most_bins, cuts.bins);
+    impl_->most_blocks = std::max(impl_->most_blocks, solid.mesh.count);
   }
   queue.wait();
 }
@@ -220,6 +223,15 @@ void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room)
   arrays.rooms = from + parts.used();
 }
 
+/// Likewise.
+void place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
+  gpu::Parts parts(from);
+  room.exact.counters = parts.take<gpu::ExactCounters>(1);
+  for (std::uint32_t*& list : room.exact.list) list = parts.take<std::uint32_t>(room.most_pairs);
+  room.exact.room_bytes = bytes - parts.used();
+  room.exact.rooms = from + parts.used();
+}
+
 /// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take. All kinds
 /// of batches have the same memory, but for flags that stay 0 between them.
 std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
@@ -230,6 +242,7 @@ std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
   const std::size_t bytes =
       std::max(place_penetrations(shared, room), place_separations(shared, room));
   place_patches(shared, bytes, room);
+  place_exact(shared, bytes, room);
   return flags.used() + bytes;
 }
 
@@ -246,6 +259,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::find_separation_grids(impl_->grids);
   gpu::find_patch_grids(impl_->grids);
   gpu::find_field_grids(impl_->grids);
+  gpu::find_exact_grids(impl_->grids);
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
   gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kRoomForTasks * sizeof(std::uint32_t),
@@ -266,11 +280,11 @@ namespace {
 /// What all kinds of batches begin with; throws where a batch cannot be launched.
 gpu::SolidPairs asked_of(const GpuSolids& solids, const GpuPairs& pairs,
                          const GpuWorkspace::Impl& room, Measure measure,
-                         const GpuPenetrations& answers) {
-  if (measure != Measure::matched && measure != Measure::inner)
-    throw Error(
-        "GPU: batches support the matched and the inner measure only: use the CPU for the exact "
-        "measure");
+                         const GpuPenetrations& answers, Measure last = Measure::inner) {
+  if (measure > last)
+    throw Error(last == Measure::exact ? "GPU: a measure that has no name"
+                                       : "GPU: contact patches are of the matched and the inner "
+                                         "measure only: use the CPU for the exact measure");
   if (pairs.count > room.most_pairs)
     throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
                 std::to_string(room.most_pairs));
@@ -286,8 +300,17 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
-  const gpu::SolidPairs asked = asked_of(solids, pairs, room, settings.measure, answers);
+  const gpu::SolidPairs asked =
+      asked_of(solids, pairs, room, settings.measure, answers, Measure::exact);
   if (pairs.count == 0) return;
+  if (settings.measure == Measure::exact) {
+    gpu::ExactArrays batch = room.exact;
+    static_cast<gpu::SolidPairs&>(batch) = asked;
+    batch.most_blocks = solids.impl().most_blocks;
+    const gpu::DeviceGuard guard(room.device);
+    gpu::launch_exact(batch, room.grids, stream);
+    return;
+  }
   gpu::BatchArrays batch = room.arrays;
   static_cast<gpu::SolidPairs&>(batch) = asked;
   batch.pair_budget = settings.pair_budget;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 
+#include "cuda/query/exact_arrays.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
@@ -23,6 +24,7 @@ struct Grids {
   int divide;            ///< of contact patches
   int smooth;            ///< of trees in smooth fields
   TriangleGrids facets;  ///< of trees in boxes and terrains
+  int exact[kExactPasses];
 };
 
 /// Each sets the members of its kernels.
@@ -30,9 +32,13 @@ void find_batch_grids(Grids& grids);
 void find_separation_grids(Grids& grids);
 void find_patch_grids(Grids& grids);
 void find_field_grids(Grids& grids);
+void find_exact_grids(Grids& grids);
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
+void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream);
+/// [bytes] that the room of a batch takes at least; more is faster.
+std::size_t least_exact_bytes(std::uint32_t most_blocks);
 void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream);
 /// As many divide contacts as `room_bytes` hold the rooms of.
 void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,

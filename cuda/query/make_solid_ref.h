@@ -195,11 +195,16 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
   }
   const TreeView& asset = std::get<TreeView>(solids[i]);
   if (asset.empty()) refuse("an empty asset");
-  if (asset.sphere_count() == 0) refuse("an asset without spheres: bake it with spheres");
+  if (asset.sphere_count() == 0 && !asset.has_mesh())
+    refuse("an asset without spheres and without a mesh: bake it with either");
   const AssetHeader& header = asset.header();
   const auto* const here = reinterpret_cast<const std::byte*>(&header);
   const std::byte* const bytes = put(std::span(here, header.file_bytes));
   ref.frame = frame_of(header);
+  if (header.mesh != 0)
+    ref.mesh = MeshTree(header, *at<MeshHeader>(header, header.mesh)).copied_to(bytes, header);
+  ref.volume = std::ldexp(header.volume + header.volume_error, 3 * header.exponent);
+  if (asset.sphere_count() == 0) return ref;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
     const TreeHeader& tree = measure == Measure::inner ? header.inner_tree : header.matched_tree;
     const auto k = static_cast<int>(measure);

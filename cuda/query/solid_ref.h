@@ -7,6 +7,7 @@
 #include "cuda/query/node_sums.h"
 #include "cuda/query/tree_ref.h"
 #include "query/base/pair_place.h"
+#include "query/exact/mesh_tree.h"
 
 namespace ist::gpu {
 
@@ -19,8 +20,11 @@ struct SolidRef {
   CutsRef cuts[2];   ///< by Measure
   CoverRef cover;    ///< of the inner tree
   AssetDetails details;
+  MeshTree mesh;  ///< without a header: none is kept
+  double volume;  ///< [u³] at most
 
   IST_HD bool is_field() const { return field.kind != FieldKind::none; }
+  IST_HD bool has_spheres() const { return tree[0].leaf_blocks > 0; }
 };
 
 }  // namespace ist::gpu

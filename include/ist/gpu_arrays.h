@@ -42,7 +42,9 @@ struct GpuPenetrations {
   std::uint32_t* node_visits = nullptr;   ///< [count]
   std::uint32_t* sphere_pairs = nullptr;  ///< [count]
   double* force = nullptr;                ///< [count][3] [u²] −translation_gradient: on B
-  double* torque = nullptr;  ///< [count][3] [u³] −rotation_gradient: about B's origin
+  double* torque = nullptr;      ///< [count][3] [u³] −rotation_gradient: about B's origin
+  double* volume_min = nullptr;  ///< [count] [u³] of the true volume; by spheres: the volume
+  double* volume_max = nullptr;  ///< [count] [u³] likewise
 };
 
 /// Answers, each as in Separation: arrays in device memory. Null pointers: not wanted.

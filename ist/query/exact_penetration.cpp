@@ -9,6 +9,7 @@
 #include "query/base/solid_bounds.h"
 #include "query/contact/write_patches.h"
 #include "query/descent/workspace.h"
+#include "query/exact/exact_in_world.h"
 #include "query/exact/exact_octants.h"
 #include "query/exact/kept_mesh.h"
 #include "query/solid_queries.h"
@@ -24,27 +25,13 @@ Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
   return {mesh_a, moved_in_mesh(mesh_a), mesh_b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
 }
 
-/// Sums of an overlap or a part of it in world units, all but the volume's bounds.
-struct ExactInWorld {
-  double volume;
-  Eigen::Vector3d centroid, force, torque;
-
-  ExactInWorld(const ExactSums& sums, const exact::Point& origin, const RelativePose& pose) {
-    const double u = pose.unit_a, found = sums.volume();
-    volume = found * pose.unit3();
-    force = pose.rotation() * vector(sums.force) * (u * u);
-    centroid.setZero();
-    if (found != 0) centroid = pose.to_world(vector(origin) + vector(sums.moment) / (24 * found));
-    // The sums' origin from B's.
-    const Eigen::Vector3d arm =
-        pose.rotation() * ((vector(origin) - vector(pose.a_from_b.t)) * u) + vector(pose.offset_b);
-    torque = pose.rotation() * vector(sums.torque) * pose.unit3() + arm.cross(force);
-  }
-};
+ExactInWorld in_world(const ExactSums& sums, const exact::Point& origin, const PairPlace& place) {
+  return {sums.volume(), sums.moment, sums.force, sums.torque, origin, place};
+}
 
 Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const PlacedTree& b,
                          const RelativePose& pose) {
-  const ExactInWorld sums(found.sums, found.origin, pose);
+  const ExactInWorld sums = in_world(found.sums, found.origin, pose);
   Penetration answer;
   answer.volume = std::max(0.0, sums.volume);
   const double error = found.error * pose.unit3() + (answer.volume - sums.volume);
@@ -54,11 +41,11 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const P
   const double most = smaller_volume(a, b);
   for (double* const volume : {&answer.volume, &answer.volume_min, &answer.volume_max})
     *volume = std::min(*volume, most);
-  if (answer.volume > 0) answer.centroid = sums.centroid;
+  if (answer.volume > 0) answer.centroid = vector(sums.centroid);
   if (found.contact.area > 0)
     answer.centroid = pose.to_world(1 / found.contact.area * vector(found.contact.moment));
-  answer.translation_gradient = sums.force;
-  answer.rotation_gradient = sums.torque;
+  answer.translation_gradient = vector(sums.force);
+  answer.rotation_gradient = vector(sums.torque);
   answer.touching = found.contact.touching;
   answer.contact_area = found.contact.area * (pose.unit_a * pose.unit_a);
   // Normals that cancel leave what areas round.
@@ -140,14 +127,14 @@ std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
   std::uint32_t place[ExactScratch::kMostParts];
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
-    const ExactInWorld sums(parts[p].sums, origin, pose);
+    const ExactInWorld sums = in_world(parts[p].sums, origin, pose);
     ContactPatch& patch = patches[place[p] = count++];
     patch = {};
     patch.id = parts[p].id;
-    patch.centroid = sums.centroid;
+    patch.centroid = vector(sums.centroid);
     patch.volume = sums.volume;
-    patch.force = -sums.force;
-    patch.torque = -sums.torque;
+    patch.force = -vector(sums.force);
+    patch.torque = -vector(sums.torque);
   }
   for (ExactPart& part : parts) part.kept = place[part.kept];
   return count;

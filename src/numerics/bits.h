@@ -72,4 +72,12 @@ IST_HD inline int lowest_bit(std::uint32_t bits) {
 #endif
 }
 
+IST_HD inline int lowest_bit(std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  return __ffsll(static_cast<long long>(bits)) - 1;
+#else
+  return std::countr_zero(bits);
+#endif
+}
+
 }  // namespace ist

@@ -46,19 +46,28 @@ struct BatchColumns {
   std::vector<double> volume, centroid, push, turn;
   std::vector<QueryStatus> status;
   std::vector<std::uint32_t> visits, spheres;
+  std::vector<double> least, most;
 
   /// Room for answers of n pairs.
   static BatchColumns unwritten(std::size_t n) {
     constexpr double kUnwritten = -7;
-    return {std::vector<double>(n, kUnwritten), std::vector<double>(3 * n),
-            std::vector<double>(3 * n),         std::vector<double>(3 * n),
-            std::vector<QueryStatus>(n),        std::vector<std::uint32_t>(n),
-            std::vector<std::uint32_t>(n)};
+    return {std::vector<double>(n, kUnwritten),
+            std::vector<double>(3 * n),
+            std::vector<double>(3 * n),
+            std::vector<double>(3 * n),
+            std::vector<QueryStatus>(n),
+            std::vector<std::uint32_t>(n),
+            std::vector<std::uint32_t>(n),
+            std::vector<double>(n),
+            std::vector<double>(n)};
   }
 
   GpuPenetrations answers() {
-    return {volume.data(), centroid.data(), push.data(),   turn.data(),
-            status.data(), visits.data(),   spheres.data()};
+    GpuPenetrations to = {volume.data(), centroid.data(), push.data(),   turn.data(),
+                          status.data(), visits.data(),   spheres.data()};
+    to.volume_min = least.data();
+    to.volume_max = most.data();
+    return to;
   }
 
   std::vector<Penetration> rows() const {
@@ -68,6 +77,8 @@ struct BatchColumns {
     std::vector<Penetration> out(volume.size());
     for (std::size_t i = 0; i < out.size(); ++i) {
       out[i].volume = volume[i];
+      out[i].volume_min = least[i];
+      out[i].volume_max = most[i];
       out[i].centroid = vector(centroid, i);
       out[i].translation_gradient = vector(push, i);
       out[i].rotation_gradient = vector(turn, i);

@@ -72,7 +72,9 @@ class DeviceBatch {
         turn_(3 * size_),
         status_(size_),
         visits_(size_),
-        spheres_(size_) {}
+        spheres_(size_),
+        least_(size_),
+        most_(size_) {}
 
   GpuPairs pairs() const {
     return {size_,
@@ -80,13 +82,16 @@ class DeviceBatch {
             {b_.data(), pose_b_.data(), scale_b_.data()}};
   }
   GpuPenetrations answers() const {
-    return {volume_.data(), centroid_.data(), push_.data(),   turn_.data(),
-            status_.data(), visits_.data(),   spheres_.data()};
+    GpuPenetrations to = {volume_.data(), centroid_.data(), push_.data(),   turn_.data(),
+                          status_.data(), visits_.data(),   spheres_.data()};
+    to.volume_min = least_.data();
+    to.volume_max = most_.data();
+    return to;
   }
 
   std::vector<Penetration> get() const {
-    return BatchColumns{volume_.get(), centroid_.get(), push_.get(),   turn_.get(),
-                        status_.get(), visits_.get(),   spheres_.get()}
+    return BatchColumns{volume_.get(), centroid_.get(), push_.get(),  turn_.get(), status_.get(),
+                        visits_.get(), spheres_.get(),  least_.get(), most_.get()}
         .rows();
   }
 
@@ -105,6 +110,7 @@ class DeviceBatch {
   OnDevice<double> volume_, centroid_, push_, turn_;
   OnDevice<QueryStatus> status_;
   OnDevice<std::uint32_t> visits_, spheres_;
+  OnDevice<double> least_, most_;
 };
 
 }  // namespace ist::testing

@@ -6,6 +6,7 @@
 #include <ist/query.h>
 
 #include "cuda/query/batch_arrays.h"
+#include "cuda/query/exact_arrays.h"
 #include "cuda/query/field_batch.h"
 #include "support/batch_pair.h"
 #include "support/host_solids.h"
@@ -26,7 +27,8 @@ class HostBatch {
   std::vector<Penetration> run(const std::vector<BatchPair>& pairs, Measure measure,
                                unsigned seed = 0, std::uint32_t pair_budget = 0);
 
-  gpu::BatchCounters counters;  ///< of the last run
+  gpu::BatchCounters counters;        ///< of the last run
+  gpu::ExactCounters exact_counters;  ///< of the last exact one
   std::uint32_t most_alone = 0, task_weight = 0;
   bool by_size = true;
   // Of pairs of a tree and a field.
@@ -40,6 +42,7 @@ class HostBatch {
 
  private:
   void sum(const gpu::BatchArrays& batch, unsigned seed);
+  void run_exactly(const gpu::SolidPairs& asked, unsigned seed);
   void run_fields(const gpu::SolidPairs& asked, unsigned seed);
   gpu::TriangleRoom triangle_room();
   /// The kernels of triangle_kernels.cu.

@@ -7,6 +7,7 @@
 
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/detail_sums.h"
+#include "cuda/query/exact_steps.h"
 #include "cuda/query/field_steps.h"
 #include "cuda/query/patch_steps.h"
 #include "cuda/query/separation_steps.h"
@@ -34,6 +35,10 @@ std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Mea
   std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
   counters = {};
   const gpu::SolidPairs asked = solids_.asked(columns.pairs(), measure, to.answers());
+  if (measure == Measure::exact) {
+    run_exactly(asked, seed);
+    return to.rows();
+  }
   const gpu::BatchArrays batch = {asked,
                                   pair_budget,
                                   true,
@@ -67,6 +72,34 @@ std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Mea
     if (flag != 0) throw std::logic_error("a task was not taken");
   run_fields(asked, seed);
   return to.rows();
+}
+
+/// The kernels of exact_kernels.cu.
+void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
+  gpu::ExactArrays batch = {};
+  static_cast<gpu::SolidPairs&>(batch) = asked;
+  exact_counters = {};
+  batch.counters = &exact_counters;
+  std::vector<std::uint32_t> lists[2];
+  for (int k = 0; k < 2; ++k) {
+    lists[k].resize(asked.pairs.count);
+    batch.list[k] = lists[k].data();
+  }
+  for (const gpu::SolidRef& solid : solids_.refs())
+    batch.most_blocks = std::max(batch.most_blocks, solid.mesh.count);
+  for (std::uint32_t i = 0; i < asked.pairs.count; ++i)
+    if (gpu::sift_exact(batch, i)) lists[0][exact_counters.listed[0]++] = i;
+  const auto memory = std::make_unique<gpu::ExactMemory>();
+  const auto pass = [&]<int kPass>() {
+    std::vector<std::uint64_t> bytes(batch.bytes_of_team(kPass) / 8);
+    batch.rooms = reinterpret_cast<std::byte*>(bytes.data());
+    const gpu::ExactRoom room = batch.room(kPass, 0);
+    for (std::uint32_t k = 0; k < exact_counters.listed[kPass]; ++k)
+      by_team(seed, [&](const auto& team) { gpu::ask_pass<kPass>(team, batch, k, room, *memory); });
+  };
+  pass.template operator()<0>();
+  pass.template operator()<1>();
+  pass.template operator()<2>();
 }
 
 void HostBatch::cut_for(std::size_t most_pairs) {

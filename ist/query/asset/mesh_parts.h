@@ -9,6 +9,7 @@ namespace ist {
 
 /// The mesh of an asset with its offsets resolved, all but boxes.
 struct MeshParts {
+  MeshParts() = default;
   MeshParts(const AssetHeader& asset, const MeshHeader& mesh) noexcept
       : header(&mesh),
         count(mesh.level[0].count),
@@ -17,12 +18,12 @@ struct MeshParts {
         shells(at<MeshShell>(asset, mesh.shells)),
         neighbours(at<std::uint32_t>(asset, mesh.neighbours)) {}
 
-  const MeshHeader* header;
-  std::uint32_t count;  ///< of blocks
-  const MeshBlock* blocks;
-  const double* vertices;
-  const MeshShell* shells;
-  const std::uint32_t* neighbours;
+  const MeshHeader* header = nullptr;
+  std::uint32_t count = 0;  ///< of blocks
+  const MeshBlock* blocks = nullptr;
+  const double* vertices = nullptr;
+  const MeshShell* shells = nullptr;
+  const std::uint32_t* neighbours = nullptr;
 };
 
 }  // namespace ist

@@ -176,7 +176,7 @@ struct PairPlace {
     return true;
   }
 
-  double unit3() const noexcept { return unit_a * unit_a * unit_a; }  ///< [u³]
+  IST_HD double unit3() const noexcept { return unit_a * unit_a * unit_a; }  ///< [u³]
 
   /// By how much the world's coordinates may be rounded, A's unit frame.
   IST_HD double rounding_of_world() const noexcept { return 1e-15 * norm(origin_a) / unit_a; }

@@ -33,20 +33,38 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
 }
 
 /// How often the way from p to q, both B's points or both A's, enters the other solid through one
-/// of its triangles: 1, 0 or −1.
+/// of its triangles: 1, 0 or −1. `unsure`: doubles do not tell, without `kExactly`.
+template <bool kExactly = true>
+IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b,
+                         const Point& aside, bool& unsure) {
+  int sign[2], way[3];
+  bool all = true;
+  for (int k = 0; k < 2; ++k) {
+    sign[k] = (of_b ? height_over_a<kExactly>(t, k == 0 ? p : q, aside)
+                    : height_over_b<kExactly>(t, k == 0 ? p : q, aside))
+                  .sign;
+    all = all && sign[k] != 0;
+  }
+  if (all && sign[0] == sign[1]) return 0;
+  for (int k = 0; k < 3; ++k) {
+    way[k] = (of_b ? way_round<kExactly>(t[k], t[(k + 1) % 3], p, q, aside)
+                   : way_round<kExactly>(p, q, t[k], t[(k + 1) % 3], aside))
+                 .sign;
+    all = all && way[k] != 0;
+  }
+  // Ways round that differ from each other keep it outside whatever the others are.
+  const int least =
+      way[0] < way[1] ? (way[0] < way[2] ? way[0] : way[2]) : (way[1] < way[2] ? way[1] : way[2]);
+  const int most =
+      way[0] > way[1] ? (way[0] > way[2] ? way[0] : way[2]) : (way[1] > way[2] ? way[1] : way[2]);
+  if (least < 0 && most > 0) return 0;
+  unsure = unsure || !all;
+  return all ? direction(sign[0]) : 0;
+}
 IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b,
                          const Point& aside) {
-  int sign[2], way[3];
-  for (int k = 0; k < 2; ++k)
-    sign[k] =
-        (of_b ? height_over_a(t, k == 0 ? p : q, aside) : height_over_b(t, k == 0 ? p : q, aside))
-            .sign;
-  if (sign[0] == sign[1]) return 0;
-  for (int k = 0; k < 3; ++k)
-    way[k] = (of_b ? way_round(t[k], t[(k + 1) % 3], p, q, aside)
-                   : way_round(p, q, t[k], t[(k + 1) % 3], aside))
-                 .sign;
-  return way[0] == way[1] && way[1] == way[2] ? direction(sign[0]) : 0;
+  bool unsure = false;
+  return enters<true>(p, q, t, of_b, aside, unsure);
 }
 
 }  // namespace ist::exact

@@ -39,36 +39,24 @@ struct PiercingEdges {
 HWY_INLINE void write_ends(const PiercingEdges& from, const Compressor<D>& chosen, int e,
                            std::uint32_t at, Crossings& out) {
   const D d;
-  const V hp = hn::Abs(from.height_p), hq = hn::Abs(from.height_q), whole = hp + hq;
-  // From the nearer end, and between two as near from the first in space, so that both triangles at
-  // an edge do alike.
-  const Vec3 &p = from.p, &q = from.q;
-  const auto before =
-      hn::Or(q.x < p.x, hn::And(q.x == p.x, hn::Or(q.y < p.y, hn::And(q.y == p.y, q.z < p.z))));
-  const auto turned = hn::Or(hq < hp, hn::And(hq == hp, before));
-  // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
-  const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
-  const auto flat = whole == hn::Zero(d);
-  const V divisor = hn::IfThenElse(flat, one, whole);
-  const V share = hn::IfThenElse(flat, hn::Set(d, 0.5), hn::Min(hp, hq) / divisor);
+  const EdgeEnd end = edge_end(from.p, from.q, from.height_p, from.height_q);
   const auto put = [&](int number, V value) {
     hn::StoreU(chosen(value), d, out.end(e, number) + at);
   };
-  const auto coordinate = [&](int k, V at_p, V at_q) {
-    const V near = hn::IfThenElse(turned, at_q, at_p), far = hn::IfThenElse(turned, at_p, at_q);
-    put(Crossings::kFrom + k, near);
-    put(Crossings::kOffset + k, share * (far - near));
+  const auto put_point = [&](int number, const Vec3& x) {
+    put(number, x.x), put(number + 1, x.y), put(number + 2, x.z);
   };
-  coordinate(0, p.x, q.x);
-  coordinate(1, p.y, q.y);
-  coordinate(2, p.z, q.z);
-  put(Crossings::kT, hn::IfThenElse(turned, one - share, share));
+  put_point(Crossings::kFrom, end.from);
+  put_point(Crossings::kOffset, end.offset);
+  const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
+  put(Crossings::kT, hn::IfThenElse(end.from_second, one - end.share, end.share));
   // Which of two places comes first is asked with B moved aside.
   put(Crossings::kTError,
-      hn::IfThenElse(flat, one,
-                     (two * (from.error + two * from.shift)) / divisor + hn::Set(d, 1e-15)));
+      hn::IfThenElse(end.flat, one,
+                     (two * (from.error + two * from.shift)) / end.heights + hn::Set(d, 1e-15)));
   put(Crossings::kHeightError, from.error);
-  put(Crossings::kEdge, hn::IfThenElse(turned, from.number, from.number + hn::Set(d, 8.0)));
+  put(Crossings::kEdge,
+      hn::IfThenElse(end.from_second, from.number, from.number + hn::Set(d, 8.0)));
 }
 
 /// Writes crossings `at` …: of pairs that are `crossing`, a bit each, whose edges [A's, B's] are

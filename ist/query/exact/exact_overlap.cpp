@@ -14,13 +14,7 @@ namespace {
 using exact::kHalfUnit;
 using exact::Point;
 
-double length_bound(const Point& p) { return (std::abs(p.x) + std::abs(p.y)) + std::abs(p.z); }
-
-Point map_vector(const Similarity& map, const Point& x) {
-  return {(map.m[0] * x.x + map.m[1] * x.y) + map.m[2] * x.z,
-          (map.m[3] * x.x + map.m[4] * x.y) + map.m[5] * x.z,
-          (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
-}
+using exact::length_bound;
 
 }  // namespace
 
@@ -29,33 +23,14 @@ double ExactQuery::nearness() const noexcept {
   return 1e-7 * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
 }
 
-/// Signs are those of B moved by far more than what rounds the meshes' places, and by far less than
-/// what the interval allows for anyway: then faces that are flush, and copies in place, have clear
-/// signs. It goes away from A's middle, since flush parts separate so, and somewhat across, since
-/// no direction of a part is like it. What A and B see of each other is opposite if they change
-/// places: the first and the last term are, and the sign of the other is by the middles, or where
-/// these do not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
 void ExactQuery::move_aside() noexcept {
-  const auto unit = [](const Point& x) {
-    const double length = std::sqrt(dot(x, x));
-    return length > 0 ? 1 / length * x : Point{0, 0, 0};
-  };
-  constexpr Point kAcross = {0.267, 0.534, 0.802};
-  const Point middle = {a_from_b_.t[0], a_from_b_.t[1], a_from_b_.t[2]}, centre = unit(middle);
-  const Point turned = 1 / a_from_b_.scale * map_vector(a_from_b_, kAcross);
-  const Point both = kAcross + turned;
-  const double along = dot(centre, both);
-  const bool first =
-      std::abs(along) > 1e-9 ? along > 0 : sides_[0].mesh.hash <= sides_[1].mesh.hash;
-  const Point across = (first ? 1.0 : -1.0) * both + cross(kAcross, turned);
-  constexpr double kAside = 0x1p-47;  // of both sizes
-  const double far = kAside * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
-  search_.aside = far * unit(centre + 0.4 * unit(across));
+  const Aside aside = aside_of(sides_[0].mesh, sides_[1].mesh, a_from_b_);
+  search_.aside = aside.by;
   search_.touch = sides_[0].moved + sides_[1].moved +
                   4 * kHalfUnit *
                       (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent() +
-                       length_bound(middle));
-  sides_[1].moved += far;
+                       length_bound(vec3(a_from_b_.t)));
+  sides_[1].moved += aside.far;
 }
 
 Point ExactQuery::place(const Side& side, std::uint32_t vertex) const noexcept {
@@ -188,54 +163,10 @@ void ExactQuery::sum_crossed_block(const Side& own, const CrossedBlock& crossed)
   }
 }
 
-ExactQuery::LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint32_t i,
-                                           std::uint32_t lane, const Point& origin) const noexcept {
-  const BoxBlock& box = own.mesh.level[level].boxes[i];
-  const BoxSums& sums = own.mesh.level[level].sums[i];
-  const auto middle = [&](int k) {
-    return (double{box.low[k][lane]} + double{box.high[k][lane]}) / 2;
-  };
-  const auto width = [&](int k) { return double{box.high[k][lane]} - double{box.low[k][lane]}; };
-  Point c = {middle(0), middle(1), middle(2)};
-  Point n = {sums.normal[0][lane], sums.normal[1][lane], sums.normal[2][lane]};
-  Point cone = {sums.cone[0][lane], sums.cone[1][lane], sums.cone[2][lane]};
-  double trace = (sums.flux[0][0][lane] + sums.flux[1][1][lane]) + sums.flux[2][2][lane];
-  double area = sums.area[lane], wide = (width(0) + width(1)) + width(2);
-  const auto flux = [&](const Point& d) {  // Σₖ ∫ y nₖ dA · dₖ
-    return Point{
-        (sums.flux[0][0][lane] * d.x + sums.flux[0][1][lane] * d.y) + sums.flux[0][2][lane] * d.z,
-        (sums.flux[1][0][lane] * d.x + sums.flux[1][1][lane] * d.y) + sums.flux[1][2][lane] * d.z,
-        (sums.flux[2][0][lane] * d.x + sums.flux[2][1][lane] * d.y) + sums.flux[2][2][lane] * d.z};
-  };
-  Point twist = {sums.flux[1][2][lane] - sums.flux[2][1][lane],
-                 sums.flux[2][0][lane] - sums.flux[0][2][lane],
-                 sums.flux[0][1][lane] - sums.flux[1][0][lane]};  // ∫ y × n dA
-  Point d = c - origin, turned;
-  if (own.is_b) {
-    const double s = a_from_b_.scale;
-    d = map_point(a_from_b_, c) - origin;
-    const double* m = a_from_b_.m;
-    const Point back = {(m[0] * d.x + m[3] * d.y) + m[6] * d.z,
-                        (m[1] * d.x + m[4] * d.y) + m[7] * d.z,
-                        (m[2] * d.x + m[5] * d.y) + m[8] * d.z};
-    turned = s * map_vector(a_from_b_, flux(back));
-    n = s * map_vector(a_from_b_, n);
-    twist = (s * s) * map_vector(a_from_b_, twist);
-    cone = (s * s * s) * map_vector(a_from_b_, cone);
-    trace *= s * s * s;
-    area *= s * s;
-    wide *= s;
-  } else {
-    turned = flux(d);
-  }
-  const double out = dot(d, n);
-  return {2 * (trace + out),
-          6 * (cone + (trace * d + (turned + out * d))),
-          n,
-          twist + cross(d, n),
-          area,
-          wide,
-          length_bound(d)};
+LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint32_t i, std::uint32_t lane,
+                               const Point& origin) const noexcept {
+  const MeshTree::Level& of = own.mesh.level[level];
+  return ist::lane_sums(of.boxes[i], of.sums[i], lane, own.is_b ? &a_from_b_ : nullptr, origin);
 }
 
 /// What lies below a lane of a box block, inside as a whole.
@@ -244,14 +175,12 @@ void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint
   const LaneSums sums = lane_sums(own, level, i, lane, out_.origin);
   into.six_volumes.add(sums.six_volumes);
   into.moment = into.moment + sums.moment;
-  rounding_ += 64 * kHalfUnit * sums.area * (sums.reach + sums.width);
+  rounding_ += sums.six_volume_rounding;
   add_layer(own, sums.area, sums.width);
 }
 
-/// A surface that moves changes the volume by no more than a layer as thick over its faces, edges
-/// and corners. `width`: of a box around it, all sides together.
 void ExactQuery::add_layer(const Side& own, double area, double width) noexcept {
-  layers_ += own.moved * area + 32 * (own.moved * own.moved) * width;
+  layers_ += moved_layer(own.moved, area, width);
 }
 
 /// Blocks at the surface of the other solid: rounding and deviations there change the volume.

@@ -7,6 +7,7 @@
 #include <ist/query.h>
 
 #include "query/base/relative_pose.h"
+#include "query/exact/box_integrals.h"
 #include "query/exact/crossing_search.h"
 #include "query/exact/exact_scratch.h"
 #include "query/exact/mesh_tree.h"
@@ -70,13 +71,6 @@ class ExactQuery {
   static void count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
                               std::int8_t (&whole)[kWidth]) noexcept;
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
-  /// Integrals over all triangles below a lane of a box block, seen from a point.
-  struct LaneSums {
-    double six_volumes;
-    exact::Point moment, normal, torque;  ///< 24 ∫ x, ∫ n dA, ∫ x × n dA
-    double area, width;                   ///< at least, and of the box all sides together
-    double reach;                         ///< of its middle
-  };
   LaneSums lane_sums(const Side& side, int level, std::uint32_t i, std::uint32_t lane,
                      const exact::Point& origin) const noexcept;
   void sum_lane(const Side& side, int level, std::uint32_t i, std::uint32_t lane,

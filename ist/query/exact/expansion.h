@@ -71,11 +71,10 @@ struct Expansion {
   }
 };
 
-/// a + b, or a − b where `factor` is −1.
-template <int kA, int kB>
-IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>& b,
-                                     double factor = 1) {
-  Expansion<kA + kB> out;
+/// The parts of a + b, or of a − b where `factor` is −1, the smallest first.
+template <int kA, int kB, class Take>
+IST_HD inline void add_parts(const Expansion<kA>& a, const Expansion<kB>& b, double factor,
+                             const Take& take) {
   int i = 0, j = 0;
   double carried = 0;
   for (int k = 0; k < a.count + b.count; ++k) {
@@ -84,10 +83,23 @@ IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>
                             : factor * b.part[j++];
     double rest;
     two_sum(carried, next, carried, rest);
-    if (rest != 0) out.part[out.count++] = rest;
+    if (rest != 0) take(rest);
   }
-  if (carried != 0) out.part[out.count++] = carried;
+  if (carried != 0) take(carried);
+}
+template <int kA, int kB>
+IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>& b,
+                                     double factor = 1) {
+  Expansion<kA + kB> out;
+  add_parts(a, b, factor, [&](double part) { out.part[out.count++] = part; });
   return out;
+}
+/// Its sign alone.
+template <int kA, int kB>
+IST_HD inline int sign_of_sum(const Expansion<kA>& a, const Expansion<kB>& b, double factor) {
+  double largest = 0;
+  add_parts(a, b, factor, [&](double part) { largest = part; });
+  return largest > 0 ? 1 : largest < 0 ? -1 : 0;
 }
 
 /// a · b.

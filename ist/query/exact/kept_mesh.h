@@ -20,28 +20,14 @@ inline MeshTree mesh_of(const PlacedTree& placed) noexcept {
   return {asset, *at<MeshHeader>(asset, asset.mesh)};
 }
 
-/// The solid's surface and the mesh lie within this of each other, unit frame.
-inline double moved_in_mesh(const MeshTree& mesh) noexcept {
-  return mesh.header->error + mesh.header->rounding;
-}
-
-/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
-/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
-/// with all that follows.
+/// The same of placed assets.
 inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
   const auto offset = [](const PlacedTree& placed) {
     const double* c = placed.tree.header().centre;
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
   };
-  // The C library's hypot differs between processors.
-  double between = 0;
-  for (int k = 0; k < 3; ++k) between += (b.pose.t[k] - a.pose.t[k]) * (b.pose.t[k] - a.pose.t[k]);
-  between = std::sqrt(between);
-  return 1.1 * exact::kHalfUnit *
-         (45 * (1.8 * pose.a_from_b.scale * mesh_b.extent() +
-                (between + offset(a) + offset(b)) / pose.unit_a) +
-          5 * vector(pose.a_from_b.t).norm());
+  return moved_by_poses(a.pose.t, offset(a), b.pose.t, offset(b), mesh_b.extent(), pose);
 }
 
 }  // namespace ist

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "numerics/team.h"
 #include "query/exact/crossing.h"
 #include "query/exact/nearest_points.h"
 
@@ -125,63 +126,9 @@ class Way {
 }  // namespace
 
 bool is_inside(const MeshOfPair& solid, const Point& p, const Point& aside) noexcept {
-  const MeshTree& mesh = solid.mesh;
-  const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
-  const double at[3] = {start.x, start.y, start.z};
-  // What mapping there and back rounds, and what B is moved aside.
-  double pad = 0;
-  for (int k = 0; k < 3; ++k)
-    pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;
-  pad = 1e-12 * pad + 2 * (solid.is_b() ? solid.from_a->scale : 1.0) *
-                          (std::abs(aside.x) + std::abs(aside.y) + std::abs(aside.z));
-  float low[3], high[3];
-  int axis = 0;
-  double shortest = HUGE_VAL, end = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double lowest = mesh.low[k], highest = mesh.high[k];
-    if (at[k] < lowest - pad || at[k] > highest + pad) return false;
-    const double beyond = 0.25 * (highest - lowest) + 8 * pad;
-    for (const double to : {lowest - beyond, highest + beyond})
-      if (std::abs(to - at[k]) < shortest) {
-        shortest = std::abs(to - at[k]);
-        axis = k;
-        end = to;
-      }
-    low[k] = static_cast<float>(at[k] - pad);
-    low[k] -= std::abs(low[k]) * 2e-7f;
-    high[k] = static_cast<float>(at[k] + pad);
-    high[k] += std::abs(high[k]) * 2e-7f;
-  }
-  double to[3] = {at[0], at[1], at[2]};
-  to[axis] = end;
-  (end < at[axis] ? low : high)[axis] = static_cast<float>(end);
-  const Point beyond = {to[0], to[1], to[2]};
-  const Point q = solid.is_b() ? map_point(*solid.to_a, beyond) : beyond;
-
-  int entered = 0;
-  for (NodeStack stack(mesh); !stack.empty();) {
-    const WaitingNode node = stack.pop();
-    if (node.level == 0) {
-      const MeshBlock& block = mesh.blocks[node.number];
-      for (std::uint32_t t = 0; t < block.triangles; ++t) {
-        const Point corners[3] = {solid.place(block.vertex[block.corner[0][t]]),
-                                  solid.place(block.vertex[block.corner[1][t]]),
-                                  solid.place(block.vertex[block.corner[2][t]])};
-        entered += exact::enters(p, q, corners, !solid.is_b(), aside);
-      }
-      continue;
-    }
-    const BoxBlock& boxes = mesh.level[node.level].boxes[node.number];
-    double key[kWidth];
-    for (std::uint32_t l = 0; l < kWidth; ++l) {
-      bool meets = true;
-      for (int k = 0; k < 3; ++k)
-        meets = meets && boxes.low[k][l] <= high[k] && boxes.high[k][l] >= low[k];
-      key[l] = meets ? 0 : 1;
-    }
-    stack.push(mesh, node, key, 1);
-  }
-  return entered < 0;
+  InsideStack stack;
+  bool unsure = false;
+  return is_inside<true>(SerialTeam(), solid, p, aside, stack, unsure);
 }
 
 MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept {

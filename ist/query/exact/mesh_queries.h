@@ -4,35 +4,13 @@
 #include <cstdint>
 
 #include "query/base/relative_pose.h"
-#include "query/exact/mesh_tree.h"
+#include "query/exact/inside_search.h"
 
 // What a point and a ray are told by a mesh. Nothing allocates, locks or throws; the answers are
 // the same on every instruction set.
 
 namespace ist {
 
-inline exact::Point map_point(const Similarity& map, const exact::Point& x) noexcept {
-  double moved[3];
-  map.apply({x.x, x.y, x.z}, moved);
-  return {moved[0], moved[1], moved[2]};
-}
-
-/// One mesh of a pair. A's is where it is; B's vertices are moved into A's unit frame.
-struct MeshOfPair {
-  const MeshTree& mesh;
-  const Similarity* to_a = nullptr;  ///< null: it is A's
-  const Similarity* from_a = nullptr;
-
-  bool is_b() const noexcept { return to_a != nullptr; }
-  exact::Point place(std::uint32_t vertex) const noexcept {
-    const exact::Point x = mesh.vertex(vertex);
-    return is_b() ? map_point(*to_a, x) : x;
-  }
-};
-
-/// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
-/// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one
-/// way or the other.
 bool is_inside(const MeshOfPair& solid, const exact::Point& p,
                const exact::Point& aside = {0, 0, 0}) noexcept;
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "query/asset/mesh_parts.h"
+#include "query/base/pair_place.h"
 #include "query/exact/orientation.h"
 
 namespace ist {
@@ -20,6 +21,7 @@ struct MeshTree : MeshParts {
     std::uint32_t first = 0;  ///< box blocks of the levels below
   };
 
+  MeshTree() = default;
   MeshTree(const AssetHeader& asset, const MeshHeader& mesh) noexcept
       : MeshParts(asset, mesh),
         hash(asset.content_hash),
@@ -37,23 +39,67 @@ struct MeshTree : MeshParts {
     }
   }
 
-  exact::Point vertex(std::uint32_t v) const noexcept {
+  /// Where a copy of the asset's bytes lies.
+  MeshTree copied_to(const std::byte* bytes, const AssetHeader& asset) const noexcept {
+    const std::ptrdiff_t far = bytes - reinterpret_cast<const std::byte*>(&asset);
+    const auto moved = [far]<class T>(const T* from) {
+      return from == nullptr
+                 ? nullptr
+                 : reinterpret_cast<const T*>(reinterpret_cast<const std::byte*>(from) + far);
+    };
+    MeshTree out = *this;
+    out.header = moved(header);
+    out.blocks = moved(blocks);
+    out.vertices = moved(vertices);
+    out.shells = moved(shells);
+    out.neighbours = moved(neighbours);
+    for (Level& of : out.level) of.boxes = moved(of.boxes), of.sums = moved(of.sums);
+    return out;
+  }
+
+  IST_HD exact::Point vertex(std::uint32_t v) const noexcept {
     const double* x = vertices + std::size_t{3} * v;
     return {x[0], x[1], x[2]};
   }
 
   /// No coordinate is larger.
-  double extent() const noexcept {
+  IST_HD double extent() const noexcept {
     double extent = 0;
     for (int k = 0; k < 3; ++k)
-      extent = std::max({extent, std::abs(double{low[k]}), std::abs(double{high[k]})});
+      extent = std::fmax(extent, std::fmax(std::abs(double{low[k]}), std::abs(double{high[k]})));
     return extent;
   }
 
-  std::uint64_t hash;  ///< of the asset
-  int top;             ///< the level of one box block, ≥ 1
+  std::uint64_t hash = 0;  ///< of the asset
+  int top = 0;             ///< the level of one box block, ≥ 1
   Level level[kMaxLevels];
-  float low[3], high[3];  ///< a box around it
+  float low[3] = {}, high[3] = {};  ///< a box around it
 };
+
+/// What rounding may do to a box of a mesh that is placed in floats, by x ↦ scale · R x + t.
+IST_HD inline float placing_pad(double scale, const double (&t)[3], const MeshTree& mesh) noexcept {
+  const double shift = std::fmax(std::abs(t[0]), std::fmax(std::abs(t[1]), std::abs(t[2])));
+  return static_cast<float>(1e-6 * (2 * scale * mesh.extent() + shift));
+}
+
+/// The solid's surface and the mesh lie within this of each other, unit frame.
+IST_HD inline double moved_in_mesh(const MeshTree& mesh) noexcept {
+  return mesh.header->error + mesh.header->rounding;
+}
+
+/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
+/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
+/// with all that follows. `offset`: [u] of a unit frame's middle from its solid's origin.
+IST_HD inline double moved_by_poses(const double (&t_a)[3], double offset_a, const double (&t_b)[3],
+                                    double offset_b, double extent_b,
+                                    const PairPlace& pose) noexcept {
+  const Vec3 between = vec3(t_b) - vec3(t_a), shift = vec3(pose.a_from_b.t);
+  // In Eigen's order.
+  const double far = std::sqrt(shift.x * shift.x + (shift.y * shift.y + shift.z * shift.z));
+  return 1.1 * exact::kHalfUnit *
+         (45 * (1.8 * pose.a_from_b.scale * extent_b +
+                (norm(between) + offset_a + offset_b) / pose.unit_a) +
+          5 * far);
+}
 
 }  // namespace ist

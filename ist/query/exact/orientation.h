@@ -28,8 +28,8 @@ IST_HD inline double absolute_dot(const Point& x, const Point& size) {
 }
 
 /// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
-IST_HD inline int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
-                                double d1, double d0) {
+IST_HD_COLD int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
+                              double d1, double d0) {
   const double ad = (a1 - a0) * (d1 - d0), bc = (b1 - b0) * (c1 - c0);
   const double value = ad - bc;
   if (std::abs(value) > kFilter * (std::abs(ad) + std::abs(bc))) return value > 0 ? 1 : -1;
@@ -40,8 +40,8 @@ IST_HD inline int sign_of_minor(double a1, double a0, double b1, double b0, doub
 }
 
 /// The sign of a tie, from the normal u × v along which the infinitesimal goes.
-IST_HD inline int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
-                              int moved) {
+IST_HD_COLD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
+                            int moved) {
   int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
   if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
   if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
@@ -51,55 +51,85 @@ IST_HD inline int sign_of_tie(const Point& u1, const Point& u0, const Point& v1,
 
 /// (r1 − r0) · ((u1 − u0) × (v1 − v0)), where r1 moves along with B (`moved` = 1), or r0 does (−1);
 /// the others' differences stay.
-IST_HD inline Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
-                                            const Point& u0, const Point& v1, const Point& v0,
-                                            int moved, const Point& aside) {
+IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
+                                          const Point& u0, const Point& v1, const Point& v0,
+                                          int moved, const Point& aside) {
   const Expansion<2> ux = difference(u1.x, u0.x), uy = difference(u1.y, u0.y),
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
                      vz = difference(v1.z, v0.z);
-  const Expansion<16> x = minor(uy, vz, uz, vy);
-  const Expansion<16> y = minor(uz, vx, ux, vz);
+  // In steps, so that few expansions are held at a time: on a GPU they lie in memory of each
+  // thread.
+  Expansion<64> shift_xy;
+  const auto xy = [&] {
+    const Expansion<16> x = minor(uy, vz, uz, vy), y = minor(uz, vx, ux, vz);
+    shift_xy = sum(scaled(x, aside.x), scaled(y, aside.y));
+    return sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y)));
+  }();
   const Expansion<16> z = minor(ux, vy, uy, vx);
-  const auto det = sum(sum(product(x, difference(r1.x, r0.x)), product(y, difference(r1.y, r0.y))),
-                       product(z, difference(r1.z, r0.z)));
-  const auto shift = sum(sum(scaled(x, aside.x), scaled(y, aside.y)), scaled(z, aside.z));
-  const int sign = sum(det, shift, moved).sign();
+  const auto det = [&] { return sum(xy, product(z, difference(r1.z, r0.z))); }();
+  const int sign = sign_of_sum(det, sum(shift_xy, scaled(z, aside.z)), moved);
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
+}
+
+/// The same in doubles, of rounded differences: sign 0 where these are not certain. `shift`: aside,
+/// or its opposite where r0 moves.
+IST_HD_ONCE inline Determinant filtered_determinant(double rx, double ry, double rz, double ux,
+                                                    double uy, double uz, double vx, double vy,
+                                                    double vz, double shift_x, double shift_y,
+                                                    double shift_z) {
+  const Point r = {rx, ry, rz}, by = {shift_x, shift_y, shift_z};
+  const double ax = uy * vz, bx = uz * vy, ay = uz * vx, by_ = ux * vz, az = ux * vy, bz = uy * vx;
+  const Point n = {ax - bx, ay - by_, az - bz};
+  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by_),
+                      std::abs(az) + std::abs(bz)};
+  const double value = dot(r, n);
+  const double error = kFilter * absolute_dot(r, size);
+  const double signed_value = value + dot(by, n);
+  const bool certain = std::abs(signed_value) > error + kFilter * absolute_dot(by, size);
+  return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+}
+IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0, const Point& u1,
+                                               const Point& u0, const Point& v1, const Point& v0,
+                                               int moved, const Point& aside) {
+  const Point r = r1 - r0, u = u1 - u0, v = v1 - v0, by = moved * aside;
+  return filtered_determinant(r.x, r.y, r.z, u.x, u.y, u.z, v.x, v.y, v.z, by.x, by.y, by.z);
 }
 
 /// The same, in doubles where these are certain.
 IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
                                       const Point& u0, const Point& v1, const Point& v0, int moved,
                                       const Point& aside) {
-  const Point r = r1 - r0, u = u1 - u0, v = v1 - v0;
-  const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
-               bz = u.y * v.x;
-  const Point n = {ax - bx, ay - by, az - bz};
-  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by),
-                      std::abs(az) + std::abs(bz)};
-  const double value = dot(r, n), shift = moved * dot(aside, n);
-  const double error = kFilter * absolute_dot(r, size);
-  const double signed_value = value + shift;
-  if (std::abs(signed_value) > error + kFilter * absolute_dot(aside, size))
-    return {value, error, signed_value > 0 ? 1 : -1};
-  return exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
+  const Determinant found = filtered_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
+  return found.sign != 0 ? found : exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
+}
+
+/// In doubles, whose sign may be 0, or with `kExactly` whatever it takes.
+template <bool kExactly, class... Points>
+IST_HD inline Determinant determinant_of(const Points&... of) {
+  if constexpr (kExactly)
+    return determinant(of...);
+  else
+    return filtered_determinant(of...);
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
+template <bool kExactly = true>
 IST_HD inline Determinant height_over_a(const Point (&a)[3], const Point& b, const Point& aside) {
-  return determinant(b, a[0], a[1], a[0], a[2], a[0], 1, aside);
+  return determinant_of<kExactly>(b, a[0], a[1], a[0], a[2], a[0], 1, aside);
 }
 
 /// How far A's point lies above triangle B's plane.
+template <bool kExactly = true>
 IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, const Point& aside) {
-  return determinant(a, b[0], b[1], b[0], b[2], b[0], -1, aside);
+  return determinant_of<kExactly>(a, b[0], b[1], b[0], b[2], b[0], -1, aside);
 }
 
 /// Which way round A's edge p → q goes about B's edge r → s.
+template <bool kExactly = true>
 IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s,
                                     const Point& aside) {
-  return determinant(r, p, q, p, s, r, 1, aside);
+  return determinant_of<kExactly>(r, p, q, p, s, r, 1, aside);
 }
 
 }  // namespace ist::exact

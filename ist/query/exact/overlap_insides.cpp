@@ -1,55 +1,19 @@
 #include <bit>
 
+#include "query/exact/block_insides.h"
 #include "query/exact/exact_overlap.h"
 #include "query/exact/mesh_queries.h"
 
 namespace ist {
 
-/// Which vertices are inside: those of pierced edges by what pierces them, the others by edges that
-/// nothing pierces.
 void ExactQuery::settle(Side& side, CrossedBlock& crossed) noexcept {
   const MeshBlock& mesh = side.mesh.blocks[crossed.block];
-  std::uint32_t known = 0, inside = 0;
-  for (std::uint64_t left = crossed.pierced; left != 0; left &= left - 1) {
-    const auto edge = static_cast<std::uint32_t>(std::countr_zero(left));
-    const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
-                        q = mesh.corner[(edge + 1) % 3][edge / 3];
-    const int sum = crossed.sum[edge], first = crossed.first[edge];
-    const bool leaves = (sum == 0) & (first < 0);  // and enters again
-    const auto clear = static_cast<std::uint32_t>((sum != 0) | (first != 0));
-    known |= clear << p | clear << q;
-    inside |= static_cast<std::uint32_t>((sum < 0) | leaves) << p |
-              static_cast<std::uint32_t>((sum > 0) | leaves) << q;
-  }
-  std::uint32_t joined[kWidth] = {};
-  for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
-    const std::uint32_t v[3] = {mesh.corner[0][t], mesh.corner[1][t], mesh.corner[2][t]};
-    const auto other_end = [&](std::uint32_t edge, std::uint32_t end) {
-      return static_cast<std::uint32_t>(~crossed.pierced >> (3 * t + edge) & 1) << v[end];
-    };
-    joined[v[0]] |= other_end(0, 1) | other_end(2, 2);
-    joined[v[1]] |= other_end(0, 0) | other_end(1, 2);
-    joined[v[2]] |= other_end(1, 1) | other_end(2, 0);
-  }
-  const std::uint32_t all = (1u << mesh.vertices) - 1;
-  const auto spread = [&](std::uint32_t from) {
-    while (from != 0) {
-      const auto v = static_cast<std::uint32_t>(std::countr_zero(from));
-      from &= from - 1;
-      const std::uint32_t reached = joined[v] & ~known;
-      known |= reached;
-      from |= reached;
-      if (inside >> v & 1) inside |= reached;
-    }
-  };
-  spread(known);
-  while (known != all) {  // where it is not clear what pierces an edge first
-    const auto v = static_cast<std::uint32_t>(std::countr_zero(all & ~known));
-    if (is_inside(side, mesh.vertex[v])) inside |= 1u << v;
-    known |= 1u << v;
-    spread(1u << v);
-  }
-  crossed.inside = static_cast<std::uint16_t>(inside);
+  BlockInsides found(
+      mesh, crossed.pierced, [&](std::uint32_t edge) { return int{crossed.sum[edge]}; },
+      [&](std::uint32_t edge) { return int{crossed.first[edge]}; });
+  for (std::uint32_t v = found.unknown(mesh); v < kWidth; v = found.unknown(mesh))
+    found.tell(v, is_inside(side, mesh.vertex[v]));
+  crossed.inside = static_cast<std::uint16_t>(found.inside);
 }
 
 bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept {

@@ -9,8 +9,6 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-using exact::kHalfUnit;
-
 HWY_INLINE void store(V v, double* to) { hn::Store(v, D(), to); }
 HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
   store(v.x, to[0] + l);
@@ -18,8 +16,12 @@ HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
   store(v.z, to[2] + l);
 }
 
-/// A cone from the origin over a part of a triangle is made of tetrahedra with an edge from the
-/// origin to the triangle's apex. Segments that two triangles share bound both of their parts.
+HWY_INLINE void store(const PieceTerms& terms, ExactTerms& out, std::size_t l) {
+  store(terms.six_volumes[0], out.six_volumes[0] + l);
+  store(terms.rounding, out.rounding + l);
+  store(terms.moment, out.moment, l);
+}
+
 void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
                    ExactTerms& out) {
   const D d;
@@ -34,43 +36,22 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
       return {load(crossings.apex(side, 0)), load(crossings.apex(side, 1)),
               load(crossings.apex(side, 2))};
     };
-    const Vec3 of_a = apex(0), of_b = apex(1);
-    Vec3 near[2], offset[2], at[2];
-    for (int e = 0; e < 2; ++e) {
-      near[e] = vector(e, Crossings::kFrom) - o;
-      offset[e] = vector(e, Crossings::kOffset);
-      at[e] = near[e] + offset[e];
-    }
-    const Vec3 &a = at[0], &b = at[1];
-    const Vec3 along = b - a, c = cross(a, along), both = a + b;
-    const V six_a = dot(c, of_a), six_b = dot(c, of_b);
-    store(dot(c, of_a - of_b), out.six_volumes[0] + l);
-    Vec3 moment = six_a * (of_a + both) - six_b * (of_b + both);
-    // What the product rounds, and what ends that are rounded do to the triangles at them.
-    V rounding = hn::Set(d, kHalfUnit) * length_bound(along) *
-                 (hn::Set(d, 8.0) * length_bound(a) * length_bound(of_a - of_b) +
-                  hn::Set(d, 6.0) * (length_bound(a) + length_bound(b)) *
-                      (length_bound(of_a - a) + length_bound(of_b - a)));
-    for (int e = 0; e < 2; ++e) {
-      const V edge = load(crossings.end(e, Crossings::kEdge));
-      const auto first_corner = edge >= hn::Set(d, 8.0);
-      const auto by_b =
-          hn::IfThenElse(first_corner, edge - hn::Set(d, 8.0), edge) >= hn::Set(d, 3.0);
-      const Vec3 from = {hn::IfThenElse(by_b, of_b.x, of_a.x), hn::IfThenElse(by_b, of_b.y, of_a.y),
-                         hn::IfThenElse(by_b, of_b.z, of_a.z)};
-      const Vec3 to = near[e] - from;
-      const V times = load(crossings.opposite(e)), six = times * dot(from, cross(offset[e], to));
-      store(six, out.six_volumes[1 + e] + l);
-      moment = moment + six * (from + (near[e] + at[e]));
-      rounding = rounding + (hn::Abs(times) * hn::Set(d, 20 * kHalfUnit) *
-                                 (length_bound(from) + length_bound(to)) *
-                                 (length_bound(offset[e]) * length_bound(to)) +
-                             hn::Set(d, 3.0) * load(crossings.end(e, Crossings::kHeightError)));
-    }
-    store(rounding, out.rounding + l);
-    store(moment, out.moment, l);
-    store(hn::Set(d, -0.5) * c, out.force, l);
-    store((((dot(a, a) + dot(a, b)) + dot(b, b)) / hn::Set(d, 6.0)) * along, out.torque, l);
+    const auto by_b = [&](int e) {
+      const V edge = load(crossings.end(e, Crossings::kEdge)), eight = hn::Set(d, 8.0);
+      return hn::IfThenElse(edge >= eight, edge - eight, edge) >= hn::Set(d, 3.0);
+    };
+    PieceTerms terms;
+    segment_terms({vector(0, Crossings::kFrom) - o, vector(1, Crossings::kFrom) - o},
+                  {vector(0, Crossings::kOffset), vector(1, Crossings::kOffset)},
+                  {apex(0), apex(1)}, {by_b(0), by_b(1)},
+                  {load(crossings.opposite(0)), load(crossings.opposite(1))},
+                  {load(crossings.end(0, Crossings::kHeightError)),
+                   load(crossings.end(1, Crossings::kHeightError))},
+                  terms);
+    store(terms, out, l);
+    for (int e = 1; e < 3; ++e) store(terms.six_volumes[e], out.six_volumes[e] + l);
+    store(terms.force, out.force, l);
+    store(terms.torque, out.torque, l);
   }
 }
 
@@ -112,8 +93,7 @@ void place_block_fans(const PlacedVertices& placed, const MeshBlock& mesh,
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
     const V first = pick(away, mesh.corner[0] + l), second = pick(away, mesh.corner[1] + l),
             third = pick(away, mesh.corner[2] + l);
-    const V nearest = hn::IfThenElse(third < hn::Min(first, second), hn::Set(d, 2.0),
-                                     hn::IfThenElseZero(second < first, hn::Set(d, 1.0)));
+    const V nearest = apex_of(first, second, third);
     const auto apex = hn::DemoteTo(bytes, hn::DemoteTo(integers, nearest));
     hn::StoreU(apex, bytes, out.apex + l);
     const auto is_third = apex == hn::Set(bytes, 2), is_second = apex == hn::Set(bytes, 1);
@@ -137,16 +117,9 @@ void sum_triangles(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidt
       return {pick(crossed.vertex[0], local), pick(crossed.vertex[1], local),
               pick(crossed.vertex[2], local)};
     };
-    const Vec3 apex = corner(0), next = corner(1), last = corner(2);
-    const Vec3 u = next - apex, v = last - apex;
-    const V count = hn::Load(d, times + l);
-    const V six = count * dot(apex, cross(u, v));
-    store(six, out.six_volumes[0] + l);
-    store(hn::Abs(count) * hn::Set(d, 20 * kHalfUnit) *
-              ((length_bound(apex) + length_bound(u) + length_bound(v)) *
-               (length_bound(u) * length_bound(v))),
-          out.rounding + l);
-    store(six * (apex + (next + last)), out.moment, l);
+    PieceTerms terms;
+    cone_terms(hn::Load(d, times + l), corner(0), corner(1), corner(2), terms);
+    store(terms, out, l);
   }
 }
 

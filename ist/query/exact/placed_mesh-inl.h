@@ -24,11 +24,8 @@ inline constexpr float kNowhere = 1e30f;
 
 using F = LaneTag<float>;
 
-/// What rounding may do to a box that is placed in floats.
 inline float pad(const Similarity& map, const MeshTree& tree) {
-  double shift = 0;
-  for (const double t : map.t) shift = std::max(shift, std::abs(t));
-  return static_cast<float>(1e-6 * (2 * map.scale * tree.extent() + shift));
+  return placing_pad(map.scale, map.t, tree);
 }
 
 inline std::uint32_t used_lanes(const MeshTree& tree, int level, std::uint32_t i) {

@@ -8,6 +8,7 @@
 #define IST_QUERY_POINTS_INL_H_
 #endif
 
+#include "query/exact/expansion.h"
 #include "query/kernel/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -39,8 +40,25 @@ HWY_INLINE V largest(const Vec3& a) {
 }
 /// No less than its length.
 HWY_INLINE V length_bound(const Vec3& a) { return (hn::Abs(a.x) + hn::Abs(a.y)) + hn::Abs(a.z); }
+
+// What formulas are written in (query/exact/overlap_formulas-inl.h).
+using Real = V;
+using Mask = hn::Mask<D>;
+HWY_INLINE V constant(double x) { return hn::Set(D(), x); }
+HWY_INLINE V magnitude(V x) { return hn::Abs(x); }
+HWY_INLINE V lesser(V x, V y) { return hn::Min(x, y); }
+HWY_INLINE Mask less(V x, V y) { return x < y; }
+HWY_INLINE Mask equal(V x, V y) { return x == y; }
+HWY_INLINE Mask both(Mask x, Mask y) { return hn::And(x, y); }
+HWY_INLINE Mask either(Mask x, Mask y) { return hn::Or(x, y); }
+HWY_INLINE V choose(Mask of, V x, V y) { return hn::IfThenElse(of, x, y); }
+
 HWY_INLINE V min3(V x, V y, V z) { return hn::Min(x, hn::Min(y, z)); }
 HWY_INLINE V max3(V x, V y, V z) { return hn::Max(x, hn::Max(y, z)); }
+
+#define IST_FORMULA HWY_INLINE
+#include "query/exact/overlap_formulas-inl.h"
+#undef IST_FORMULA
 
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -1,0 +1,266 @@
+// Exact penetrations of many pairs at once on the GPU: rates with poses and answers resident, by
+// how much the solids overlap, of a nut on its bolt, of mated parts and of small bodies; the same
+// by all cores of the machine, and how far the answers differ.
+#include <cuda_runtime_api.h>
+
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <ist/gpu_query.h>
+#include <ist/query_tbb.h>
+
+#include "cuda/check.h"
+#include "gpu_batch_scenes.h"
+#include "report.h"
+#include "samples/samples.h"
+#include "support/device_batch.h"
+#include "support/mated_rows.h"
+#include "timing.h"
+
+namespace {
+
+using namespace ist;
+using namespace ist::benchmark;
+using ist::testing::DeviceBatch;
+
+Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
+  return bake_surface(close_mesh(mesh, name), 0);
+}
+
+/// [ms] of the device's work, the median of some.
+template <class Work>
+double device_ms(const Work& work) {
+  cudaStream_t stream = nullptr;
+  cudaEvent_t event[2];
+  gpu::check(cudaStreamCreate(&stream), "making a stream");
+  for (cudaEvent_t& e : event) gpu::check(cudaEventCreate(&e), "making an event");
+  work(stream);
+  std::vector<double> all;
+  for (int k = 0; k < 5; ++k) {
+    gpu::check(cudaEventRecord(event[0], stream), "timing");
+    work(stream);
+    gpu::check(cudaEventRecord(event[1], stream), "timing");
+    gpu::check(cudaEventSynchronize(event[1]), "timing");
+    float ms = 0;
+    gpu::check(cudaEventElapsedTime(&ms, event[0], event[1]), "timing");
+    all.push_back(static_cast<double>(ms));
+  }
+  for (cudaEvent_t e : event) cudaEventDestroy(e);
+  cudaStreamDestroy(stream);
+  return benchmark::quantile(all, 0.5);
+}
+
+struct Solids {
+  std::vector<const Asset*> assets;
+  std::vector<GpuSolid> views() const {
+    std::vector<GpuSolid> out;
+    for (const Asset* asset : assets) out.emplace_back(asset->view());
+    return out;
+  }
+};
+
+/// By all cores, M/s.
+double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs,
+                std::vector<Penetration>& answers) {
+  std::vector<PlacedPair> placed;
+  for (const BatchPair& pair : pairs)
+    placed.push_back({{solids.assets[pair.a]->view(), pair.pose_a, pair.scale_a},
+                      {solids.assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
+  PenetrationSettings settings;
+  settings.measure = Measure::exact;
+  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+  answers.resize(pairs.size());
+  double best = 1e30;
+  for (int k = 0; k < 2; ++k) {
+    const double start = benchmark::wall_seconds();
+    penetration_batch(placed, settings, workspaces, answers, tbb_parallel_for());
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(pairs.size()) / best * 1e-6;
+}
+
+/// Reports the rate of pairs drawn from some; false where answers are not the CPU's.
+bool ask(Report& report, const char* table, const std::string& name, const Solids& solids,
+         const std::vector<BatchPair>& some, std::size_t count, double target) {
+  if (some.empty()) return true;
+  std::mt19937_64 random(1);
+  std::vector<BatchPair> pairs;
+  for (std::size_t k = 0; k < count; ++k) pairs.push_back(some[random() % some.size()]);
+  const GpuSolids on_device(solids.views());
+  GpuWorkspace workspace(count);
+  const DeviceBatch batch(pairs);
+  const double ms = device_ms([&](cudaStream_t stream) {
+    penetration_batch(on_device, batch.pairs(), {Measure::exact}, workspace, batch.answers(),
+                      stream);
+  });
+  const std::vector<Penetration> found = batch.get();
+  std::vector<BatchPair> asked = pairs;
+  asked.resize(std::min<std::size_t>(count, 5'000));
+  std::vector<Penetration> cpu;
+  const double by_cores = cpu_rate(solids, asked, cpu);
+  double worst = 0, crossings = 0, visits = 0;
+  std::size_t unanswered = 0;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    if (found[i].status != QueryStatus::ok) {
+      ++unanswered;
+      continue;
+    }
+    const Asset &a = *solids.assets[asked[i].a], &b = *solids.assets[asked[i].b];
+    const double most = std::min(a.view().volume() * std::pow(asked[i].scale_a, 3),
+                                 b.view().volume() * std::pow(asked[i].scale_b, 3));
+    worst = std::max(worst, std::abs(found[i].volume - cpu[i].volume) / most);
+    crossings += found[i].sphere_pairs / static_cast<double>(asked.size());
+    visits += found[i].node_visits / static_cast<double>(asked.size());
+  }
+  const double rate = static_cast<double>(count) / ms * 1e-3;
+  report.row(table, {{"poses", name},
+                     {"pairs", count},
+                     {"M/s", rate},
+                     {"crossings, mean", crossings},
+                     {"node pairs opened, mean", visits},
+                     {"M/s by all cores", by_cores},
+                     {"largest difference to the CPU, of the smaller solid", worst},
+                     {"unanswered of 5,000", unanswered}});
+  if (target > 0) report.target(name + ", M/s", rate, target);
+  return worst < 1e-11 && unanswered == 0;
+}
+
+/// Star-shaped bodies of some triangles, none convex, each beside its neighbours in a packed bed.
+TriangleMesh small_body(std::size_t triangles, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  TriangleMesh mesh;
+  const std::uint32_t around = std::max<std::uint32_t>(
+      4, static_cast<std::uint32_t>(std::sqrt(static_cast<double>(triangles) / 2)));
+  const std::uint32_t rings =
+      std::max<std::uint32_t>(1, static_cast<std::uint32_t>(triangles) / (2 * around));
+  mesh.vertices.emplace_back(0, 0, -0.5);
+  for (std::uint32_t j = 0; j < rings; ++j)
+    for (std::uint32_t i = 0; i < around; ++i) {
+      const double up = std::numbers::pi * ((j + 1.0) / (rings + 1) - 0.5);
+      const double turn = 2 * std::numbers::pi * i / around, r = 0.3 + 0.2 * uniform();
+      mesh.vertices.emplace_back(r * std::cos(up) * std::cos(turn),
+                                 r * std::cos(up) * std::sin(turn), r * std::sin(up));
+    }
+  mesh.vertices.emplace_back(0, 0, 0.5);
+  const auto at = [&](std::uint32_t j, std::uint32_t i) { return 1 + j * around + i % around; };
+  const auto top = static_cast<std::uint32_t>(mesh.vertices.size() - 1);
+  for (std::uint32_t i = 0; i < around; ++i) {
+    mesh.triangles.push_back({0, at(0, i + 1), at(0, i)});
+    for (std::uint32_t j = 0; j + 1 < rings; ++j) {
+      mesh.triangles.push_back({at(j, i), at(j, i + 1), at(j + 1, i + 1)});
+      mesh.triangles.push_back({at(j, i), at(j + 1, i + 1), at(j + 1, i)});
+    }
+    mesh.triangles.push_back({at(rings - 1, i), at(rings - 1, i + 1), top});
+  }
+  return mesh;
+}
+
+int measure(Report& report) {
+  const std::size_t many = report.quick() ? 50'000 : 1'000'000;
+  bool right = true;
+  const Asset elephant = mesh_of(load_mesh(testing::oracle_mesh_path("elephant")), "elephant");
+  const Asset dino = mesh_of(load_mesh(testing::oracle_mesh_path("dino")), "dino");
+  const Solids two = {{&elephant, &dino}};
+  std::map<std::string, std::vector<BatchPair>> classes;
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+    const double share = row.fraction_of_smaller;
+    const std::string name = row.volume == 0               ? "apart"
+                             : row.pose_class == "contain" ? "contained"
+                             : share < 1e-4                ? "below 0.01 %"
+                             : share < 1e-3                ? "0.01 to 0.1 %"
+                             : share < 1e-2                ? "0.1 to 1 %"
+                             : share < 1e-1                ? "1 to 10 %"
+                                                           : "deep";
+    BatchPair pair;
+    pair.b = 1;
+    pair.pose_b = row.pose;
+    pair.scale_b = row.scale_b;
+    classes[name].push_back(pair);
+  }
+  const std::map<std::string, double> wanted = {
+      {"0.01 to 0.1 %", 8}, {"0.1 to 1 %", 4}, {"1 to 10 %", 1}, {"deep", 0.7}};
+  for (const auto& [name, poses] : classes)
+    right = ask(report, "Elephant and dino", name, two, poses, many,
+                wanted.contains(name) ? wanted.at(name) : 0) &&
+            right;
+  const Asset bolt = mesh_of(make_sample("bolt"), "bolt"), nut = mesh_of(make_sample("nut"), "nut");
+  std::vector<BatchPair> engaged = nut_poses(400), clear = engaged;
+  for (BatchPair& pair : engaged) pair.b = 1;
+  for (BatchPair& pair : clear) {
+    pair.b = 1;
+    pair.pose_b.t[0] = pair.pose_b.t[1] = 0;
+    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
+    pair.pose_b.t[2] = 8 + 2 * turn;
+  }
+  const Solids thread = {{&bolt, &nut}};
+  right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
+  right = ask(report, "Nut on bolt", "in clearance", thread, clear, many / 2, 2) && right;
+  // Mated parts, as they are and all together.
+  std::vector<Asset> parts;
+  std::map<std::string, std::uint32_t> number;
+  std::map<std::string, std::vector<BatchPair>> mates;
+  const std::vector<testing::MatedRow> rows = testing::read_mated_rows();
+  for (const testing::MatedRow& row : rows)
+    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
+      if (number.try_emplace(mesh, static_cast<std::uint32_t>(parts.size())).second)
+        parts.push_back(mesh_of(load_mesh(testing::mated_mesh_path(mesh)), mesh));
+  Solids mated;
+  for (const Asset& part : parts) mated.assets.push_back(&part);
+  for (const testing::MatedRow& row : rows) {
+    BatchPair pair;
+    pair.a = number[row.mesh_a];
+    pair.b = number[row.mesh_b];
+    pair.pose_b = row.pose;
+    mates[row.name + (row.moved == 0     ? ", in place"
+                      : row.moved < 1e-2 ? ", near"
+                                         : ", moved")]
+        .push_back(pair);
+  }
+  for (const auto& [name, poses] : mates)
+    right = ask(report, "Mated parts", name, mated, poses, many / 50, 0) && right;
+  for (const std::size_t triangles : {8u, 24u, 80u, 200u}) {
+    const Asset a = mesh_of(small_body(triangles, 1), "body"),
+                b = mesh_of(small_body(triangles, 2), "body");
+    std::mt19937_64 random(3);
+    std::vector<BatchPair> poses;
+    for (int k = 0; k < 4000; ++k) {
+      const auto uniform = [&] { return static_cast<double>(random() >> 11) * 0x1p-52 - 1; };
+      BatchPair pair;
+      pair.b = 1;
+      for (double& q : pair.pose_b.q) q = uniform();
+      double square = 0;
+      for (double& t : pair.pose_b.t) t = uniform(), square += t * t;
+      for (double& t : pair.pose_b.t) t *= 0.75 / std::sqrt(square);
+      poses.push_back(pair);
+    }
+    right = ask(report, "Small bodies", std::to_string(triangles) + " triangles", {{&a, &b}}, poses,
+                many, 0) &&
+            right;
+  }
+  const int written = report.write();
+  if (right) return written;
+  std::fprintf(stderr, "answers differ from the CPU's\n");
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("gpu_exact", argc, argv);
+  report.page("Exact penetrations of many pairs on a GPU");
+  std::string why;
+  if (!gpu_available(0, &why)) {
+    std::fprintf(stderr, "gpu_exact: %s\n", why.c_str());
+    return 1;
+  }
+  try {
+    return measure(report);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

@@ -1,0 +1,288 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/exact_crossings.h"
+#include "query/exact/block_insides.h"
+
+namespace ist::gpu {
+
+/// What lies inside of each mesh once all crossings are known, and what it adds to the sums.
+template <class Team, bool kExactly>
+class ExactInsides {
+ public:
+  IST_HD ExactInsides(const Team& team, ExactMemory& memory, const ExactRoom& room,
+                      std::uint32_t records, bool crossed)
+      : team_(team), memory_(memory), room_(room), records_(records), crossed_(crossed) {}
+
+  /// False where doubles do not tell what is inside.
+  IST_HD bool run() {
+    settle();
+    for (int side = 0; side < 2; ++side) {
+      const MeshTree& mesh = memory_.mesh[side];
+      flood(side);
+      sum_inside(side, static_cast<std::uint32_t>(mesh.top) << kShift);
+    }
+    sum_records();
+    bound_near();
+    return !unsure_;
+  }
+
+ private:
+  static constexpr int kShift = 28;
+
+  IST_HD bool has(const std::uint32_t* bits, std::uint32_t b) const {
+    return (bits[b / 32] >> b % 32 & 1) != 0;
+  }
+  IST_HD exact::Point place(int side, std::uint32_t vertex) const {
+    const exact::Point x = memory_.mesh[side].vertex(vertex);
+    return side == 0 ? x : map_point(memory_.place.a_from_b, x);
+  }
+  /// All of the team together.
+  IST_HD bool is_inside_other(int side, std::uint32_t vertex) {
+    const MeshTree& other = memory_.mesh[1 - side];
+    const MeshOfPair solid =
+        side == 1 ? MeshOfPair{other}
+                  : MeshOfPair{other, &memory_.place.a_from_b, &memory_.place.b_from_a};
+    return is_inside<kExactly>(team_, solid, place(side, vertex), memory_.aside, memory_.stack,
+                               unsure_);
+  }
+
+  /// Which vertices of records are inside.
+  IST_HD void settle() {
+    const auto lane = static_cast<std::uint32_t>(team_.lane());
+    for (std::uint32_t first = 0; first < records_;
+         first += static_cast<std::uint32_t>(Team::kWidth)) {
+      const std::uint32_t r = first + lane;
+      std::uint32_t unknown = kWidth;
+      BlockInsides found;
+      int side = 0;
+      std::uint32_t block = 0;
+      if (r < records_) {
+        const CrossedRef& record = room_.records[r];
+        side = record.of_b;
+        block = record.block;
+        if (record.all_pierced() != 0) {
+          const MeshBlock& mesh = memory_.mesh[side].blocks[block];
+          found = BlockInsides(
+              mesh, record.all_pierced(), [&](std::uint32_t e) { return record.sum(e); },
+              [](std::uint32_t) { return 0; });
+          unknown = found.unknown(mesh);
+          atomic_or(&room_.pierced[side][block / 32], 1u << block % 32);
+        }
+      }
+      for (;;) {
+        int waiting = 0;
+        const int next = team_.first(unknown < kWidth, waiting);
+        if (next < 0) break;
+        const int of_side = team_.broadcast(side, next);
+        const MeshBlock& mesh = memory_.mesh[of_side].blocks[team_.broadcast(block, next)];
+        const bool is = is_inside_other(of_side, mesh.vertex[team_.broadcast(unknown, next)]);
+        if (team_.lane() == next) {
+          found.tell(unknown, is);
+          unknown = found.unknown(mesh);
+        }
+      }
+      if (r < records_) room_.records[r].inside = static_cast<std::uint16_t>(found.inside);
+    }
+    team_.sync();
+  }
+
+  /// A block lies inside as a whole.
+  IST_HD void wait(int side, std::uint32_t block) {
+    if (has(room_.pierced[side], block)) return;
+    const std::uint32_t bit = 1u << block % 32;
+    if ((atomic_or(&room_.inside[side][block / 32], bit) & bit) != 0) return;
+    room_.flood[atomic_add(&memory_.flooded, 1)] = block;
+  }
+
+  /// From blocks whose edges are pierced on, and whole shells.
+  IST_HD void flood(int side) {
+    const MeshTree& mesh = memory_.mesh[side];
+    const std::uint32_t shells = mesh.header->shell_count;
+    if (team_.lane() == 0) memory_.flooded = 0;
+    team_.sync();
+    bool any = false;
+    for (std::uint32_t r = static_cast<std::uint32_t>(team_.lane()); r < records_;
+         r += static_cast<std::uint32_t>(Team::kWidth)) {
+      const CrossedRef& record = room_.records[r];
+      if (record.of_b != side || record.all_pierced() == 0) continue;
+      any = true;
+      const MeshBlock& block = mesh.blocks[record.block];
+      for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+        const std::uint32_t entry = mesh.neighbours[block.first_neighbour + k];
+        if ((record.inside >> entry % kWidth & 1) != 0) wait(side, entry / kWidth);
+      }
+    }
+    // A solid of one shell that is pierced has no whole one.
+    any = team_.any(any);
+    for (std::uint32_t s = 0; s < shells && !(any && shells == 1); ++s) {
+      const std::uint32_t block = mesh.shells[s].block;
+      if (is_pierced(side, s)) continue;
+      if (!is_inside_other(side, mesh.blocks[block].vertex[0])) continue;
+      if (!crossed_) {
+        crossed_ = true;
+        const exact::Point here = place(side, mesh.blocks[block].vertex[0]);
+        team_.sync();
+        if (team_.lane() == 0) memory_.origin = here;
+      }
+      if (team_.lane() == 0) wait(side, block);
+    }
+    team_.sync();
+    std::uint32_t done = 0;
+    for (;;) {
+      const std::uint32_t flooded = memory_.flooded;
+      if (done == flooded) break;
+      team_.sync();
+      for (std::uint32_t i = done + static_cast<std::uint32_t>(team_.lane()); i < flooded;
+           i += static_cast<std::uint32_t>(Team::kWidth)) {
+        const MeshBlock& block = mesh.blocks[room_.flood[i]];
+        for (std::uint32_t k = 0; k < block.neighbours; ++k)
+          wait(side, mesh.neighbours[block.first_neighbour + k] / kWidth);
+      }
+      done = flooded;
+      team_.sync();
+    }
+  }
+
+  /// Whether edges of a shell are pierced.
+  IST_HD bool is_pierced(int side, std::uint32_t shell) const {
+    bool pierced = false;
+    for (std::uint32_t r = static_cast<std::uint32_t>(team_.lane()); r < records_;
+         r += static_cast<std::uint32_t>(Team::kWidth)) {
+      const CrossedRef& record = room_.records[r];
+      pierced = pierced || (record.of_b == side && record.all_pierced() != 0 &&
+                            memory_.mesh[side].blocks[record.block].shell == shell);
+    }
+    return team_.any(pierced);
+  }
+
+  /// Blocks inside as a whole, as few lanes of boxes as hold them; `root` is a node.
+  IST_HD void sum_inside(int side, std::uint32_t root) {
+    const MeshTree& mesh = memory_.mesh[side];
+    if (memory_.flooded == 0) return;
+    std::uint32_t* const stack = memory_.stack.node;
+    std::uint32_t waiting = 1;
+    team_.sync();
+    if (team_.lane() == 0) stack[0] = root;
+    team_.sync();
+    while (waiting > 0) {
+      const std::uint32_t node = stack[--waiting];
+      const int level = static_cast<int>(node >> kShift);
+      const std::uint32_t number = node & ((1u << kShift) - 1);
+      const std::uint32_t used = mesh.level[level - 1].count - kWidth * number;
+      team_.sync();
+      for (int first = 0; first < static_cast<int>(kWidth); first += Team::kWidth) {
+        const auto l = static_cast<std::uint32_t>(first + team_.lane());
+        bool all = false, none = true;
+        if (l < kWidth && l < used) look(side, level, kWidth * number + l, all, none);
+        if (all) add_lane(side, level, number, l);
+        int total = 0;
+        const int before = team_.exclusive_count(!all && !none, total);
+        if (!all && !none)
+          stack[waiting + static_cast<std::uint32_t>(before)] =
+              static_cast<std::uint32_t>(level - 1) << kShift | (kWidth * number + l);
+        waiting += static_cast<std::uint32_t>(total);
+      }
+      team_.sync();
+    }
+  }
+
+  /// Whether all or none of the blocks below a lane are inside.
+  IST_HD void look(int side, int level, std::uint32_t number, bool& all, bool& none) const {
+    const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
+    const std::uint32_t count = memory_.mesh[side].level[0].count;
+    const std::uint32_t first = number << shift;
+    const std::uint32_t end = count - first < 1u << shift ? count : first + (1u << shift);
+    all = none = true;
+    for (std::uint32_t b = first; b < end; b += 32 - b % 32) {
+      const std::uint32_t left = end - b < 32 - b % 32 ? end - b : 32 - b % 32;
+      const std::uint32_t mask = (left == 32 ? ~0u : (1u << left) - 1) << b % 32;
+      const std::uint32_t word = room_.inside[side][b / 32] & mask;
+      all = all && word == mask;
+      none = none && word == 0;
+    }
+  }
+
+  IST_HD void add(double six) {
+    double(&sum)[ExactSum::kCount][32] = memory_.sum;
+    const int lane = team_.lane();
+    double rest;
+    exact::two_sum(sum[ExactSum::kHigh][lane], six, sum[ExactSum::kHigh][lane], rest);
+    sum[ExactSum::kLow][lane] += rest;
+  }
+  IST_HD void add(int of, const exact::Point& x) {
+    for (int k = 0; k < 3; ++k) memory_.sum[of + k][team_.lane()] += x[k];
+  }
+
+  IST_HD void add_lane(int side, int level, std::uint32_t i, std::uint32_t lane) {
+    const MeshTree::Level& of = memory_.mesh[side].level[level];
+    const LaneSums found = lane_sums(of.boxes[i], of.sums[i], lane,
+                                     side == 0 ? nullptr : &memory_.place.a_from_b, memory_.origin);
+    add(found.six_volumes);
+    add(ExactSum::kMoment, found.moment);
+    memory_.sum[ExactSum::kRounding][team_.lane()] += found.six_volume_rounding;
+    memory_.sum[ExactSum::kLayers][team_.lane()] +=
+        moved_layer(memory_.moved[side], found.area, found.width);
+  }
+
+  /// What rounding and deviations of blocks that are near the other surface do to the volume.
+  IST_HD void bound_near() {
+    for (int side = 0; side < 2; ++side)
+      for (std::uint32_t w = static_cast<std::uint32_t>(team_.lane()); w < room_.words;
+           w += static_cast<std::uint32_t>(Team::kWidth))
+        for (std::uint32_t left = room_.near[side][w]; left != 0; left &= left - 1)
+          bound(side, 32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
+  }
+
+  /// Of triangles of crossed blocks the cones over the edges opposite to their apexes.
+  IST_HD void sum_records() {
+    const std::uint32_t triangles = kWidth * records_;
+    for (std::uint32_t n = static_cast<std::uint32_t>(team_.lane()); n < triangles;
+         n += static_cast<std::uint32_t>(Team::kWidth)) {
+      const CrossedRef& record = room_.records[n / kWidth];
+      const std::uint32_t t = n % kWidth;
+      const int side = record.of_b;
+      const MeshBlock& block = memory_.mesh[side].blocks[record.block];
+      if (t >= block.triangles || record.all_pierced() == 0) continue;
+      const exact::Point corner[3] = {
+          place(side, block.vertex[block.corner[0][t]]) - memory_.origin,
+          place(side, block.vertex[block.corner[1][t]]) - memory_.origin,
+          place(side, block.vertex[block.corner[2][t]]) - memory_.origin};
+      const auto apex = static_cast<std::uint32_t>(exact::apex_of(exact::length_bound(corner[0]),
+                                                                  exact::length_bound(corner[1]),
+                                                                  exact::length_bound(corner[2])));
+      // Whether the middle of the edge opposite to the apex is inside.
+      const std::uint32_t k = (apex + 1) % 3, edge = 3 * t + k;
+      const int count =
+          static_cast<int>(record.inside >> block.corner[k][t] & 1) + record.near_first(edge);
+      if (count == 0) continue;
+      exact::PieceTerms terms;
+      exact::cone_terms(count, corner[apex], corner[(apex + 1) % 3], corner[(apex + 2) % 3], terms);
+      add(terms.six_volumes[0]);
+      add(ExactSum::kMoment, terms.moment);
+      memory_.sum[ExactSum::kRounding][team_.lane()] += terms.rounding;
+    }
+  }
+
+  IST_HD void bound(int side, std::uint32_t b) {
+    const MeshTree::Level& of = memory_.mesh[side].level[1];
+    const BoxBlock& box = of.boxes[b / kWidth];
+    const std::uint32_t lane = b % kWidth;
+    const double scale = side == 0 ? 1 : memory_.place.a_from_b.scale;
+    double wide = 0;
+    for (int k = 0; k < 3; ++k)
+      wide += scale * (double{box.high[k][lane]} - double{box.low[k][lane]});
+    memory_.sum[ExactSum::kLayers][team_.lane()] +=
+        moved_layer(memory_.moved[side], scale * scale * of.sums[b / kWidth].area[lane], wide);
+  }
+
+  const Team& team_;
+  ExactMemory& memory_;
+  const ExactRoom& room_;
+  std::uint32_t records_;
+  bool crossed_;  ///< there is an origin
+  bool unsure_ = false;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+
+#include "query/exact/box_integrals.h"
+#include "query/exact/crossing.h"
+
+namespace ist {
+
+/// One mesh of a pair. A's is where it is; B's vertices are moved into A's unit frame.
+struct MeshOfPair {
+  const MeshTree& mesh;
+  const Similarity* to_a = nullptr;  ///< null: it is A's
+  const Similarity* from_a = nullptr;
+
+  IST_HD bool is_b() const noexcept { return to_a != nullptr; }
+  IST_HD exact::Point place(std::uint32_t vertex) const noexcept {
+    const exact::Point x = mesh.vertex(vertex);
+    return is_b() ? map_point(*to_a, x) : x;
+  }
+};
+
+/// Nodes of a mesh that wait, of a search depth first.
+struct InsideStack {
+  std::uint32_t node[kWidth * kMaxLevels];  ///< level << 28 | number
+};
+
+/// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
+/// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one
+/// way or the other. All of a team together; `stack` is what its lanes share. `unsure`: doubles do
+/// not tell, without `kExactly`.
+template <bool kExactly, class Team>
+IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Point& p,
+                           const exact::Point& aside, InsideStack& stack, bool& unsure) noexcept {
+  using exact::Point;
+  const MeshTree& mesh = solid.mesh;
+  const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
+  const double at[3] = {start.x, start.y, start.z};
+  // What mapping there and back rounds, and what B is moved aside.
+  double pad = 0;
+  for (int k = 0; k < 3; ++k)
+    pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;
+  pad = 1e-12 * pad + 2 * (solid.is_b() ? solid.from_a->scale : 1.0) *
+                          (std::abs(aside.x) + std::abs(aside.y) + std::abs(aside.z));
+  float low[3], high[3];
+  int axis = 0;
+  double shortest = HUGE_VAL, end = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double lowest = mesh.low[k], highest = mesh.high[k];
+    if (at[k] < lowest - pad || at[k] > highest + pad) return false;
+    const double beyond = 0.25 * (highest - lowest) + 8 * pad;
+    for (const double to : {lowest - beyond, highest + beyond})
+      if (std::abs(to - at[k]) < shortest) {
+        shortest = std::abs(to - at[k]);
+        axis = k;
+        end = to;
+      }
+    low[k] = static_cast<float>(at[k] - pad);
+    low[k] -= std::abs(low[k]) * 2e-7f;
+    high[k] = static_cast<float>(at[k] + pad);
+    high[k] += std::abs(high[k]) * 2e-7f;
+  }
+  double to[3] = {at[0], at[1], at[2]};
+  to[axis] = end;
+  (end < at[axis] ? low : high)[axis] = static_cast<float>(end);
+  const Point beyond = {to[0], to[1], to[2]};
+  const Point q = solid.is_b() ? map_point(*solid.to_a, beyond) : beyond;
+
+  constexpr std::uint32_t kNumber = (1u << 28) - 1;
+  bool doubtful = false;
+  int entered = 0, waiting = 1;
+  if (team.lane() == 0) stack.node[0] = static_cast<std::uint32_t>(mesh.top) << 28;
+  team.sync();
+  while (waiting > 0) {
+    const std::uint32_t node = stack.node[--waiting], level = node >> 28, number = node & kNumber;
+    if (level == 0) {
+      const MeshBlock& block = mesh.blocks[number];
+      for (int t = team.lane(); t < block.triangles; t += Team::kWidth) {
+        const Point corners[3] = {solid.place(block.vertex[block.corner[0][t]]),
+                                  solid.place(block.vertex[block.corner[1][t]]),
+                                  solid.place(block.vertex[block.corner[2][t]])};
+        entered += exact::enters<kExactly>(p, q, corners, !solid.is_b(), aside, doubtful);
+      }
+      continue;
+    }
+    const BoxBlock& boxes = mesh.level[level].boxes[number];
+    const std::uint32_t used = mesh.level[level - 1].count - kWidth * number;
+    team.sync();  // all have read what is overwritten now
+    for (int first = 0; first < static_cast<int>(kWidth); first += Team::kWidth) {
+      const auto l = static_cast<std::uint32_t>(first + team.lane());
+      bool meets = l < kWidth && l < used;
+      for (int k = 0; k < 3; ++k)
+        meets = meets && boxes.low[k][l] <= high[k] && boxes.high[k][l] >= low[k];
+      int total = 0;
+      const int place = waiting + team.exclusive_count(meets, total);
+      if (meets) stack.node[place] = (level - 1) << 28 | (kWidth * number + l);
+      waiting += total;
+    }
+    team.sync();
+  }
+  if constexpr (!kExactly) unsure = team.any(doubtful) || unsure;
+  return team.sum(entered) < 0;
+}
+
+}  // namespace ist

@@ -1,0 +1,98 @@
+// Formulas of an overlap's sums, once for lanes of the CPU and for a thread of the GPU. No header
+// of its own: who includes it says before what its numbers are. `Real`, `Mask` and `Vec3` are a
+// number, an answer and three numbers, or lanes of them; constant(), magnitude(), choose(), less()
+// and equal() work on them. IST_FORMULA goes before a function.
+
+/// Where an edge from p to q goes through a plane.
+struct EdgeEnd {
+  Vec3 from;         ///< the end of the edge that is nearer to the plane
+  Vec3 offset;       ///< from there to the place: it keeps its digits where that is next to the end
+  Real share;        ///< of the edge that the offset is
+  Real heights;      ///< of both ends together; 1 where they are rounded to 0
+  Mask flat;         ///< they are
+  Mask from_second;  ///< the nearer end is q
+};
+
+/// From heights over the plane. From the nearer end, and between two as near from the first in
+/// space, so that both triangles at an edge do alike.
+IST_FORMULA EdgeEnd edge_end(const Vec3& p, const Vec3& q, Real height_p, Real height_q) {
+  const Real hp = magnitude(height_p), hq = magnitude(height_q), whole = hp + hq;
+  const Mask before =
+      either(less(q.x, p.x),
+             both(equal(q.x, p.x), either(less(q.y, p.y), both(equal(q.y, p.y), less(q.z, p.z)))));
+  const Mask turned = either(less(hq, hp), both(equal(hq, hp), before));
+  // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
+  const Mask flat = equal(whole, constant(0.0));
+  const Real divisor = choose(flat, constant(1.0), whole);
+  const Real share = choose(flat, constant(0.5), lesser(hp, hq) / divisor);
+  const Vec3 near = {choose(turned, q.x, p.x), choose(turned, q.y, p.y), choose(turned, q.z, p.z)};
+  const Vec3 far = {choose(turned, p.x, q.x), choose(turned, p.y, q.y), choose(turned, p.z, q.z)};
+  return {near, share * (far - near), share, divisor, flat, turned};
+}
+
+/// The corner that a triangle's cones start at, 0 … 2, of its corners' distances from the origin:
+/// the nearest.
+IST_FORMULA Real apex_of(Real first, Real second, Real third) {
+  return choose(less(third, lesser(first, second)), constant(2.0),
+                choose(less(second, first), constant(1.0), constant(0.0)));
+}
+
+/// What a piece of the boundary adds to the sums, from the origin.
+struct PieceTerms {
+  Real six_volumes[3];  ///< of tetrahedra: summed one by one, as they may cancel
+  Vec3 moment, force, torque;
+  Real rounding;  ///< six times what the volume may be off by
+};
+
+/// A segment that two triangles share, and pierced edges opposite to an apex from their nearer ends
+/// on. A cone from the origin over a part of a triangle is made of tetrahedra with an edge from the
+/// origin to the triangle's apex; segments that two triangles share bound both of their parts.
+///
+/// `near`: an end's nearer end of its edge; `apex`: of A's and of B's triangle; `by_b`: whose edge
+/// an end is of; `opposite`: 1 where its edge is opposite to its triangle's apex and enters, −1
+/// where it leaves, else 0; `height_error`: of both ends of an edge together.
+IST_FORMULA void segment_terms(const Vec3 (&near)[2], const Vec3 (&offset)[2],
+                               const Vec3 (&apex)[2], const Mask (&by_b)[2],
+                               const Real (&opposite)[2], const Real (&height_error)[2],
+                               PieceTerms& out) {
+  const Vec3 at[2] = {near[0] + offset[0], near[1] + offset[1]};
+  const Vec3 &a = at[0], &b = at[1], &of_a = apex[0], &of_b = apex[1];
+  const Vec3 along = b - a, c = cross(a, along), sum = a + b;
+  const Real six_a = dot(c, of_a), six_b = dot(c, of_b);
+  out.six_volumes[0] = dot(c, of_a - of_b);
+  Vec3 moment = six_a * (of_a + sum) - six_b * (of_b + sum);
+  // What the product rounds, and what ends that are rounded do to the triangles at them.
+  Real rounding = constant(exact::kHalfUnit) * length_bound(along) *
+                  (constant(8.0) * length_bound(a) * length_bound(of_a - of_b) +
+                   constant(6.0) * (length_bound(a) + length_bound(b)) *
+                       (length_bound(of_a - a) + length_bound(of_b - a)));
+  for (int e = 0; e < 2; ++e) {
+    const Vec3 from = {choose(by_b[e], of_b.x, of_a.x), choose(by_b[e], of_b.y, of_a.y),
+                       choose(by_b[e], of_b.z, of_a.z)};
+    const Vec3 to = near[e] - from;
+    const Real six = opposite[e] * dot(from, cross(offset[e], to));
+    out.six_volumes[1 + e] = six;
+    moment = moment + six * (from + (near[e] + at[e]));
+    rounding = rounding + (magnitude(opposite[e]) * constant(20 * exact::kHalfUnit) *
+                               (length_bound(from) + length_bound(to)) *
+                               (length_bound(offset[e]) * length_bound(to)) +
+                           constant(3.0) * height_error[e]);
+  }
+  out.moment = moment;
+  out.force = constant(-0.5) * c;
+  out.torque = (((dot(a, a) + dot(a, b)) + dot(b, b)) / constant(6.0)) * along;
+  out.rounding = rounding;
+}
+
+/// The cone over the edge opposite to a triangle's apex, `count` times. It has neither force nor
+/// torque, and but one tetrahedron.
+IST_FORMULA void cone_terms(Real count, const Vec3& apex, const Vec3& next, const Vec3& last,
+                            PieceTerms& out) {
+  const Vec3 u = next - apex, v = last - apex;
+  const Real six = count * dot(apex, cross(u, v));
+  out.six_volumes[0] = six;
+  out.rounding = magnitude(count) * constant(20 * exact::kHalfUnit) *
+                 ((length_bound(apex) + length_bound(u) + length_bound(v)) *
+                  (length_bound(u) * length_bound(v)));
+  out.moment = six * (apex + (next + last));
+}

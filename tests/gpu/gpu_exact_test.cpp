@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <ist/error.h>
+#include <ist/gpu_query.h>
+
+#include "support/device_batch.h"
+#include "support/exact_batches.h"
+#include "support/gpu_test.h"
+#include "support/mated_rows.h"
+
+// Batches of exact penetrations on the GPU: the same bits as its source on the host, lane by lane,
+// and the CPU's answers.
+
+namespace ist::testing {
+namespace {
+
+class GpuExactTest : public GpuTest {};
+
+std::vector<Penetration> ask_device(const std::vector<GpuSolid>& all,
+                                    const std::vector<BatchPair>& pairs) {
+  const GpuSolids solids(all);
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  const DeviceBatch first(pairs), second(pairs);
+  for (const DeviceBatch* batch : {&first, &second})
+    penetration_batch(solids, batch->pairs(), {Measure::exact}, workspace, batch->answers(),
+                      stream);
+  stream.wait();
+  const std::vector<Penetration> answers = first.get();
+  expect_same_bits(second.get(), answers);
+  return answers;
+}
+
+TEST_F(GpuExactTest, HasTheBitsOfAWarpOnTheHost) {
+  std::vector<BatchPair> pairs = exact_pairs(41, 60);
+  for (const BatchPair& pair : aligned_pairs(42, 40)) pairs.push_back(pair);
+  pairs[20].pose_b.t[0] = std::nan("");
+  pairs[30].scale_b = -1;
+  pairs[40].a = 1000;
+  HostBatch host(exact_solids());
+  expect_same_bits(ask_device(exact_solids(), pairs), host.run(pairs, Measure::exact, 1));
+}
+
+TEST_F(GpuExactTest, AnswersAreTheCpus) {
+  for (const std::vector<BatchPair>& pairs : {exact_pairs(43, 100'000), aligned_pairs(44, 30'000)})
+    expect_near(compare_exactly(exact_assets(), pairs, ask_device(exact_solids(), pairs)));
+}
+
+TEST_F(GpuExactTest, OracleRowsAreTheCpusAndTrue) {
+  for (const std::string& key : kPairKeys) {
+    if (key == "big200k") continue;
+    std::vector<Asset> assets;
+    std::map<std::string, std::uint32_t> number;
+    std::vector<BatchPair> pairs;
+    std::vector<double> truth;
+    const auto asset = [&](const std::string& mesh) {
+      const std::string path = oracle_mesh_path(mesh);
+      const auto [at, fresh] = number.try_emplace(path, static_cast<std::uint32_t>(assets.size()));
+      if (fresh) assets.push_back(surface(load_mesh(path)));
+      return at->second;
+    };
+    for (const OracleRow& row : read_oracle_rows(key)) {
+      BatchPair pair;
+      pair.a = asset(row.mesh_a);
+      pair.b = asset(row.mesh_b);
+      pair.pose_b = row.pose;
+      pair.scale_b = row.scale_b;
+      pairs.push_back(pair);
+      truth.push_back(row.volume);
+    }
+    const std::vector<Penetration> answers = ask_device(views_of(assets), pairs);
+    std::printf("%s: ", key.c_str());
+    expect_near(compare_exactly(assets, pairs, answers));
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      EXPECT_NEAR(answers[i].volume, truth[i], 1e-11 * (truth[i] + 1e-3)) << key << " " << i;
+  }
+}
+
+TEST_F(GpuExactTest, MatedPartsAreTheCpusAndTrue) {
+  std::vector<Asset> assets;
+  std::map<std::string, std::uint32_t> number;
+  std::vector<BatchPair> pairs;
+  const std::vector<MatedRow> rows = read_mated_rows();
+  const auto asset = [&](const std::string& mesh) {
+    const auto [at, fresh] = number.try_emplace(mesh, static_cast<std::uint32_t>(assets.size()));
+    if (fresh) assets.push_back(surface(load_mesh(mated_mesh_path(mesh))));
+    return at->second;
+  };
+  for (const MatedRow& row : rows) {
+    BatchPair pair;
+    pair.a = asset(row.mesh_a);
+    pair.b = asset(row.mesh_b);
+    pair.pose_b = row.pose;
+    pairs.push_back(pair);
+  }
+  const std::vector<Penetration> answers = ask_device(views_of(assets), pairs);
+  expect_near(compare_exactly(assets, pairs, answers));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double size = size_of({assets[pairs[i].a].view(), {}, 1});
+    EXPECT_NEAR(answers[i].volume, rows[i].volume, 1e-12 * size * size * size)
+        << rows[i].name << " " << rows[i].moved;
+  }
+}
+
+}  // namespace
+}  // namespace ist::testing

@@ -1,0 +1,69 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "support/exact_batches.h"
+
+// The GPU's batch of exact penetrations, its source run by teams of the host: of one lane, and of
+// 32 that go on in an order that nobody can count on.
+
+namespace ist::testing {
+namespace {
+
+TEST(GpuExact, AnswersAreTheCpus) {
+  const std::vector<BatchPair> pairs = exact_pairs(31, 1000);
+  HostBatch batch(exact_solids());
+  const Differences worst =
+      compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));
+  EXPECT_GT(worst.met, 500u);
+  expect_near(worst);
+}
+
+TEST(GpuExact, AlignedAnswersAreTheCpus) {
+  const std::vector<BatchPair> pairs = aligned_pairs(33, 1000);
+  HostBatch batch(exact_solids());
+  const Differences worst =
+      compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));
+  // Ties are the second pass's.
+  EXPECT_GT(batch.exact_counters.listed[1], 100u);
+  EXPECT_GT(worst.met, 500u);
+  expect_near(worst);
+}
+
+/// Which lane does what, and when, must not show.
+TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
+  std::vector<BatchPair> pairs = exact_pairs(34, 30);
+  for (const BatchPair& pair : aligned_pairs(36, 20)) pairs.push_back(pair);
+  HostBatch batch(exact_solids());
+  const std::vector<Penetration> expected = batch.run(pairs, Measure::exact, 1);
+  expect_near(compare_exactly(exact_assets(), pairs, expected));
+  expect_same_bits(batch.run(pairs, Measure::exact, 2), expected);
+}
+
+TEST(GpuExact, WhatCannotBeAskedSaysSo) {
+  std::vector<GpuSolid> solids = exact_solids();
+  solids.emplace_back(batch_assets()[0].view());  // keeps no mesh
+  solids.emplace_back(Field(BallField{1}));
+  std::vector<BatchPair> pairs = exact_pairs(35, 5);
+  pairs[0].b = 5;
+  pairs[1].a = 0;
+  pairs[1].b = 6;
+  pairs[2].b = 7;
+  pairs[3].pose_b.t[1] = std::nan("");
+  HostBatch batch(solids);
+  const std::vector<Penetration> exact = batch.run(pairs, Measure::exact);
+  const std::vector<Penetration> by_spheres = batch.run(pairs, Measure::matched);
+  constexpr QueryStatus kNot = QueryStatus::not_held, kInvalid = QueryStatus::invalid_input;
+  for (const auto& [i, status] : {std::pair{0, kNot}, {1, kNot}, {2, kInvalid}, {3, kInvalid}}) {
+    EXPECT_EQ(exact[static_cast<std::size_t>(i)].status, status);
+    EXPECT_TRUE(std::isnan(exact[static_cast<std::size_t>(i)].volume));
+  }
+  EXPECT_EQ(exact[4].status, QueryStatus::ok);
+  // A mesh alone has no spheres to sum.
+  EXPECT_EQ(by_spheres[0].status, kNot);
+  EXPECT_EQ(by_spheres[1].status, kNot);
+}
+
+}  // namespace
+}  // namespace ist::testing
