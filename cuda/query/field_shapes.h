@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-/// No nearer to the surface than this, positive inside.
+/// No nearer to the surface than this, negative inside.
 IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:

@@ -111,7 +111,7 @@ class FieldWalk {
         const double d = distance_in(m_.field, x, sound_),
                      reach = sure_reach(r, distance_error(m_.field));
         waits = d > -reach && d < reach;
-        if (d >= reach)
+        if (d <= -reach)
           sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),
                           m_.place.a_from_b);
       }

@@ -20,13 +20,13 @@ bool tell(const char* name, const ist::PlacedField& field, const ist::PlacedTree
   return p.status == ist::QueryStatus::ok && p.volume > 0;
 }
 
-/// Waves along x: [u] below the surface, and which way it goes. Divided by the steepest slope, so
+/// Waves along x: [u] above the surface, and which way it goes. Divided by the steepest slope, so
 /// that no distance is too large.
 ist::FieldSample waves(const void*, const Eigen::Vector3d& x) noexcept {
   constexpr double kHeight = 0.1, kLength = 2, kPi = 3.14159265358979;
   const double k = 2 * kPi / kLength, steepest = std::hypot(1, kHeight * k);
-  const double below = kHeight * std::sin(k * x.x()) - x.z();
-  return {below / steepest, Eigen::Vector3d(kHeight * k * std::cos(k * x.x()), 0, -1) / steepest};
+  const double above = x.z() - kHeight * std::sin(k * x.x());
+  return {above / steepest, Eigen::Vector3d(-kHeight * k * std::cos(k * x.x()), 0, 1) / steepest};
 }
 
 }  // namespace

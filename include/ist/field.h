@@ -8,8 +8,8 @@
 
 // Fields: shapes that a sphere tree collides with and that need no tree themselves: half-spaces,
 // primitives, terrains, distance grids and functions. They are plain views: nothing is copied or
-// allocated, and memory they point to must outlive them. Distances are positive inside the solid
-// and negative outside, as those of Solid. Lengths are [u] in the field's own frame.
+// allocated, and memory they point to must outlive them. Distances are negative inside the solid
+// and positive outside, as those of Solid. Lengths are [u] in the field's own frame.
 
 namespace IST_API ist {
 
@@ -73,13 +73,14 @@ struct DistanceGridField {
 
 /// A sample of a field.
 struct FieldSample {
-  double distance = 0;                                 ///< [u] to the surface, positive inside
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
+  double distance = 0;                                 ///< [u] to the surface, negative inside
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance: outward
 };
 
 /// A field by a function of the caller's. It is called once for every node and ball that is
-/// visited, on the thread of the query. It must be 1-Lipschitz and never exceed the true distance
-/// by more than `error`. A sample that is not finite gives QueryStatus::invalid_input.
+/// visited, on the thread of the query. It must be 1-Lipschitz, and its magnitude must never exceed
+/// the true distance by more than `error`. A sample that is not finite gives
+/// QueryStatus::invalid_input.
 struct FunctionField {
   FieldSample (*sample)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
   const void* context = nullptr;  ///< passed to `sample`

@@ -252,7 +252,7 @@ typedef struct ist_pose {
 #define IST_POSE_IDENTITY {{1, 0, 0, 0}, {0, 0, 0}}
 /* clang-format on */
 
-/* --- Fields: solids without spheres (field.h). Distances are positive inside. ----------------- */
+/* --- Fields: solids without spheres (field.h). Distances are negative inside. ----------------- */
 
 typedef int32_t ist_field_kind_t;
 enum {
@@ -268,8 +268,8 @@ enum {
 
 /* A sample of a field. */
 typedef struct ist_field_sample {
-  double distance;    /* [u] to the surface, positive inside */
-  double gradient[3]; /* of the distance */
+  double distance;    /* [u] to the surface, negative inside */
+  double gradient[3]; /* of the distance: outward */
 } ist_field_sample_t;
 
 /* A plain view: what it points to must outlive its use. */

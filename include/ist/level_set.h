@@ -13,7 +13,7 @@
 
 namespace IST_API ist {
 
-/// Signed distances at the points of a lattice, positive inside. A band around the surface
+/// Signed distances at the points of a lattice, negative inside. A band around the surface
 /// suffices: beyond it only the sign matters.
 struct DistanceGrid {
   std::array<std::uint32_t, 3> size = {};            ///< points along x, y, z, each ≥ 2
@@ -28,7 +28,7 @@ struct LevelSetMesh {
   double error = 0;  ///< [u] proven: its surface and the level set lie within this of each other
 };
 
-/// The solid where the trilinear interpolation of a grid is > 0, as a mesh: a vertex in every cell
+/// The solid where the trilinear interpolation of a grid is < 0, as a mesh: a vertex in every cell
 /// whose eight points have both signs, with sharp edges and corners. It is a mesh like any other:
 /// bake() takes it, also on a GPU, and check() proves against it.
 ///
@@ -49,8 +49,8 @@ std::unique_ptr<Solid> make_grid_solid(const DistanceGrid& grid);
 /// Whether this library was built with OpenVDB.
 bool vdb_available() noexcept;
 
-/// The level set of an OpenVDB file: its one grid, of floats and marked as a level set (negative
-/// inside, as in OpenVDB), with any linear transform. [u] is the file's world unit.
+/// The level set of an OpenVDB file: its one grid, of floats and marked as a level set, with any
+/// linear transform. [u] is the file's world unit.
 ///
 /// load_mesh() reads a .vdb this way too, so every function that takes a mesh file takes such a
 /// file. OpenVDB reads the file: do not use it for untrusted files.

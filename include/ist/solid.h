@@ -35,8 +35,8 @@ class Solid {
  public:
   virtual ~Solid() = default;
 
-  /// [u] distance to the surface, positive inside, negative outside; 1-Lipschitz. It may
-  /// underestimate the true distance (as CSG by min and max does), never overestimate it.
+  /// [u] distance to the surface, negative inside, positive outside; 1-Lipschitz. Its magnitude
+  /// may underestimate the true distance (as CSG by min and max does), never overestimate it.
   virtual double signed_distance(const Eigen::Vector3d& x) const = 0;
 
   virtual Eigen::AlignedBox3d bounds() const = 0;  ///< [u] contains the whole solid
@@ -61,9 +61,9 @@ std::unique_ptr<Solid> make_box(const Eigen::Vector3d& centre, const Eigen::Vect
 /// of the tube.
 std::unique_ptr<Solid> make_torus(const Eigen::Vector3d& centre, double major, double minor);
 
-/// The solid where a function [u] is > 0.
+/// The solid where a function [u] is < 0.
 ///
-/// The function must be 1-Lipschitz, must be 0 or less outside `bounds` [u], and may be called from
+/// The function must be 1-Lipschitz, must be 0 or more outside `bounds` [u], and may be called from
 /// many threads at once. Divide a smooth function by a bound of its slope. If the function is not
 /// 1-Lipschitz, spheres may protrude and parts may be missed: bake() tests some thousand pairs of
 /// points and throws Error with a place; pack() tests nothing. The volume is as for the boolean

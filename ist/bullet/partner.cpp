@@ -52,15 +52,15 @@ FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept 
   FieldSample sample;
   Eigen::Vector2d gradient;
   if (to_side >= 0 && to_base >= 0) {
-    sample.distance = std::min(to_side, to_base);
-    gradient = to_side < to_base ? Eigen::Vector2d(-side) : Eigen::Vector2d(0, 1);
+    sample.distance = -std::min(to_side, to_base);
+    gradient = to_side < to_base ? side : Eigen::Vector2d(0, -1);
   } else {
-    const Eigen::Vector2d base = on_segment(point, foot, rim) - point;
-    const Eigen::Vector2d mantle = on_segment(point, rim, apex) - point;
+    const Eigen::Vector2d base = point - on_segment(point, foot, rim);
+    const Eigen::Vector2d mantle = point - on_segment(point, rim, apex);
     gradient = base.squaredNorm() < mantle.squaredNorm() ? base : mantle;
     const double distance = gradient.norm();
-    sample.distance = -distance;
-    gradient = distance > 0 ? Eigen::Vector2d(gradient / distance) : Eigen::Vector2d(-side);
+    sample.distance = distance;
+    gradient = distance > 0 ? Eigen::Vector2d(gradient / distance) : side;
   }
   const Eigen::Vector2d radial =
       out > 0 ? Eigen::Vector2d(x.head<2>() / out) : Eigen::Vector2d(1, 0);
@@ -145,12 +145,12 @@ HullDistance::HullDistance(const std::vector<btVector3>& points) {
 }
 
 FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
-  FieldSample inside{std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
+  FieldSample inside{-std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
   double nearest = std::numeric_limits<double>::infinity();
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const Face& face : faces_) {
     const double out = face.normal.dot(x) - face.offset;
-    if (-out < inside.distance) inside = {-out, -face.normal};
+    if (out > inside.distance) inside = {out, face.normal};
     if (out <= 0) continue;
     bool over = true;
     const std::size_t count = face.corners.size();
@@ -159,13 +159,13 @@ FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
       const Eigen::Vector3d& b = face.corners[(i + 1) % count];
       if ((b - a).cross(face.normal).dot(x - a) <= 0) continue;
       over = false;
-      const Eigen::Vector3d to_edge = on_segment(x, a, b) - x;
-      if (to_edge.norm() < nearest) nearest = to_edge.norm(), way = to_edge / nearest;
+      const Eigen::Vector3d from_edge = x - on_segment(x, a, b);
+      if (from_edge.norm() < nearest) nearest = from_edge.norm(), way = from_edge / nearest;
     }
-    if (over && out < nearest) nearest = out, way = -face.normal;
+    if (over && out < nearest) nearest = out, way = face.normal;
   }
-  if (inside.distance >= 0) return inside;
-  return {-nearest, way};
+  if (inside.distance <= 0) return inside;
+  return {nearest, way};
 }
 
 void HullDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
@@ -296,12 +296,12 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // Where several triangles are as near, as at a common side, all of them tell front from back: by
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
-  if (boxes_.empty()) return {-1e100, Eigen::Vector3d::Zero()};
+  if (boxes_.empty()) return {1e100, Eigen::Vector3d::Zero()};
   if (level_) {
     const Eigen::Vector3d& up = triangles_[0].normal;
     const double depth = up.dot(triangles_[0].centre - x);
-    if (depth < thickness_ - depth) return {depth, -up};
-    return {thickness_ - depth, up};
+    if (depth < thickness_ - depth) return {-depth, up};
+    return {depth - thickness_, -up};
   }
   // The triangles of the nearest box say first how near is near.
   const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
@@ -360,19 +360,19 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
       front += angle * triangle.normal;
     }
   }
-  if (size == 0) return {-1e100, Eigen::Vector3d::Zero()};
+  if (size == 0) return {1e100, Eigen::Vector3d::Zero()};
   front.normalize();
   const Eigen::Vector3d out = x - foot;
   const double length = out.norm(), depth = -front.dot(out);
   const Eigen::Vector3d away = length > kNone * kNone * std::sqrt(size) ? out / length : front;
-  if (depth <= 0) return {-length, -away};
+  if (depth <= 0) return {length, away};
   if (border.squaredNorm() > kNone * kNone * size) {
     const Eigen::Vector3d beside = out + std::min(depth, thickness_) * front;
     const double gap = beside.norm();
-    if (gap > kNone * length) return {-gap, -beside / gap};
+    if (gap > kNone * length) return {gap, beside / gap};
   }
-  if (length < thickness_ - length) return {length, away};
-  return {thickness_ - length, -away};
+  if (length < thickness_ - length) return {-length, -away};
+  return {length - thickness_, away};
 }
 
 std::optional<Partner> Partner::of(const btCollisionShape& shape) {

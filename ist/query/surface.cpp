@@ -220,7 +220,7 @@ RayHit shape_hit(Shape& shape, const SolidFrame& frame, const OwnRay& ray) noexc
     const double distance = chord.first >= 0 ? chord.first : chord.last;
     if (chord.empty() || !(distance >= 0) || !(distance <= ray.longest)) return {};
     const Vector3d at = ray.origin + distance * ray.direction;
-    return hit_at(frame, ray, distance, -shape.nearest(at).gradient, ~0u);
+    return hit_at(frame, ray, distance, shape.nearest(at).gradient, ~0u);
   } else {
     return refused<RayHit>(QueryStatus::not_held);
   }
@@ -248,12 +248,12 @@ class PlacedShape {
           // Where all directions are alike one of them serves.
           const double slope = at.gradient.norm();
           const Vector3d gradient =
-              slope > 0 ? Vector3d(-at.gradient / slope) : Vector3d::UnitX().eval();
+              slope > 0 ? Vector3d(at.gradient / slope) : Vector3d::UnitX().eval();
           const double rounding = 1e-15 * (x.norm() + std::abs(at.distance)) +
                                   1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
-          return SurfacePoint{-at.distance * frame_->unit,
+          return SurfacePoint{at.distance * frame_->unit,
                               frame_->unit * (error + rounding),
-                              frame_->world(x + at.distance * gradient),
+                              frame_->world(x - at.distance * gradient),
                               frame_->rotation * gradient,
                               ~0u,
                               QueryStatus::ok};
@@ -262,7 +262,7 @@ class PlacedShape {
 
   Containment answer(const Vector3d& given, Containment) const noexcept {
     return with_sample<Containment>(given, [](const Vector3d&, const FieldSample& at, double) {
-      return Containment{at.distance > 0, QueryStatus::ok};
+      return Containment{at.distance < 0, QueryStatus::ok};
     });
   }
 

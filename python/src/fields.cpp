@@ -165,7 +165,7 @@ void add_fields(py::module_& module) {
           "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] is at the origin.\n"
           "lowest, highest: [u] bounds on all heights, by which far objects are rejected quickly.");
   add_kind<DistanceGridField>(module, "DistanceGridField",
-                              "Distances at the points of a grid, positive inside, interpolated "
+                              "Distances at the points of a grid, negative inside, interpolated "
                               "linearly. Points outside the grid are outside the solid.")
       .def(py::new_([](const py::object& distances, const py::object& origin, double spacing,
                        double error) {

@@ -364,12 +364,12 @@ int outlines_answer(scene_t* s) {
 
 /* The half-space z ≤ offset, as a function. */
 static void sample(const void* context, const double x[3], ist_field_sample_t* answer) {
-  answer->distance = *(const double*)context - x[2];
-  answer->gradient[2] = -1;
+  answer->distance = x[2] - *(const double*)context;
+  answer->gradient[2] = 1;
 }
 
 int fields_answer(scene_t* s) {
-  static float numbers[125];
+  static float heights[125], distances[125];
   static const double offset = 0.1;
   const ist_pose_t identity = IST_POSE_IDENTITY;
   ist_field_t field = {.size = sizeof field};
@@ -384,7 +384,7 @@ int fields_answer(scene_t* s) {
   a.pose = identity;
   patches.patches = room;
   patches.capacity = 4;
-  for (i = 0; i < 125; ++i) numbers[i] = 0.1f;
+  for (i = 0; i < 125; ++i) distances[i] = -(heights[i] = 0.1f);
   for (kind = IST_HALF_SPACE; kind <= IST_FUNCTION; ++kind) {
     memset(&field.as, 0, sizeof field.as);
     field.kind = kind;
@@ -398,11 +398,11 @@ int fields_answer(scene_t* s) {
     } else if (kind == IST_CAPSULE || kind == IST_CYLINDER) {
       field.as.capsule.radius = field.as.capsule.half_height = 0.4;
     } else if (kind == IST_HEIGHTS) {
-      field.as.heights.heights = numbers;
+      field.as.heights.heights = heights;
       field.as.heights.columns = field.as.heights.rows = 5;
       field.as.heights.spacing[0] = field.as.heights.spacing[1] = 0.3;
     } else if (kind == IST_DISTANCE_GRID) {
-      field.as.distance_grid.distances = numbers;
+      field.as.distance_grid.distances = distances;
       for (i = 0; i < 3; ++i) field.as.distance_grid.points[i] = 5;
       for (i = 0; i < 3; ++i) field.as.distance_grid.origin[i] = -1;
       field.as.distance_grid.spacing = 0.5;

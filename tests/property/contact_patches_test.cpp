@@ -255,7 +255,7 @@ TEST(WorkspaceDeathTest, TwoThreadsInOneAreSaid) {
       [](const void* context, const Eigen::Vector3d&) noexcept {
         const auto& asked = *static_cast<const Both*>(context);
         std::thread([&] { penetration(asked.placed, asked.placed, {}, asked.workspace); }).join();
-        return FieldSample{1, Eigen::Vector3d::UnitX()};
+        return FieldSample{-1, Eigen::Vector3d::UnitX()};
       },
       &both, 0};
   EXPECT_DEATH(penetration(PlacedField{field, {}}, placed, {}, workspace), "two threads use one");

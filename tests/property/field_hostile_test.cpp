@@ -22,7 +22,7 @@ struct Garbage {
 
 FieldSample answer_garbage(const void* context, const Vector3d& x) noexcept {
   const Garbage& garbage = *static_cast<const Garbage*>(context);
-  if (garbage.looks++ < garbage.after) return {0.1 - x.z(), Vector3d(0, 0, -1)};
+  if (garbage.looks++ < garbage.after) return {x.z() - 0.1, Vector3d(0, 0, 1)};
   return {garbage.distance, garbage.gradient};
 }
 
@@ -156,7 +156,9 @@ TEST(FieldHostile, TablesOfNoNumbers) {
     for (const bool all : {true, false}) {
       std::vector<float> values(125, all ? value : 0.1f);
       values[62] = values[12] = value;
-      for (const Field& field : {Field(grid_of(values, 5)), Field(terrain_of(values, 5))}) {
+      std::vector<float> distances = values;
+      for (float& distance : distances) distance = -distance;
+      for (const Field& field : {Field(grid_of(distances, 5)), Field(terrain_of(values, 5))}) {
         const PlacedField a{field, {}, 1};
         for (const double z : {0.0, 0.5, -3.0}) {
           const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {0.1, 0.2, z}), 0.5};

@@ -84,7 +84,7 @@ TEST(Overlap, NeedsTimeAndRoom) {
 
 /// Half a distance: what a bound may say.
 FieldSample cautious_plane(const void*, const Eigen::Vector3d& x) noexcept {
-  return {-0.5 * x.z(), {0, 0, -0.5}};
+  return {0.5 * x.z(), {0, 0, 0.5}};
 }
 
 TEST(Overlap, OfFields) {

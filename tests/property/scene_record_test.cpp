@@ -42,11 +42,11 @@ SceneBody at(std::uint32_t number, const PlacedSolid& solid, bool moves = true) 
 
 /// Bodies of every kind that has a record, some of which touch.
 struct Mixed {
-  std::vector<float> heights = std::vector<float>(12, 0.5f), distances = std::vector<float>(27, -1);
+  std::vector<float> heights = std::vector<float>(12, 0.5f), distances = std::vector<float>(27, 1);
   Scene scene{{.max_bodies = 16, .max_pairs = 200}};
 
   Mixed() {
-    distances[13] = 1;
+    distances[13] = -1;
     SceneRule exact;
     exact.penetration.measure = Measure::exact;
     exact.margin = 0.25;

@@ -126,7 +126,7 @@ TEST(TimeOfImpact, OfFieldsThatTellNoDirection) {
   terrain.heights = flat.data();
   terrain.columns = terrain.rows = 3;
   const auto plane = [](const void*, const Vector3d& x) noexcept {
-    return FieldSample{0.25 - x.z(), -Vector3d::UnitZ()};
+    return FieldSample{x.z() - 0.25, Vector3d::UnitZ()};
   };
   for (const Field& field : {Field{terrain}, Field{FunctionField{plane, nullptr, 0}}}) {
     const TimeOfImpact found =

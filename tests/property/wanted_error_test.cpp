@@ -355,7 +355,10 @@ TEST_F(WantedErrors, PatchesSumToTheBlend) {
     EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
     const bool is_exact = whole.volume == exact(a, b).volume;
     exact_ones += is_exact && whole.volume > 0 ? 1 : 0;
-    blends += !is_exact && whole.volume != penetration(a, b, {.spheres_only = true}, workspace_).volume ? 1 : 0;
+    blends +=
+        !is_exact && whole.volume != penetration(a, b, {.spheres_only = true}, workspace_).volume
+            ? 1
+            : 0;
   }
   EXPECT_GT(blends, 40);
   EXPECT_GT(exact_ones, 20);

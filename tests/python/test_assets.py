@@ -346,7 +346,7 @@ def expect_same_columns(one, other):
 
 def test_shapes_and_meshes_pickle(cube):
     heights = np.random.default_rng(1).uniform(0, 1, (4, 5)).astype(np.float32)
-    inside = np.ones((3, 3, 3), np.float32)
+    inside = np.full((3, 3, 3), -1, np.float32)
     for shape in (ist.HalfSpaceField([0, 0, 2], 0.5), ist.BoxField([1, 2, 3]), ist.BallField(2),
                   ist.CapsuleField(1, 2), ist.CylinderField(1, 2),
                   ist.HeightField(heights, spacing=(0.5, 0.5), lowest=0),

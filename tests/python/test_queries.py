@@ -215,7 +215,7 @@ def test_fields_meet_assets(cube):
     centre = cube.mass_properties().centre_of_mass
     grid = np.linspace(-2 * side, 2 * side, 33)
     z, y, x = np.meshgrid(grid, grid, grid, indexing="ij")
-    ball = ist.DistanceGridField((side - np.sqrt(x**2 + y**2 + z**2)).astype(np.float32),
+    ball = ist.DistanceGridField((np.sqrt(x**2 + y**2 + z**2) - side).astype(np.float32),
                                  origin=np.full(3, grid[0]), spacing=grid[1] - grid[0])
     pose = np.concatenate(([1, 0, 0, 0], -centre))
     for field in (ist.HalfSpaceField(offset=side), ist.BoxField([side, side, side]),

@@ -118,7 +118,7 @@ inline std::vector<std::pair<const char*, Field>> fields() {
       for (int j = 0; j < 21; ++j)
         for (int i = 0; i < 21; ++i)
           d.push_back(
-              static_cast<float>(0.5 - 0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm()));
+              static_cast<float>(0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm() - 0.5));
     return d;
   }();
   HeightField terrain = terrain_of(heights, 9);
@@ -126,7 +126,7 @@ inline std::vector<std::pair<const char*, Field>> fields() {
   FunctionField function;
   function.sample = [](const void*, const Vector3d& x) noexcept {
     const double d = x.norm();
-    return FieldSample{0.5 - d, d > 0 ? Vector3d(-x / d) : Vector3d::Zero().eval()};
+    return FieldSample{d - 0.5, d > 0 ? Vector3d(x / d) : Vector3d::Zero().eval()};
   };
   return {{"half-space", HalfSpaceField{Vector3d(0.6, 0, 0.8), 0.1}},
           {"box", BoxField{Vector3d(0.5, 0.4, 0.3)}},

@@ -57,7 +57,7 @@ std::vector<btVector3> corners(double half) {
 
 double distance_to_box(const Eigen::Vector3d& x, double half) {
   const Eigen::Vector3d d = x.cwiseAbs().array() - half;
-  return d.maxCoeff() <= 0 ? -d.maxCoeff() : -d.cwiseMax(0).norm();
+  return d.maxCoeff() <= 0 ? d.maxCoeff() : d.cwiseMax(0).norm();
 }
 
 TEST(BulletPartners, HullsTellTrueDistances) {
@@ -98,7 +98,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
                           std::hypot(out - 0.4 * t, x.z() - (0.5 - t))});
     }
     const bool inside = x.z() > -0.5 && out < 0.4 * (0.5 - x.z());
-    EXPECT_NEAR(sample.distance, inside ? nearest : -nearest, 1e-3) << x.transpose();
+    EXPECT_NEAR(sample.distance, inside ? -nearest : nearest, 1e-3) << x.transpose();
     EXPECT_NEAR(sample.gradient.norm(), 1, 1e-9);
     EXPECT_NEAR(field.sample(field.context, x + 1e-6 * sample.gradient).distance,
                 sample.distance + 1e-6, 1e-9);

@@ -73,12 +73,13 @@ const Asset& asset_named(const std::string& name) {
 
 /// A field by the name that a row has in place of its first asset.
 Field field_named(const std::string& name) {
-  static const std::vector<float> numbers = [] {
+  const auto numbers_of = [](float sign) {
     std::vector<float> made(343);
     for (std::size_t i = 0; i < made.size(); ++i)
-      made[i] = 0.125f - 0.0625f * static_cast<float>(i * 7 % 11);
+      made[i] = sign * (0.125f - 0.0625f * static_cast<float>(i * 7 % 11));
     return made;
-  }();
+  };
+  static const std::vector<float> heights = numbers_of(1), distances = numbers_of(-1);
   if (name == "half_space") return HalfSpaceField{{0.6, 0, 0.8}, 0.1};
   if (name == "box_field") return BoxField{{0.7, 0.5, 0.01}};
   if (name == "ball_field") return BallField{0.8};
@@ -86,13 +87,13 @@ Field field_named(const std::string& name) {
   if (name == "cylinder") return CylinderField{0.5, 0.4};
   if (name == "terrain") {
     HeightField field;
-    field.heights = numbers.data();
+    field.heights = heights.data();
     field.columns = field.rows = 7;
     field.spacing[0] = field.spacing[1] = 0.25;
     return field;
   }
   DistanceGridField field;
-  field.distances = numbers.data();
+  field.distances = distances.data();
   for (std::uint32_t& n : field.size) n = 7;
   field.origin = Eigen::Vector3d::Constant(-0.75);
   field.spacing = 0.25;

@@ -96,7 +96,7 @@ class RealTime : public ::testing::Test {
   }
 
   static FieldSample sample(const void*, const Eigen::Vector3d& x) noexcept {
-    return {0.2 - x.z(), -Eigen::Vector3d::UnitZ()};
+    return {x.z() - 0.2, Eigen::Vector3d::UnitZ()};
   }
 
   static constexpr int kPoses = 40;

@@ -60,9 +60,9 @@ void expect_same_solid(const ClosedMesh& a, const ClosedMesh& b, const double ne
     const Point at(share(random), share(random), share(random));
     const Point p = a.report.bounds.min() + at.cwiseProduct(a.report.bounds.sizes());
     const double in_a = of_a->signed_distance(p), in_b = of_b->signed_distance(p);
-    inside += in_a > 0 ? 1 : 0;
+    inside += in_a < 0 ? 1 : 0;
     if (std::abs(in_a) > near) {
-      EXPECT_EQ(in_a > 0, in_b > 0) << p.transpose();
+      EXPECT_EQ(in_a < 0, in_b < 0) << p.transpose();
     }
   }
   EXPECT_GT(inside, 0u);

@@ -139,8 +139,8 @@ TEST(RobotModel, ACapsulesMeshHoldsIt) {
   for (int i = 0; i < 1000; ++i) {
     const double z = 0.002 * i - 1, r = std::sqrt(1 - z * z), a = 2.4 * i;
     const Eigen::Vector3d x(2 * r * std::cos(a), 2 * r * std::sin(a), 2 * z + (z < 0 ? -3 : 3));
-    EXPECT_GE(solid->signed_distance(x), -1e-12);
-    EXPECT_LE(solid->signed_distance(x), shape.slack);
+    EXPECT_LE(solid->signed_distance(x), 1e-12);
+    EXPECT_GE(solid->signed_distance(x), -shape.slack);
   }
   EXPECT_LT(shape.slack, 0.01);
 }
@@ -151,7 +151,7 @@ TEST(RobotModel, ACylindersMeshHoldsIt) {
   const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
   const auto solid = make_solid(close_mesh(shape.mesh, "cylinder"));
   for (int i = 0; i < 1000; ++i)
-    EXPECT_GE(solid->signed_distance({2 * std::cos(0.01 * i), 2 * std::sin(0.01 * i), 0}), -1e-12);
+    EXPECT_LE(solid->signed_distance({2 * std::cos(0.01 * i), 2 * std::sin(0.01 * i), 0}), 1e-12);
   EXPECT_LT(shape.slack, 2e-3);
 }
 

@@ -183,7 +183,7 @@ export class Field {
     spacing: ArrayLike<number>,
   ): Field;
   /**
-   * Distances, positive inside, at the points of a grid, copied: x runs fastest. Points outside
+   * Distances, negative inside, at the points of a grid, copied: x runs fastest. Points outside
    * the grid are outside the solid.
    */
   static distanceGrid(

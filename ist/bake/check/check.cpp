@@ -175,7 +175,7 @@ class DistanceSolid final : public CheckedSolid {
 
   double distance(const Eigen::Vector3d& p, double) const override { return std::abs(value(p)); }
 
-  int winding(const Eigen::Vector3d& p) const override { return value(p) > 0 ? 1 : 0; }
+  int winding(const Eigen::Vector3d& p) const override { return value(p) < 0 ? 1 : 0; }
 
   const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
 

@@ -70,8 +70,8 @@ class FieldDescent {
         const double d = shape_.sample(x).distance;
         const double reach = sure_reach(balls.r[lane], shape_.error());
         const std::uint32_t child = kWidth * block + lane;
-        if (d <= -reach) continue;
-        if (d >= reach) {
+        if (d >= reach) continue;
+        if (d <= -reach) {
           held[count++] = child;
         } else {
           next.a[next.size++] = child;

@@ -62,7 +62,7 @@ class GapSearch {
       double at[3];
       map_.apply(ball.centre, at);
       const Eigen::Vector3d x(at[0], at[1], at[2]);
-      const double distance = -shape_.nearest(x).distance;
+      const double distance = shape_.nearest(x).distance;
       const double gap = distance - ball.r * map_.scale;
       const double cover = distance - cover_radius * map_.scale;
       if (!wanted(gap, cover)) continue;
@@ -104,10 +104,10 @@ class GapSearch {
     }
     result.distance = unit * gap_;
     result.distance_max = unit * (gap_ + off);
-    const Eigen::Vector3d inward = shape_.nearest(centre_).gradient;
-    const double length = inward.norm();
+    const Eigen::Vector3d outward = shape_.nearest(centre_).gradient;
+    const double length = outward.norm();
     const Eigen::Vector3d out =
-        length > 0 ? Eigen::Vector3d(-inward / length) : Eigen::Vector3d::Zero().eval();
+        length > 0 ? Eigen::Vector3d(outward / length) : Eigen::Vector3d::Zero().eval();
     result.point_b = pose_.to_world(centre_ - radius_ * out);
     result.point_a = pose_.to_world(centre_ - (radius_ + gap_) * out);
     result.normal = pose_.rotation() * out;

@@ -45,7 +45,7 @@ class FieldMeetingSearch {
   double depth_at(const double (&centre)[3]) noexcept {
     double at[3];
     map_.apply(centre, at);
-    return shape_.nearest({at[0], at[1], at[2]}).distance;
+    return -shape_.nearest({at[0], at[1], at[2]}).distance;
   }
   double gap(const double (&centre)[3], double radius) noexcept {
     return -depth_at(centre) - radius * map_.scale;

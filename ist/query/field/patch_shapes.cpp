@@ -157,7 +157,7 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
   const double distance = std::sqrt(best2);
   const Eigen::Vector3d up =
       distance > 0 ? Eigen::Vector3d((x - point) / distance) : Eigen::Vector3d::UnitZ().eval();
-  return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
+  return gap > 0 ? FieldSample{distance, up} : FieldSample{-distance, -up};
 }
 
 void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) noexcept {

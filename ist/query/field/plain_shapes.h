@@ -12,7 +12,8 @@
 #include "query/probe/cap.h"
 
 // The shapes of ist/field.h in plain numbers, the same on CPU and GPU. sample(x) gives the
-// distance, positive inside and never more than the true one, with its gradient; part(x, r) what of
+// distance, negative inside and never further from 0 than the true one, with its gradient; part(x,
+// r) what of
 // a ball is inside. Without part() a shape is flat_part() of its sample.
 
 namespace ist {
@@ -32,11 +33,11 @@ struct BallPart {
 
 /// A ball before a plane at the closest point of the surface.
 IST_HD inline BallPart flat_part(const DistanceSample& at, double r) {
-  const Cap in = cap(r, at.distance);
+  const Cap in = cap(r, -at.distance);
   BallPart part = {in.volume, in.derivative, {}, {}};
   for (int k = 0; k < 3; ++k) {
-    part.gradient[k] = in.derivative * at.gradient[k];
-    part.moment[k] = in.moment * at.gradient[k];
+    part.gradient[k] = in.derivative * -at.gradient[k];
+    part.moment[k] = in.moment * -at.gradient[k];
   }
   return part;
 }
@@ -47,8 +48,8 @@ IST_HD inline double sure_reach(double r, double error) { return r * (1 + 1e-6) 
 /// A point `away` from the core of a shape that is all within `radius` of it.
 IST_HD inline DistanceSample core_sample(double radius, const double (&away)[3]) {
   const double d = norm(away);
-  if (!(d > 0)) return {radius - d, {}};
-  return {radius - d, {-away[0] / d, -away[1] / d, -away[2] / d}};
+  if (!(d > 0)) return {d - radius, {}};
+  return {d - radius, {away[0] / d, away[1] / d, away[2] / d}};
 }
 
 struct PlainHalfSpace {
@@ -56,7 +57,7 @@ struct PlainHalfSpace {
   double offset;
 
   IST_HD DistanceSample sample(const double (&x)[3]) const {
-    return {offset - dot(normal, x), {-normal[0], -normal[1], -normal[2]}};
+    return {dot(normal, x) - offset, {normal[0], normal[1], normal[2]}};
   }
 };
 
@@ -92,7 +93,7 @@ struct PlainCylinder {
   /// Past the rim the farther of mantle and end: a ball that reaches both has a part of each,
   /// though it may miss the rim.
   IST_HD DistanceSample sample(const double (&x)[3]) const {
-    return {-most(std::fabs(x[2]) - half, from_axis(x) - radius), {}};
+    return {most(std::fabs(x[2]) - half, from_axis(x) - radius), {}};
   }
   IST_HD DistanceSample nearest(const double (&x)[3]) const {
     const double d = from_axis(x);
@@ -101,11 +102,11 @@ struct PlainCylinder {
     const double side = d - radius, above = std::fabs(x[2]) - half;
     const double out = most(0, side), over = most(0, above);
     const double away = std::sqrt(out * out + over * over);
-    DistanceSample at = {away > 0 ? -away : -most(side, above), {}};
+    DistanceSample at = {away > 0 ? away : most(side, above), {}};
     for (int k = 0; k < 3; ++k)
-      at.gradient[k] = away > 0       ? -(out * mantle[k] + over * end[k]) / away
-                       : side > above ? -mantle[k]
-                                      : -end[k];
+      at.gradient[k] = away > 0       ? (out * mantle[k] + over * end[k]) / away
+                       : side > above ? mantle[k]
+                                      : end[k];
     return at;
   }
   /// The share of the mantle times that of the slab between the ends.
@@ -144,7 +145,7 @@ struct PlainGrid {
     if (std::fabs(at.distance) <= kLongestLength && dot(at.gradient, at.gradient) <= 1e300)
       return at;
     sound = false;
-    return {-kLongestLength, {}};
+    return {kLongestLength, {}};
   }
 
  private:
@@ -174,8 +175,8 @@ struct PlainGrid {
     const double away = norm(beyond);
     if (away > 0) {
       // Whoever is outside of the grid is outside of the solid, at least so far from it.
-      at.distance = least(0, at.distance) - away;
-      for (int k = 0; k < 3; ++k) at.gradient[k] = -beyond[k] / away;
+      at.distance = most(0, at.distance) + away;
+      for (int k = 0; k < 3; ++k) at.gradient[k] = beyond[k] / away;
       return at;
     }
     const auto slope = [&](int k, int j) { return c[k][j][1] - c[k][j][0]; };
@@ -196,16 +197,16 @@ struct PlainBox {
     double out[3] = {std::fabs(x[0]) - half[0], std::fabs(x[1]) - half[1],
                      std::fabs(x[2]) - half[2]};
     const double deepest = most(most(out[2], out[1]), out[0]);
-    DistanceSample at = {-deepest, {}};
+    DistanceSample at = {deepest, {}};
     if (deepest <= 0) {
       const int face = out[0] == deepest ? 0 : out[1] == deepest ? 1 : 2;
       for (int k = 0; k < 3; ++k) out[k] = k == face ? 1 : 0;
     } else {
       for (double& o : out) o = most(o, 0);
-      at.distance = -norm(out);
-      for (double& o : out) o /= -at.distance;
+      at.distance = norm(out);
+      for (double& o : out) o /= at.distance;
     }
-    for (int k = 0; k < 3; ++k) at.gradient[k] = x[k] < 0 ? out[k] : -out[k];
+    for (int k = 0; k < 3; ++k) at.gradient[k] = x[k] < 0 ? -out[k] : out[k];
     return at;
   }
 
@@ -256,8 +257,8 @@ struct PlainTerrain {
   /// Only what is beyond all heights is told at once; 0: a closer look tells.
   IST_HD DistanceSample sample(const double (&x)[3]) const {
     DistanceSample at = {};
-    if (x[2] > highest) at.distance = highest - x[2];
-    if (x[2] < lowest) at.distance = lowest - x[2];
+    if (x[2] > highest) at.distance = x[2] - highest;
+    if (x[2] < lowest) at.distance = x[2] - lowest;
     return at;
   }
 

@@ -88,7 +88,7 @@ struct FunctionShape {
     FieldSample at = field.sample(field.context, x);
     if (!(std::abs(at.distance) <= kLongestLength) || !(at.gradient.squaredNorm() <= 1e6)) {
       sound = false;
-      at = FieldSample{-kLongestLength, Eigen::Vector3d::Zero()};
+      at = FieldSample{kLongestLength, Eigen::Vector3d::Zero()};
     }
     return at;
   }

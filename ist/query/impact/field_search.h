@@ -73,8 +73,8 @@ class FieldSearch {
   Sight sight(const Vector3d& x, const Placement& at) const noexcept {
     const FieldSample sample = shape_.nearest(at.a.transpose() * x + frame_.a.centre);
     const double length = sample.gradient.norm();
-    const Vector3d out = length > 0 ? Vector3d(-sample.gradient / length) : Vector3d::Zero().eval();
-    return {-sample.distance, at.a * out};
+    const Vector3d out = length > 0 ? Vector3d(sample.gradient / length) : Vector3d::Zero().eval();
+    return {sample.distance, at.a * out};
   }
   double lost(const Placement& at) const noexcept { return shape_.error() + at.error; }
 

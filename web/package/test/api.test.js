@@ -266,7 +266,7 @@ test('fields', () => {
   const half = ist.Field.halfSpace([0, 0, 1], 0), cut = ist.penetration(half, b, {}).volume;
   const ground = ist.Field.heights(new Float32Array(16), 4, 4, [10, 10]);
   near(ist.penetration(ground, b, {}).volume, cut, 1e-9);
-  const grid = new Float32Array(27).map((_, i) => 100 * (1 - Math.floor(i / 9)));  // −z
+  const grid = new Float32Array(27).map((_, i) => 100 * (Math.floor(i / 9) - 1));  // z
   near(
       ist.penetration(
              ist.Field.distanceGrid(grid, [3, 3, 3], 100, {origin: [-100, -100, -100]}), b, {})
