@@ -10,7 +10,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "report.h"
 #include "support/oracle_rows.h"

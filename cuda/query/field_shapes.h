@@ -3,7 +3,7 @@
 #include "cuda/query/field_ref.h"
 #include "numerics/host_device.h"
 
-// Which of a field's shapes (query/field/plain_shapes.h) a descent looks at.
+// Which of a field's shapes (query/shape/plain_shapes.h) a descent looks at.
 
 namespace ist::gpu {
 

@@ -8,8 +8,8 @@
 #include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
 
-// A tree gone down against a field that tells how far its surface is: FieldDescent
-// (query/field/field_descent.h) depth first, by one team, two blocks at a time.
+// A tree gone down against a field that tells how far its surface is: ShapeDescent
+// (query/shape/shape_descent.h) depth first, by one team, two blocks at a time.
 
 namespace ist::gpu {
 

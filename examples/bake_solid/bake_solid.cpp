@@ -1,7 +1,7 @@
 // Solids without a mesh file: one from boxes and balls, one from a function. Links ist::ist.
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>

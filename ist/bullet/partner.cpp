@@ -41,7 +41,7 @@ Vector on_segment(const Vector& x, const Vector& a, const Vector& b) {
 }
 
 /// A cone about the z axis, its base below: in the half-plane of distance from the axis and height.
-FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& cone = *static_cast<const btConeShape*>(context);
   const double radius = cone.getRadius(), height = cone.getHeight();
   const double out = std::hypot(x.x(), x.y());
@@ -49,7 +49,7 @@ FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept 
   const Eigen::Vector2d rim(radius, -height / 2);
   const Eigen::Vector2d side = Eigen::Vector2d(height, radius).normalized();  // outward
   const double to_side = side.dot(apex - point), to_base = x.z() + height / 2;
-  FieldSample sample;
+  ShapeSample sample;
   Eigen::Vector2d gradient;
   if (to_side >= 0 && to_base >= 0) {
     sample.distance = -std::min(to_side, to_base);
@@ -68,11 +68,11 @@ FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept 
   return sample;
 }
 
-FieldSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const MeshDistance*>(context)->at(x);
 }
 
-FieldSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const HullDistance*>(context)->at(x);
 }
 
@@ -98,19 +98,19 @@ std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
 
 /// Bullet tells nobody what its terrain is made of: an heir may look.
 struct Terrain : btHeightfieldTerrainShape {
-  static bool find(const btHeightfieldTerrainShape& shape, PlacedField& placed, btVector3& origin) {
+  static bool find(const btHeightfieldTerrainShape& shape, PlacedShape& placed, btVector3& origin) {
     if (shape.*(&Terrain::m_upAxis) != 2 || shape.*(&Terrain::m_heightDataType) != PHY_FLOAT) {
       return false;
     }
     const btVector3& scaling = shape.getLocalScaling();
-    HeightField field;
+    HeightFieldShape field;
     field.heights = shape.*(&Terrain::m_heightfieldDataFloat);
     field.columns = static_cast<std::uint32_t>(shape.*(&Terrain::m_heightStickWidth));
     field.rows = static_cast<std::uint32_t>(shape.*(&Terrain::m_heightStickLength));
     for (int k = 0; k < 2; ++k) field.spacing[k] = double{scaling[k]} / scaling.z();
     field.lowest = shape.*(&Terrain::m_minHeight);
     field.highest = shape.*(&Terrain::m_maxHeight);
-    placed.field = field;
+    placed.shape = field;
     placed.scale = scaling.z();
     // Bullet's is centred, ist's begins at the first height's foot.
     origin = -scaling * (shape.*(&Terrain::m_localOrigin));
@@ -144,8 +144,8 @@ HullDistance::HullDistance(const std::vector<btVector3>& points) {
   }
 }
 
-FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
-  FieldSample inside{-std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
+ShapeSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
+  ShapeSample inside{-std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
   double nearest = std::numeric_limits<double>::infinity();
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const Face& face : faces_) {
@@ -292,7 +292,7 @@ Eigen::Vector3d MeshDistance::Triangle::nearest(const Eigen::Vector3d& x) const 
   return share;
 }
 
-FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
+ShapeSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // Where several triangles are as near, as at a common side, all of them tell front from back: by
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
@@ -380,33 +380,33 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
   switch (shape.getShapeType()) {
     case STATIC_PLANE_PROXYTYPE: {
       const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
-      partner.field_.field =
-          HalfSpaceField{to_eigen(plane.getPlaneNormal()), plane.getPlaneConstant()};
+      partner.field_.shape =
+          HalfSpaceShape{to_eigen(plane.getPlaneNormal()), plane.getPlaneConstant()};
       return partner;
     }
     case BOX_SHAPE_PROXYTYPE:
-      partner.field_.field =
-          BoxField{to_eigen(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin())};
+      partner.field_.shape =
+          BoxShape{to_eigen(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin())};
       return partner;
     case SPHERE_SHAPE_PROXYTYPE:
-      partner.field_.field = BallField{static_cast<const btSphereShape&>(shape).getRadius()};
+      partner.field_.shape = BallShape{static_cast<const btSphereShape&>(shape).getRadius()};
       return partner;
     case CAPSULE_SHAPE_PROXYTYPE: {
       const auto& capsule = static_cast<const btCapsuleShape&>(shape);
-      partner.field_.field = CapsuleField{capsule.getRadius(), capsule.getHalfHeight()};
+      partner.field_.shape = CapsuleShape{capsule.getRadius(), capsule.getHalfHeight()};
       partner.in_shape_ = from_z_to(capsule.getUpAxis());
       return partner;
     }
     case CYLINDER_SHAPE_PROXYTYPE: {
       const auto& cylinder = static_cast<const btCylinderShape&>(shape);
       const int up = cylinder.getUpAxis();
-      partner.field_.field =
-          CylinderField{cylinder.getRadius(), cylinder.getHalfExtentsWithMargin()[up]};
+      partner.field_.shape =
+          CylinderShape{cylinder.getRadius(), cylinder.getHalfExtentsWithMargin()[up]};
       partner.in_shape_ = from_z_to(up);
       return partner;
     }
     case CONE_SHAPE_PROXYTYPE:
-      partner.field_.field = FunctionField{cone_sample, &shape, 0};
+      partner.field_.shape = FunctionShape{cone_sample, &shape, 0};
       partner.in_shape_ = from_z_to(static_cast<const btConeShape&>(shape).getConeUpIndex());
       return partner;
     case CONVEX_HULL_SHAPE_PROXYTYPE:
@@ -417,7 +417,7 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
           corners_of(static_cast<const btPolyhedralConvexShape&>(shape));
       partner.hull_ = std::make_shared<const HullDistance>(points);
       if (partner.hull_->faces() < 4) return std::nullopt;
-      partner.field_.field = FunctionField{hull_sample, partner.hull_.get(), 0};
+      partner.field_.shape = FunctionShape{hull_sample, partner.hull_.get(), 0};
       return partner;
     }
     case TERRAIN_SHAPE_PROXYTYPE: {
@@ -440,26 +440,26 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
   }
 }
 
-PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
+PlacedShape Partner::placed(const btTransform& shape, const btVector3& lower,
                             const btVector3& upper, double thickness) const {
-  PlacedField placed = field_;
+  PlacedShape placed = field_;
   placed.pose = to_pose(shape * in_shape_);
   if (mesh_ != nullptr) {
     thread_local MeshDistance near;
     near.gather(*mesh_, lower, upper, thickness);
-    placed.field = FunctionField{mesh_sample, &near, 0};
+    placed.shape = FunctionShape{mesh_sample, &near, 0};
   }
   return placed;
 }
 
-void Partner::add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const {
+void Partner::add_faces(const PlacedShape& placed, bool of_b, SupportPolygon& polygon) const {
   const Eigen::Isometry3d pose = to_isometry(placed.pose);
   if (hull_ != nullptr) return hull_->add_faces(pose, of_b, polygon);
   if (mesh_ != nullptr) {
-    const auto& near = std::get<FunctionField>(placed.field);
+    const auto& near = std::get<FunctionShape>(placed.shape);
     return static_cast<const MeshDistance*>(near.context)->add_faces(pose, of_b, polygon);
   }
-  const auto* const cylinder = std::get_if<CylinderField>(&placed.field);
+  const auto* const cylinder = std::get_if<CylinderShape>(&placed.shape);
   if (cylinder == nullptr) return;
   constexpr int kSides = 32;
   for (const double sign : {-1.0, 1.0}) {

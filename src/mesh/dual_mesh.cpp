@@ -1,6 +1,6 @@
 #include "mesh/dual_mesh.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Core>

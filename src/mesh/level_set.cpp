@@ -1,4 +1,4 @@
-#include <ist/level_set.h>
+#include <ist/solid.h>
 
 #include <tbb/parallel_for.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/dual_mesh.h"
 #include "mesh/level_set_surface.h"

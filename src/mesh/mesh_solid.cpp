@@ -1,6 +1,6 @@
 #include "mesh/mesh_solid.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #define XXH_INLINE_ALL
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "numerics/hashing.h"
 

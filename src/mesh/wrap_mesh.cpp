@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/edge_table.h"
 #include "mesh/judge.h"

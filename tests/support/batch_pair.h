@@ -5,8 +5,8 @@
 #include <vector>
 
 #include <ist/gpu_query.h>
-#include <ist/pose.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace ist::testing {
 
@@ -69,8 +69,8 @@ struct BatchColumns {
     for (std::size_t i = 0; i < out.size(); ++i) {
       out[i].volume = volume[i];
       out[i].centroid = vector(centroid, i);
-      out[i].translation_gradient = vector(push, i);
-      out[i].rotation_gradient = vector(turn, i);
+      out[i].force = vector(push, i);
+      out[i].torque = vector(turn, i);
       out[i].status = status[i];
       out[i].node_visits = visits[i];
       out[i].sphere_pairs = spheres[i];

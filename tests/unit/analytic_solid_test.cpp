@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "support/float_traps.h"
 

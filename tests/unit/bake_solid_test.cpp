@@ -6,8 +6,8 @@
 
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include "support/baked.h"
 #include "support/test_meshes.h"

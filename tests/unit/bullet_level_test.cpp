@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include "bullet/partner.h"
 #include "support/bullet_world.h"
@@ -69,7 +69,7 @@ TEST(BulletLevel, ClosedMeshesTellTheDistancesOfTheirSolids) {
     for (int i = 0; i < 2000; ++i) {
       const Eigen::Vector3d x(draw(random), draw(random), 0.5 * draw(random));
       const SurfacePoint truth = closest_point({asset.view(), {}}, x);
-      const FieldSample told = near.at(x);
+      const ShapeSample told = near.at(x);
       ASSERT_NEAR(told.distance, truth.distance, 1e-9) << name << " " << x.transpose();
       ASSERT_NEAR(told.gradient.norm(), 1, 1e-9);
       EXPECT_NEAR(near.at(x + 1e-6 * told.gradient).distance, told.distance + 1e-6, 1e-8);
@@ -102,7 +102,7 @@ TEST(BulletLevel, AnOpenMeshIsASlab) {
   for (int i = 0; i < 500; ++i) {
     const Eigen::Vector3d x(0.25 * draw(random), 0.25 * draw(random), 0.3 * draw(random));
     const double depth = -x.z(), expected = -std::min(depth, 0.3 - depth);
-    const FieldSample told = near.at(x);
+    const ShapeSample told = near.at(x);
     ASSERT_NEAR(told.distance, expected, 1e-12) << x.transpose();
     EXPECT_NEAR(told.gradient.z(), depth < 0.15 ? 1 : -1, 1e-12);
   }

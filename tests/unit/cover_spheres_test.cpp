@@ -10,8 +10,8 @@
 #include <cmath>
 #include <random>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "spheres/shared_count.h"
 #include "support/test_meshes.h"

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include <ist/error.h>
-#include <ist/level_set.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 #include "support/float_traps.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_moments.h"
 #include "support/float_traps.h"

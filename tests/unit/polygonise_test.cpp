@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 

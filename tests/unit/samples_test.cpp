@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/winding.h"
 

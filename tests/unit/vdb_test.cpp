@@ -9,8 +9,8 @@
 
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
-#include <ist/level_set.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 namespace {
 

@@ -10,13 +10,13 @@
 
 namespace ist {
 
-inline bool keeps_mesh(const PlacedTree& placed) noexcept {
-  return !placed.tree.empty() && placed.tree.header().mesh != 0;
+inline bool keeps_mesh(const PlacedAsset& placed) noexcept {
+  return !placed.asset.empty() && placed.asset.header().mesh != 0;
 }
 
 /// Only where the asset keeps one.
-inline MeshTree mesh_of(const PlacedTree& placed) noexcept {
-  const AssetHeader& asset = placed.tree.header();
+inline MeshTree mesh_of(const PlacedAsset& placed) noexcept {
+  const AssetHeader& asset = placed.asset.header();
   return {asset, *at<MeshHeader>(asset, asset.mesh)};
 }
 
@@ -28,10 +28,10 @@ inline double moved_in_mesh(const MeshTree& mesh) noexcept {
 /// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
 /// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
 /// with all that follows.
-inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
+inline double moved_by_poses(const PlacedAsset& a, const PlacedAsset& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
-  const auto offset = [](const PlacedTree& placed) {
-    const double* c = placed.tree.header().centre;
+  const auto offset = [](const PlacedAsset& placed) {
+    const double* c = placed.asset.header().centre;
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
   };
   // The C library's hypot differs between processors.

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include <ist/error.h>
-#include <ist/level_set.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 namespace ist {
 namespace {

@@ -3,22 +3,22 @@
 #include <algorithm>
 #include <limits>
 
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 #include "query/base/budget.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/workspace.h"
-#include "query/field/shapes.h"
+#include "query/shape/shapes.h"
 
 namespace ist {
 
-/// Depth first, nearest child first, for two minima at once: the gap between a field and a tree's
-/// inner spheres, and that of their cover balls. All in the field's frame.
-template <class Shape>
+/// Depth first, nearest child first, for two minima at once: the gap between a shape and a tree's
+/// inner spheres, and that of their cover balls. All in the shape's frame.
+template <class Sampler>
 class GapSearch {
  public:
-  GapSearch(Shape& shape, const SphereTree& tree, const RelativePose& pose,
+  GapSearch(Sampler& shape, const SphereTree& tree, const RelativePose& pose,
             const SeparationSettings& settings, Workspace::Impl& scratch) noexcept
       : shape_(shape),
         tree_(tree),
@@ -114,7 +114,7 @@ class GapSearch {
     return result;
   }
 
-  Shape& shape_;
+  Sampler& shape_;
   const SphereTree& tree_;
   const RelativePose& pose_;
   const Similarity& map_;
