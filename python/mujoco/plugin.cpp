@@ -203,7 +203,7 @@ ist_placed_t place(const mjModel* m, const mjtNum* quat, const mjtNum* pos, int 
                    const Instance& solid) {
   ist_placed_t out = {};
   out.size = sizeof out;
-  out.tree = &solid.tree->tree;
+  out.asset = &solid.tree->tree;
   mjtNum q[4] = {quat[0], quat[1], quat[2], quat[3]}, t[3] = {pos[0], pos[1], pos[2]};
   out.scale = solid.scale > 0 ? solid.scale : 1;
   if (const int mesh = m->geom_dataid[geom]; mesh >= 0) {
@@ -230,7 +230,7 @@ bool shape_of(const mjModel* m, const mjData* d, int geom, ist_shape_t& field,
   field.size = sizeof field;
   placed = {};
   placed.size = sizeof placed;
-  placed.field = &field;
+  placed.shape = &field;
   write_pose(placed.pose, d->geom_xquat + 4 * geom, d->geom_xpos + 3 * geom);
   const mjtNum* size = m->geom_size + 3 * geom;
   switch (m->geom_type[geom]) {
@@ -376,7 +376,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     settings.measure = IST_EXACT;
     a = {};
     a.size = sizeof a;
-    a.tree = &shape.tree->tree;
+    a.asset = &shape.tree->tree;
     a.scale = scale_of(type, m->geom_size + 3 * g1);
     write_pose(a.pose, d->geom_xquat + 4 * g1, d->geom_xpos + 3 * g1);
   }

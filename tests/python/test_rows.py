@@ -184,7 +184,7 @@ def test_every_query_takes_unlike_rows(solids, arguments):
     meet = ist.overlap(held[a], held[b], poses, **by)
     times = ist.time_of_impact(held[a], held[b], poses, poses_to, **by)
     whole = ist.penetration(held[a], held[b], poses, spheres_only=True, scale_gradients=True, **by)
-    assert {0, 1} <= set(meet.tolist()) and len(set(times.status.tolist())) > 1
+    assert {0, 1} <= set(meet.tolist()) and len(set(times.kind.tolist())) > 1
     everything = [*solids, ist.HalfSpaceShape()]
     for i in range(60):
         one = {name: x[i] for name, x in by.items()}
