@@ -86,8 +86,8 @@ void ask_copies(Report& report, const std::string& name, std::size_t spheres) {
   ist::Workspace workspace;
   double worst_alike = 0, worst = 0;
   for (std::size_t k = 0; k < placements.size(); ++k) {
-    const ist::PlacedTree a{baked.asset->view(), {}, 1};
-    const ist::PlacedTree b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
+    const ist::PlacedAsset a{baked.asset->view(), {}, 1};
+    const ist::PlacedAsset b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
     // What penetration() would say without minding copies.
     ist::ContactPatch patch;
     const auto alike = [&] {
@@ -125,8 +125,8 @@ void ask_faces(Report& report, const std::string& name, std::size_t spheres) {
   double worst_raw = 0, worst = 0;
   const double face = exact.front() / (0.8 * radius);  // what it takes to be one
   for (std::size_t k = 0; k < gaps.size(); ++k) {
-    const ist::PlacedTree a{baked.asset->view(), {}, 1};
-    const ist::PlacedTree b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
+    const ist::PlacedAsset a{baked.asset->view(), {}, 1};
+    const ist::PlacedAsset b{baked.asset->view(), {{1, 0, 0, 0}, {shifts[k], 0, 0}}, 1};
     const ist::Penetration raw = ist::penetration(a, b, {}, workspace);
     const ist::Penetration sharp = ist::without_protrusion(raw, a, b);
     const double layer = face * radius;
@@ -142,8 +142,8 @@ void ask_faces(Report& report, const std::string& name, std::size_t spheres) {
                 {"exact volume", exact[k] / layer},
                 {"volume", raw.volume / layer},
                 {"without protrusion", sharp.volume / layer},
-                {"force", raw.translation_gradient.norm() / face},
-                {"force without protrusion", sharp.translation_gradient.norm() / face},
+                {"force", raw.force.norm() / face},
+                {"force without protrusion", sharp.force.norm() / face},
                 {"µs", microseconds([&] { return ist::penetration(a, b, {}, workspace); })},
                 {"µs without protrusion", microseconds([&] {
                    return ist::without_protrusion(ist::penetration(a, b, {}, workspace), a, b);

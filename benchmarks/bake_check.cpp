@@ -2,7 +2,7 @@
 // again. Meshes that bound no solid are refused first, then baked after repair, or fail with a
 // reason. Usage: bake_check [--out FILE] [--quick]
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <algorithm>
 #include <chrono>
 #include <filesystem>

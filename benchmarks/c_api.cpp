@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <ist/field.h>
-#include <ist/ist.h>
-#include <ist/overlap.h>
+#include <ist/c.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include "report.h"
 #include "support/oracle_assets.h"
@@ -22,8 +21,8 @@ using ist::benchmark::Report;
 
 /// A row in both languages.
 struct Row {
-  ist::PlacedTree a, b;
-  ist_tree_t tree_a, tree_b;
+  ist::PlacedAsset a, b;
+  ist_asset_t tree_a, tree_b;
   ist_placed_t c_a, c_b;  ///< point to these
 };
 
@@ -65,7 +64,7 @@ T sized() {
   return result;
 }
 
-ist_placed_t in_c(const ist_tree_t& tree, const ist::PlacedTree& like) {
+ist_placed_t in_c(const ist_asset_t& tree, const ist::PlacedAsset& like) {
   return {sizeof(ist_placed_t), &tree, nullptr, std::bit_cast<ist_pose_t>(like.pose), like.scale};
 }
 
@@ -91,9 +90,9 @@ int main(int argc, char** argv) {
       if (row.pose_class != name) continue;
       const auto [a, b] = ist::testing::placed(row, spheres);
       Row& both = rows.emplace_back(Row{a, b, {}, {}, {}, {}});
-      const auto view = [&](const std::string& mesh, ist_tree_t& tree) {
+      const auto view = [&](const std::string& mesh, ist_asset_t& tree) {
         const auto bytes = ist::testing::oracle_asset(mesh, spheres).bytes();
-        return ist_tree_view(bytes.data(), bytes.size(), &tree) == IST_OK;
+        return ist_asset_view(bytes.data(), bytes.size(), &tree) == IST_OK;
       };
       if (!view(row.mesh_a, both.tree_a) || !view(row.mesh_b, both.tree_b)) return 1;
     }
@@ -139,7 +138,7 @@ int main(int argc, char** argv) {
                               static_cast<std::uint64_t>(overlap(rows[i].a, rows[i].b, workspace));
                         },
                         [&](std::size_t i) {
-                          ist_overlapping_t answer;
+                          ist_yes_no_t answer;
                           ist_overlap(&rows[i].c_a, &rows[i].c_b, &c_workspace, &answer);
                           sum -= static_cast<std::uint64_t>(answer);
                         }));
@@ -148,11 +147,11 @@ int main(int argc, char** argv) {
          measure(
              rows.size(), rounds,
              [&](std::size_t i) {
-               const ist::PlacedField plane{ist::HalfSpaceField{}, rows[i].a.pose, 1};
+               const ist::PlacedShape plane{ist::HalfSpaceShape{}, rows[i].a.pose, 1};
                sum += bits(penetration(plane, rows[i].b, {}, workspace).volume);
              },
              [&](std::size_t i) {
-               auto field = sized<ist_field_t>();
+               auto field = sized<ist_shape_t>();
                field.kind = IST_HALF_SPACE;
                field.as.half_space.normal[2] = 1;
                const ist_placed_t plane = {sizeof plane, nullptr, &field,

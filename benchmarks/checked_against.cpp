@@ -139,7 +139,7 @@ class Angles {
     ist_.push_back(angles.ist);
     fcl_.push_back(angles.fcl);
     bullet_.push_back(angles.bullet);
-    const double area = angles.found.translation_gradient.norm();
+    const double area = angles.found.force.norm();
     const double depth = area > 0 ? angles.found.volume / area : 0;
     cases_.emplace_back(angles.ist,
                         Report::Json{{"case", c.name},

@@ -30,7 +30,7 @@ using ist::benchmark::thread_seconds;
 struct Shape {
   explicit Shape(const std::string& name)
       : closed(ist::close_mesh(ist::load_mesh(ist::testing::mated_mesh_path(name)), name)),
-        asset(ist::bake_surface(closed)),
+        asset(ist::bake_mesh_only(closed)),
         manifold(closed.mesh) {}
   ist::ClosedMesh closed;
   ist::Asset asset;

@@ -52,7 +52,7 @@ struct Persistence {
 };
 
 /// Follows the patches of consecutive steps with contact in both.
-Persistence follow(const ist::PlacedTree& a, ist::PlacedTree b, const std::vector<Step>& steps,
+Persistence follow(const ist::PlacedAsset& a, ist::PlacedAsset b, const std::vector<Step>& steps,
                    std::size_t most, ist::Workspace& workspace) {
   Persistence result;
   std::vector<ist::ContactPatch> now(most), last(most);
@@ -82,7 +82,7 @@ Persistence follow(const ist::PlacedTree& a, ist::PlacedTree b, const std::vecto
 
 /// Median over steps, in turn, of the time of contact_patches over that of penetration: the least
 /// of some rounds each, one after the other.
-double cost(const ist::PlacedTree& a, ist::PlacedTree b, const std::vector<Step>& steps,
+double cost(const ist::PlacedAsset& a, ist::PlacedAsset b, const std::vector<Step>& steps,
             std::size_t most, ist::Workspace& workspace) {
   constexpr int kRounds = 5;
   std::vector<ist::ContactPatch> patches(most);
@@ -104,7 +104,7 @@ double cost(const ist::PlacedTree& a, ist::PlacedTree b, const std::vector<Step>
 }
 
 /// Largest difference of the summed wrench and the whole's, relative to the whole's.
-double wrench_error(const ist::PlacedTree& a, ist::PlacedTree b, const std::vector<Step>& steps,
+double wrench_error(const ist::PlacedAsset& a, ist::PlacedAsset b, const std::vector<Step>& steps,
                     std::size_t most, ist::Workspace& workspace) {
   std::vector<ist::ContactPatch> patches(most);
   double worst = 0;
@@ -113,13 +113,13 @@ double wrench_error(const ist::PlacedTree& a, ist::PlacedTree b, const std::vect
     const ist::Penetration whole = ist::penetration(a, b, {}, workspace);
     const ist::ContactPatches found = ist::contact_patches(a, b, {}, workspace, patches);
     if (found.count == 0) continue;
-    Vector3d force = whole.translation_gradient, torque = whole.rotation_gradient;
+    Vector3d force = -whole.force, torque = -whole.torque;
     for (std::size_t i = 0; i < found.count; ++i) {
       force += patches[i].force;
       torque += patches[i].torque;
     }
-    worst = std::max({worst, force.norm() / whole.translation_gradient.norm(),
-                      torque.norm() / whole.rotation_gradient.norm()});
+    worst =
+        std::max({worst, force.norm() / whole.force.norm(), torque.norm() / whole.torque.norm()});
   }
   return worst;
 }
@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
   const std::size_t spheres = report.quick() ? 1'000 : 4'000;
   const ist::Asset a = bake_oracle_mesh("elephant", spheres);
   const ist::Asset b = bake_oracle_mesh("dino", spheres);
-  const ist::PlacedTree pa = {a.view(), {}, 1}, pb = {b.view(), {}, 1};
+  const ist::PlacedAsset pa = {a.view(), {}, 1}, pb = {b.view(), {}, 1};
   const std::vector<Step> steps = read_trajectory();
   ist::Workspace workspace;
   double worst = 0;

@@ -47,20 +47,20 @@ class Asker {
   std::vector<ist::Penetration> answers_;
 };
 
-const ist::TreeView& tree_of(const ist::PlacedSolid& solid) {
-  return std::get<ist::PlacedTree>(solid.placed).tree;
+const ist::AssetView& tree_of(const ist::PlacedSolid& solid) {
+  return std::get<ist::PlacedAsset>(solid.placed).asset;
 }
-ist::TreeView& tree_of(ist::PlacedSolid& solid) {
-  return std::get<ist::PlacedTree>(solid.placed).tree;
+ist::AssetView& tree_of(ist::PlacedSolid& solid) {
+  return std::get<ist::PlacedAsset>(solid.placed).asset;
 }
 
 /// How many times as much so many threads do as one where they share nothing: each asks all pairs
 /// by penetration(), of copies of its own. What the machine has for them.
 double ceiling(std::span<const ist::PlacedPair> pairs, std::size_t threads) {
   struct Alone {
-    Alone(const ist::TreeView& first, const ist::TreeView& second)
+    Alone(const ist::AssetView& first, const ist::AssetView& second)
         : a(bytes_of(first), "copy"), b(bytes_of(second), "copy") {}
-    static std::span<const std::byte> bytes_of(const ist::TreeView& tree) {
+    static std::span<const std::byte> bytes_of(const ist::AssetView& tree) {
       return {reinterpret_cast<const std::byte*>(&tree.header()), tree.header().file_bytes};
     }
     ist::Asset a, b;

@@ -2,9 +2,9 @@
 // off what is made of them is. Over meshes/bad, the robots and game characters of meshes/dev, and
 // over closed samples that are damaged at random, whose true volume is known. Usage: dirty_meshes
 // [--out FILE] [--quick]
-#include <ist/error.h>
 #include <ist/mesh.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -77,7 +77,7 @@ void look_at(const fs::path& path, const std::string& set, double detail, Report
   Report::Json row = {{"set", set}, {"mesh", name}, {"triangles", mesh.triangles.size()}};
   const auto percent = [](double share) { return 100 * share; };
   if (repaired) {
-    const ist::Judgement& judged = *repaired->first.report.judged;
+    const ist::RepairQuality& judged = *repaired->first.report.judged;
     row["repair: confidence"] = judged.confidence;
     row["w ≥ ½ / volume"] = judged.volume_ratio;
     row["repair [s]"] = repaired->second;

@@ -8,7 +8,6 @@
 // and measures 30 pairs of triangles: 160,000 operations, eight or four at a time, and 100 kB.
 
 #include <ist/bake.h>
-#include <ist/overlap.h>
 #include <ist/query.h>
 
 #include <algorithm>
@@ -33,7 +32,7 @@
 
 namespace {
 
-using ist::PlacedTree;
+using ist::PlacedAsset;
 using ist::Pose;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
@@ -81,7 +80,7 @@ std::vector<double> times(const Scene& scene, int rounds,
   return out;
 }
 
-PlacedTree at(Body& body, const Row& row) { return {body.asset.view(), row.pose, row.scale}; }
+PlacedAsset at(Body& body, const Row& row) { return {body.asset.view(), row.pose, row.scale}; }
 
 /// Ratios of two lists of times, row by row: median, that of nine rows in ten, the least.
 std::array<double, 3> ratios(const std::vector<double>& slow, const std::vector<double>& fast) {
@@ -100,7 +99,7 @@ void from_scratch(Report& report, const Scene& scene, const Aim& aim, int rounds
   const std::size_t count = scene.rows.size();
   std::vector<double> fcl(count), coal(count, NAN);
   std::vector<ist::Separation> found(count);
-  const PlacedTree a{scene.a->asset.view(), {}};
+  const PlacedAsset a{scene.a->asset.view(), {}};
   const auto ours = times(scene, rounds, [&](const Row& row, std::size_t i, int) {
     found[i] = ist::separation(a, at(*scene.b, row), {}, workspace);
   });
@@ -153,7 +152,7 @@ void from_scratch(Report& report, const Scene& scene, const Aim& aim, int rounds
 /// Solids that cross: what the distance adds to the overlap.
 void crossing(Report& report, const Scene& scene, int rounds) {
   ist::Workspace workspace;
-  const PlacedTree a{scene.a->asset.view(), {}};
+  const PlacedAsset a{scene.a->asset.view(), {}};
   const auto gap = times(scene, rounds, [&](const Row& row, std::size_t, int) {
     ist::separation(a, at(*scene.b, row), {}, workspace);
   });
@@ -191,7 +190,7 @@ void crossing(Report& report, const Scene& scene, int rounds) {
 /// Steps of one motion under a pair_id.
 void in_a_loop(Report& report, const Scene& scene, int rounds) {
   ist::Workspace workspace;
-  const PlacedTree a{scene.a->asset.view(), {}};
+  const PlacedAsset a{scene.a->asset.view(), {}};
   std::vector<ist::Separation> found(scene.rows.size()), kept(scene.rows.size());
   const auto scratch = times(scene, rounds, [&](const Row& row, std::size_t i, int) {
     found[i] = ist::separation(a, at(*scene.b, row), {}, workspace);
@@ -222,7 +221,7 @@ void in_a_loop(Report& report, const Scene& scene, int rounds) {
 /// Farther than a part of the distance, and the yes and no of it.
 void bounded(Report& report, const Scene& scene, int rounds) {
   ist::Workspace workspace;
-  const PlacedTree a{scene.a->asset.view(), {}};
+  const PlacedAsset a{scene.a->asset.view(), {}};
   std::vector<double> distance;
   for (const Row& row : scene.rows)
     distance.push_back(ist::separation(a, at(*scene.b, row), {}, workspace).distance);

@@ -63,8 +63,7 @@ void measure(Report& report, const Motion& motion) {
         double& least = (id == 0 ? scratch : kept)[i];
         least = std::min(least, 1e6 * (thread_seconds() - start));
       }
-      unlike += found[0].volume != found[1].volume ||
-                found[0].rotation_gradient != found[1].rotation_gradient;
+      unlike += found[0].volume != found[1].volume || found[0].torque != found[1].torque;
       searched[i] = found[1].node_visits > 0;
       crossings += found[0].sphere_pairs;
     }
@@ -101,7 +100,7 @@ void measure(Report& report, const Motion& motion) {
 int main(int argc, char** argv) {
   Report report("exact_loop", argc, argv);
   const auto surface = [](ist::TriangleMesh mesh, const char* name) {
-    return ist::bake_surface(ist::close_mesh(std::move(mesh), name));
+    return ist::bake_mesh_only(ist::close_mesh(std::move(mesh), name));
   };
   const auto oracle = [&](const char* name) {
     return surface(ist::load_mesh(ist::testing::oracle_mesh_path(name)), name);

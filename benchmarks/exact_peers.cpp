@@ -290,8 +290,8 @@ void report_growth(Report& report) {
   const std::size_t least = a.triangles.size() + b.triangles.size();
   for (int level = 0; level < (report.quick() ? 3 : 5); ++level) {
     if (level > 0) a = finer(a), b = finer(b);
-    const ist::Asset asset_a = ist::bake_surface(ist::close_mesh(a, "elephant")),
-                     asset_b = ist::bake_surface(ist::close_mesh(b, "dino"));
+    const ist::Asset asset_a = ist::bake_mesh_only(ist::close_mesh(a, "elephant")),
+                     asset_b = ist::bake_mesh_only(ist::close_mesh(b, "dino"));
     const std::size_t triangles = a.triangles.size() + b.triangles.size();
     for (const Class& of : classes) {
       const Query query{kExact, 1000, report.quick() ? 3u : 9u, [&](const Row& row) {

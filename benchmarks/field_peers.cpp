@@ -6,7 +6,7 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/halfspace.h>
 #include <ist/bake.h>
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -146,13 +146,13 @@ class Scene {
 
   void measure(const ist::Pose& at, bool box, double half, const Wedge& wedge, Rows& rows) {
     const Exact exact = exact_overlap(closed_.mesh, at, wedge);
-    ist::PlacedField field;
+    ist::PlacedShape field;
     if (box) {
-      field.field = ist::BoxField{Vector3d::Constant(half)};
+      field.shape = ist::BoxShape{Vector3d::Constant(half)};
     } else {
-      field.field = ist::HalfSpaceField{};
+      field.shape = ist::HalfSpaceShape{};
     }
-    const ist::PlacedTree tree{asset_.view(), at, 1};
+    const ist::PlacedAsset tree{asset_.view(), at, 1};
     ist::Penetration found;
     rows.time[0].push_back(
         least_time([&] { found = ist::penetration(field, tree, {}, workspace_); }));
@@ -162,7 +162,7 @@ class Scene {
     rows.volume_error.push_back(std::abs(found.volume / exact.volume - 1));
     rows.fraction.push_back(exact.volume / closed_.report.volume);
     const Vector3d truth = -exact.gradient;
-    const Vector3d pushes[3] = {-found.translation_gradient, by_fcl.push_b, by_bullet.push_b};
+    const Vector3d pushes[3] = {found.force, by_fcl.push_b, by_bullet.push_b};
     for (int k = 0; k < 3; ++k) {
       const bool none = !(pushes[k].norm() > 0);
       rows.none[k] += none ? 1 : 0;

@@ -3,7 +3,7 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include <cstdio>
 #include <string>

@@ -217,8 +217,8 @@ int measure(Report& report) {
       many / 10);
 
   Ground ground;
-  const Field half_space = HalfSpaceField{}, terrain = ground.terrain(dino4k);
-  const auto in_ground = [&](const std::string& name, const Field& field, double least, double most,
+  const Shape half_space = HalfSpaceShape{}, terrain = ground.terrain(dino4k);
+  const auto in_ground = [&](const std::string& name, const Shape& field, double least, double most,
                              double rate) {
     ask("Fields", {name, nullptr, &dino4k, poses_in_ground(dino4k, least, most), rate, 0, &field},
         1e-6, many);

@@ -5,8 +5,8 @@
 #include <thread>
 #include <vector>
 
-#include <ist/field.h>
 #include <ist/query_tbb.h>
+#include <ist/shapes.h>
 
 #include "gpu_batch_scenes.h"
 #include "support/patch_columns.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 #include "support/batch_pair.h"
 #include "support/oracle_rows.h"
@@ -22,10 +22,10 @@ namespace ist::benchmark {
 using ist::testing::BatchPair;
 
 inline Asset baked(const TriangleMesh& mesh, const std::string& name, std::size_t spheres,
-                   bool surface = false) {
+                   bool keep_mesh = false) {
   PackingSettings settings;
   settings.max_spheres = spheres;
-  settings.keep_mesh = surface;
+  settings.keep_mesh = keep_mesh;
   return bake(close_mesh(mesh, name), settings);
 }
 
@@ -36,7 +36,7 @@ struct Scene {
   const Asset* b;
   std::vector<BatchPair> poses;
   double rate = 0, step_ms = 0;  ///< what one H200 is to reach: M/s of a million, ms of 4,096; 0: –
-  const Field* field = nullptr;  ///< in A's place
+  const Shape* field = nullptr;  ///< in A's place
   std::uint32_t pair_budget = 0;
 };
 
@@ -69,10 +69,10 @@ class Ground {
   }
 
   /// Cells a tenth of the body's size across.
-  Field terrain(const Asset& body) {
+  Shape terrain(const Asset& body) {
     const double cell = 0.1 * std::cbrt(body.view().volume());
     for (float& height : heights_) height *= static_cast<float>(0.2 * cell);
-    return HeightField{heights_.data(), kPoints, kPoints, {cell, cell}};
+    return HeightFieldShape{heights_.data(), kPoints, kPoints, {cell, cell}};
   }
 
  private:

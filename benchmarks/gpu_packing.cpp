@@ -1,6 +1,6 @@
 // How long the GPU takes from a mesh's triangles in pageable host memory to certified spheres in
 // host memory: upload and hierarchy every time, only context and memory pool kept.
-#include <ist/packing.h>
+#include <ist/bake.h>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>

@@ -2,7 +2,7 @@
 // ours, the memory of the adaptive grids beside dense ones, and the medial axis. Times run from
 // triangles in pageable host memory to certified spheres in host memory. Needs a GPU.
 
-#include <ist/medial.h>
+#include <ist/bake.h>
 
 #include <algorithm>
 #include <map>

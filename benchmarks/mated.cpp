@@ -36,7 +36,7 @@ using Json = Report::Json;
 struct Part {
   explicit Part(TriangleMesh triangles, const std::string& name)
       : closed(ist::close_mesh(std::move(triangles), name)),
-        asset(ist::bake_surface(closed)),
+        asset(ist::bake_mesh_only(closed)),
         manifold(closed.mesh) {}
   double volume() const { return asset.view().volume(); }
   ist::ClosedMesh closed;

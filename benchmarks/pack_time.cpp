@@ -1,6 +1,6 @@
 // What packing alone costs and reaches on solids of every kind: organic, mechanical, with many
 // places that are equally good, and thinner than any cell.
-#include <ist/packing.h>
+#include <ist/bake.h>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>

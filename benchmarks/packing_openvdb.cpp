@@ -10,7 +10,7 @@
 #include <cmath>
 #include <numbers>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "report.h"
 #include "support/oracle_rows.h"
@@ -95,7 +95,7 @@ Judgement judge(const std::vector<Ball>& balls, const ist::Solid& solid) {
   std::vector<Ball> kept;
   for (const Ball& ball : balls) {
     out.claimed += ball.volume() / solid.volume();
-    const double protrusion = ball.radius - solid.signed_distance(ball.centre);
+    const double protrusion = ball.radius + solid.signed_distance(ball.centre);
     out.worst_protrusion = std::max(out.worst_protrusion, protrusion / longest);
     if (protrusion > tolerance) {
       ++out.sticking_out;

@@ -76,18 +76,18 @@ Slopes by_volumes(const std::vector<Shape>& shapes, const Poses& poses, double s
   slopes.rotation = slopes.translation;
   const auto placed = [&](std::size_t i) {
     const Shape& shape = shapes[i % shapes.size()];
-    return ist::PlacedTree{shape.asset.view(), poses[i], shape.scale * swollen};
+    return ist::PlacedAsset{shape.asset.view(), poses[i], shape.scale * swollen};
   };
   for (std::size_t i = 0; i < kObjects; ++i)
     for (std::size_t k = i + 1; k < kObjects; ++k) {
       const ist::Penetration p = penetration(placed(i), placed(k), {}, workspace);
       if (p.volume == 0) continue;
       slopes.energy += p.volume;
-      slopes.translation[k] += p.translation_gradient;
-      slopes.rotation[k] += p.rotation_gradient;
-      slopes.translation[i] -= p.translation_gradient;
+      slopes.translation[k] -= p.force;
+      slopes.rotation[k] -= p.torque;
+      slopes.translation[i] += p.force;
       const Eigen::Vector3d way = Eigen::Vector3d(poses[k].t) - Eigen::Vector3d(poses[i].t);
-      slopes.rotation[i] -= p.rotation_gradient + way.cross(p.translation_gradient);
+      slopes.rotation[i] += p.torque + way.cross(p.force);
     }
   return slopes;
 }

@@ -60,7 +60,7 @@ Batch make_batch(const py::module_& module, const std::string& pose_class, std::
   batch.a = in_python(module, ist::testing::oracle_asset(mesh_a, spheres));
   batch.b = in_python(module, ist::testing::oracle_asset(mesh_b, spheres));
   for (std::size_t i = 0; i < count; ++i) {
-    const auto& b = std::get<ist::PlacedTree>(rows[i % rows.size()].b.placed);
+    const auto& b = std::get<ist::PlacedAsset>(rows[i % rows.size()].b.placed);
     batch.pairs.push_back(rows[i % rows.size()]);
     std::copy(std::begin(b.pose.q), std::end(b.pose.q), std::back_inserter(batch.pose_rows));
     std::copy(std::begin(b.pose.t), std::end(b.pose.t), std::back_inserter(batch.pose_rows));

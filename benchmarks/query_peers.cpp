@@ -11,7 +11,6 @@
 #include <optional>
 
 #include <ist/bake.h>
-#include <ist/overlap.h>
 #include <ist/query.h>
 
 #include "report.h"
@@ -93,7 +92,7 @@ struct PairOfBodies {
 
 std::vector<Query> all_queries(PairOfBodies& pair) {
   const auto placed_b = [&pair](const OracleRow& row) {
-    return ist::PlacedTree{pair.b.asset.view(), row.pose, row.scale_b};
+    return ist::PlacedAsset{pair.b.asset.view(), row.pose, row.scale_b};
   };
   const auto fcl_b = [&pair](const OracleRow& row) -> const ist::testing::FclMesh& {
     return row.scale_b == 1 ? pair.b.fcl : pair.b.fcl_small;
@@ -105,7 +104,7 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
     return [&pair, placed_b, budget](const OracleRow& row) {
       const auto p = ist::penetration({pair.a.asset.view(), {}}, placed_b(row),
                                       {.pair_budget = budget}, pair.workspace);
-      return Answer{p.volume > 0, p.volume, -p.translation_gradient, {}};
+      return Answer{p.volume > 0, p.volume, p.force, {}};
     };
   };
   std::vector<Query> queries;
@@ -121,7 +120,7 @@ std::vector<Query> all_queries(PairOfBodies& pair) {
       {kOverlap,
        [&pair, placed_b](const OracleRow& row) {
          const auto answer = ist::overlap({pair.a.asset.view(), {}}, placed_b(row), pair.workspace);
-         return Answer{.touching = answer == ist::Overlapping::yes};
+         return Answer{.touching = answer == ist::YesNo::yes};
        }},
       {kFclOverlap,
        [&pair, fcl_b](const OracleRow& row) {
@@ -275,7 +274,7 @@ void report_answers(Report& report, const std::string& key, const std::vector<Qu
         deep_error.push_back(100 * std::abs(*answer.volume / row.volume - 1));
       }
       if (answer.push_b.norm() > 0 && row.pose_class == "pen") {
-        angle.push_back(degrees_between(answer.push_b, -row.translation_gradient));
+        angle.push_back(degrees_between(answer.push_b, row.force));
       }
       if (answer.interval) {
         const auto [low, high] = *answer.interval;

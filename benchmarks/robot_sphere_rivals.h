@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "bake/backend/make_backend.h"
 #include "mesh/mesh_solid.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include <ist/cover_spheres.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "report.h"
 #include "robot/link_mesh.h"

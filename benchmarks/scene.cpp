@@ -208,7 +208,8 @@ int main(int argc, char** argv) {
       "a box that meets another's. In the block all are flush, and it is lifted by an eighth. One "
       "thread, thread CPU time, median of the steps. Bullet's pairs "
       "are those of its wider boxes.");
-  const ist::Asset ball = ist::bake_surface(ist::close_mesh(ist::make_sample("sphere"), "sphere"));
+  const ist::Asset ball =
+      ist::bake_mesh_only(ist::close_mesh(ist::make_sample("sphere"), "sphere"));
   struct Case {
     const char* name;
     std::size_t bodies, still, moved;

@@ -26,8 +26,8 @@ class SdfVoxels {
       for (int y = 0; y < nodes_[1]; ++y) {
         for (int x = 0; x < nodes_[0]; ++x) {
           const Eigen::Vector3d at = origin_ + spacing * Eigen::Vector3d(x, y, z);
-          distance_.push_back(static_cast<float>(solid.signed_distance(at)));
-          if (distance_.back() > 0) inside_.push_back(at);
+          depth_.push_back(static_cast<float>(-solid.signed_distance(at)));
+          if (depth_.back() > 0) inside_.push_back(at);
         }
       }
     }
@@ -39,7 +39,7 @@ class SdfVoxels {
     const Eigen::Matrix3d to_grid = b_to_a.linear() * (scale_b / spacing_);
     const Eigen::Vector3d shift = (b_to_a.translation() - origin_) / spacing_;
     std::size_t count = 0;
-    const float* depth_b = b.distance_.data();
+    const float* depth_b = b.depth_.data();
     for (int z = 0; z < b.nodes_[2]; ++z) {
       for (int y = 0; y < b.nodes_[1]; ++y) {
         for (int x = 0; x < b.nodes_[0]; ++x, ++depth_b) {
@@ -72,7 +72,7 @@ class SdfVoxels {
     const auto row = [&](int j, int k) {
       const std::size_t i =
           static_cast<std::size_t>(((z + k) * nodes_[1] + (y + j)) * nodes_[0] + x);
-      return (1 - u) * distance_[i] + u * distance_[i + 1];
+      return (1 - u) * depth_[i] + u * depth_[i + 1];
     };
     return (1 - w) * ((1 - v) * row(0, 0) + v * row(1, 0)) +
            w * ((1 - v) * row(0, 1) + v * row(1, 1));
@@ -81,7 +81,7 @@ class SdfVoxels {
   double spacing_;
   Eigen::Vector3d origin_;
   int nodes_[3] = {};
-  std::vector<float> distance_;          ///< [u] at the nodes, x fastest
+  std::vector<float> depth_;             ///< [u] at the nodes, x fastest
   std::vector<Eigen::Vector3d> inside_;  ///< [u] centres of the voxels inside
 };
 

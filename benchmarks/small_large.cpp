@@ -11,8 +11,8 @@
 #include <random>
 
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include "report.h"
 #include "support/oracle_rows.h"
@@ -23,7 +23,7 @@
 namespace {
 
 using Eigen::Vector3d;
-using ist::PlacedTree;
+using ist::PlacedAsset;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::testing::degrees_between;
@@ -86,8 +86,8 @@ std::vector<Row> small_rows(const std::string& key) {
                 {pose("tx"), pose("ty"), pose("tz")}};
     row.scale_b = pose("scale_b");
     row.volume = truth("volume");
-    row.force = {truth("dVdtx"), truth("dVdty"), truth("dVdtz")};
-    row.torque = {truth("dVdrx"), truth("dVdry"), truth("dVdrz")};
+    row.force = -Eigen::Vector3d(truth("dVdtx"), truth("dVdty"), truth("dVdtz"));
+    row.torque = -Eigen::Vector3d(truth("dVdrx"), truth("dVdry"), truth("dVdrz"));
     rows.push_back(row);
   }
   return rows;
@@ -100,7 +100,7 @@ std::vector<Row> like_sized_rows(const std::string& key) {
     row.a = from.mesh_a, row.b = from.mesh_b;
     row.pose = from.pose, row.scale_b = from.scale_b;
     row.volume = from.volume;
-    row.force = from.translation_gradient, row.torque = from.rotation_gradient;
+    row.force = from.force, row.torque = from.torque;
     const double part = from.fraction_of_smaller;
     row.kind = from.pose_class != "pen" ? from.pose_class
                : part >= 0.01           ? "1–10 %"
@@ -127,7 +127,7 @@ using Methods = std::array<Measured, kMethods>;
 /// turns.
 std::map<std::string, Methods> measure(const std::vector<Row>& rows, Assets& assets, int turns) {
   struct Placed {
-    PlacedTree a, b;
+    PlacedAsset a, b;
   };
   std::vector<Placed> placed;
   for (const Row& row : rows)
@@ -167,11 +167,11 @@ std::map<std::string, Methods> measure(const std::vector<Row>& rows, Assets& ass
       m.nothing += got.volume > 0 ? 0 : 1;
       if (row.kind == "contain") continue;  // feels no force
       // Who reads 0 has no direction: that is counted by itself.
-      if (got.volume > 0) m.angle.push_back(degrees_between(got.translation_gradient, row.force));
+      if (got.volume > 0) m.angle.push_back(degrees_between(got.force, row.force));
       // A ball has no torque about its own centre: a tenth of what the force has at B's rim is the
       // least that an error is measured by. The meshes' diameter is 1.
       const double least = 0.1 * row.force.norm() * 0.5 * row.scale_b;
-      m.torque.push_back(100 * (got.rotation_gradient - row.torque).norm() /
+      m.torque.push_back(100 * (got.torque - row.torque).norm() /
                          std::max(row.torque.norm(), least));
     }
   }
@@ -332,7 +332,7 @@ std::vector<Row> unseen_rows(const std::string& a, const std::string& b, double 
         {assets.of(a).view(), {}, 1}, {assets.of(b).view(), row.pose, scale_b}, exact, workspace);
     if (truth.status != ist::QueryStatus::ok || !(truth.volume > 0)) continue;
     row.volume = truth.volume;
-    row.force = truth.translation_gradient, row.torque = truth.rotation_gradient;
+    row.force = truth.force, row.torque = truth.torque;
     rows.push_back(row);
   }
   return rows;
@@ -370,11 +370,11 @@ void unseen_pairs(Report& report, Assets& assets, int turns) {
 
 /// Dino in random turns, its lowest point at depths of 0.1 to 20 % under a plane or a box's top.
 void planes(Report& report, Assets& assets, int turns) {
-  const ist::TreeView dino = assets.of("dino").view();
+  const ist::AssetView dino = assets.of("dino").view();
   const ist::TriangleMesh mesh = ist::load_mesh(mesh_path("dino"));
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
-  std::vector<PlacedTree> poses;
+  std::vector<PlacedAsset> poses;
   for (int i = 0; i < 60; ++i) {
     const double w = normal(random), x = normal(random), y = normal(random), z = normal(random);
     const Eigen::Quaterniond q = Eigen::Quaterniond(w, x, y, z).normalized();
@@ -384,9 +384,9 @@ void planes(Report& report, Assets& assets, int turns) {
     poses.push_back({dino, {{q.w(), q.x(), q.y(), q.z()}, {0, 0, -low - depth}}, 1});
   }
   ist::Workspace workspace;
-  const std::pair<const char*, ist::PlacedField> fields[] = {
-      {"half-space", {ist::HalfSpaceField{}, {}, 1}},
-      {"box", {ist::BoxField{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1}}};
+  const std::pair<const char*, ist::PlacedShape> fields[] = {
+      {"half-space", {ist::HalfSpaceShape{}, {}, 1}},
+      {"box", {ist::BoxShape{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1}}};
   for (const auto& [name, field] : fields) {
     std::vector<std::vector<double>> times(poses.size());
     double sum = 0;
@@ -422,24 +422,23 @@ void flat_rests(Report& report, Assets& assets) {
   for (const double gap :
        {-0.03, -0.02, -0.01, -0.005, -0.002, 0.0, 0.002, 0.005, 0.01, 0.02, 0.03}) {
     const double side = scale;
-    const PlacedTree body{cube.view(), {{1, 0, 0, 0}, {0, 0, (gap + 0.5) * side}}, scale};
-    const PlacedTree under{cube.view(), {{1, 0, 0, 0}, {0, 0, -0.5}}, 1};
+    const PlacedAsset body{cube.view(), {{1, 0, 0, 0}, {0, 0, (gap + 0.5) * side}}, scale};
+    const PlacedAsset under{cube.view(), {{1, 0, 0, 0}, {0, 0, -0.5}}, 1};
     const double exact = std::max(0.0, -gap) * side * side * side;
     const double exact_force = gap < 0 ? side * side : 0;
     Report::Json row = {{"gap / side", gap}, {"exact volume", exact}, {"exact force", exact_force}};
     const auto add = [&](const std::string& name, const ist::Penetration& got) {
       row[name + " volume"] = got.volume;
-      row[name + " force"] = got.translation_gradient.norm();
+      row[name + " force"] = got.force.norm();
       if (name == "half-space" || name == "box") {
         worst_volume = std::max(worst_volume, std::abs(got.volume - exact));
-        worst_force =
-            std::max(worst_force, std::abs(got.translation_gradient.norm() - exact_force));
+        worst_force = std::max(worst_force, std::abs(got.force.norm() - exact_force));
       }
     };
     add("half-space",
-        ist::penetration(ist::PlacedField{ist::HalfSpaceField{}, {}, 1}, body, {}, workspace));
+        ist::penetration(ist::PlacedShape{ist::HalfSpaceShape{}, {}, 1}, body, {}, workspace));
     add("box", ist::penetration(
-                   ist::PlacedField{ist::BoxField{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1},
+                   ist::PlacedShape{ist::BoxShape{{2, 2, 0.5}}, {{1, 0, 0, 0}, {0, 0, -0.5}}, 1},
                    body, {}, workspace));
     ist::PenetrationSettings settings;
     settings.spheres_only = true;

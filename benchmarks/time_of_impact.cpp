@@ -142,7 +142,7 @@ Answer advance(const Body& a, const Body& b, const Way& way, double tolerance,
   Answer answer;
   for (double time = 0; time < 1;) {
     const ist::Separation gap =
-        ist::separation(ist::PlacedTree{a.asset.view(), {}, 1},
+        ist::separation(ist::PlacedAsset{a.asset.view(), {}, 1},
                         {b.asset.view(), pose_at(way, time), 1}, {}, workspace);
     ++answer.steps;
     if (gap.distance_min <= tolerance) {
@@ -186,10 +186,10 @@ void run(Report& report, const std::string& pair, const Body& a, const Body& b, 
                          ist::ImpactSettings settings;
                          settings.tolerance = tolerance;
                          const ist::TimeOfImpact found = ist::time_of_impact(
-                             ist::PlacedTree{a.asset.view(), {}, 1}, {b.asset.view(), way.from, 1},
+                             ist::PlacedAsset{a.asset.view(), {}, 1}, {b.asset.view(), way.from, 1},
                              {{}, way.motion}, settings, workspace);
-                         return Answer{found.status == ist::ImpactStatus::impact,
-                                       found.status == ist::ImpactStatus::unresolved, found.time,
+                         return Answer{found.kind == ist::ImpactKind::impact,
+                                       found.kind == ist::ImpactKind::unresolved, found.time,
                                        static_cast<double>(found.node_visits)};
                        }});
   libraries.push_back({"ist, steps of separation()",

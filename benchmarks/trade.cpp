@@ -95,8 +95,8 @@ int wrong_answers(const PairOfBodies& pair, const Baked& finest, ist::Workspace&
   int wrong = 0;
   std::array<std::vector<double>, kClassCount> errors;
   for (const Row& row : pair.rows) {
-    const ist::PlacedTree a = {finest.a.view(), {}, 1},
-                          b = {finest.b.view(), row.pose, row.scale_b};
+    const ist::PlacedAsset a = {finest.a.view(), {}, 1},
+                           b = {finest.b.view(), row.pose, row.scale_b};
     const ist::Penetration whole = ist::penetration(a, b, {}, workspace);
     const ist::Penetration ample = ist::penetration(a, b, {.pair_budget = 1u << 30}, workspace);
     const ist::Penetration stopped = ist::penetration(a, b, {.max_visits = 20}, workspace);
@@ -208,8 +208,7 @@ void report_continuity(Report& report, const PairOfBodies& pair, const Baked& as
       const ist::Penetration now = ist::penetration(
           {assets.a.view(), {}, 1}, {assets.b.view(), pose, 1}, {.pair_budget = budget}, workspace);
       if (i % kSegment != 0 && exact >= least && exact_before >= least) {
-        turn =
-            std::max(turn, degrees_between(before.translation_gradient, now.translation_gradient));
+        turn = std::max(turn, degrees_between(before.force, now.force));
         exact_turn = std::max(exact_turn, degrees_between(force_before, force));
         step = std::max(step, std::abs(now.volume - before.volume));
         exact_step = std::max(exact_step, std::abs(exact - exact_before));

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "bake/predict/trial_poses.h"
 #include "mesh/mesh_solid.h"

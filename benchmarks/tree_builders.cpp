@@ -109,8 +109,8 @@ int main(int argc, char** argv) {
         for (const auto& row : rows) {
           if (row.pose_class != pose_class) continue;
           const bool first = row.mesh_a.starts_with("elephant");
-          const PlacedTree placed_a = {(first ? a : b).view(), {}, 1};
-          const PlacedTree placed_b = {(first ? b : a).view(), row.pose, row.scale_b};
+          const PlacedAsset placed_a = {(first ? a : b).view(), {}, 1};
+          const PlacedAsset placed_b = {(first ? b : a).view(), row.pose, row.scale_b};
           const Penetration p = penetration(placed_a, placed_b, {}, workspace);
           const Separation s = separation(placed_a, placed_b, {}, workspace);
           visits.push_back(p.node_visits);

@@ -75,8 +75,8 @@ std::map<std::size_t, double> ask_oracle_rows(Report& report, const std::string&
   std::vector<double> widths;
   std::size_t outside_interval = 0;
   for (const OracleRow& row : rows) {
-    const ist::PlacedTree a = {asset(row.mesh_a).view(), {}, 1};
-    const ist::PlacedTree b = {asset(row.mesh_b).view(), row.pose, row.scale_b};
+    const ist::PlacedAsset a = {asset(row.mesh_a).view(), {}, 1};
+    const ist::PlacedAsset b = {asset(row.mesh_b).view(), row.pose, row.scale_b};
     const ist::Separation gap = ist::separation(a, b, {}, workspace);
     const double distance = row.solid_distance();
     if (distance < gap.distance_min || distance > gap.distance_max) ++outside_interval;
@@ -92,8 +92,7 @@ std::map<std::size_t, double> ask_oracle_rows(Report& report, const std::string&
     error.inner_volume.push_back(std::abs(inner.volume / row.volume - 1));
     if (matched.volume > 0) ++error.found;
     if (class_of(row) != 0)  // a contained solid feels no force
-      error.angle.push_back(
-          degrees_between(matched.translation_gradient, row.translation_gradient));
+      error.angle.push_back(degrees_between(matched.force, row.force));
   }
 
   const std::string of = key + ", " + std::to_string(spheres) + " spheres";

@@ -65,8 +65,7 @@ void report_errors(Report& report, const PairOfBodies& pair, const ist::Asset& a
         if (pair.rows[i].overlap_class != k) continue;
         const ist::Penetration& answer = got.answers[i];
         error.push_back(100 * std::abs(answer.volume / pair.rows[i].volume - 1));
-        angle.push_back(ist::testing::degrees_between(answer.translation_gradient,
-                                                      exact.answers[i].translation_gradient));
+        angle.push_back(ist::testing::degrees_between(answer.force, exact.answers[i].force));
         us.push_back(got.us[i]);
         exceeded += answer.status != ist::QueryStatus::ok ? 1 : 0;
       }

@@ -6,7 +6,7 @@ function(ist_compile_options target)
   ist_precompile(${target})
   set_target_properties(${target} PROPERTIES
     CXX_STANDARD 20 CXX_STANDARD_REQUIRED ON CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON
-    # Of a shared library only what the public headers declare is seen (ist/api.h).
+    # Of a shared library only what the public headers declare is seen (ist/types.h).
     CXX_VISIBILITY_PRESET hidden CUDA_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_compile_options(${target} PRIVATE
     # The same bytes on any machine (docs/design.md 3.3): nothing is fused or re-associated.

@@ -1,6 +1,6 @@
 #include "cuda/check.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <string>
 

@@ -1,6 +1,6 @@
 #include <cuda_runtime_api.h>
-#include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/types.h>
 
 #include <string>
 

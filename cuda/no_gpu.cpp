@@ -1,7 +1,7 @@
 // What a build without CUDA says.
-#include <ist/error.h>
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include "cuda/cuda_backend.h"
 

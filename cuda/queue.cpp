@@ -1,6 +1,6 @@
 #include "cuda/queue.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <limits>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <span>
 

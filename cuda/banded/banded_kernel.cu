@@ -1,6 +1,6 @@
 #include "cuda/banded/banded_kernel.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <cstdint>
 

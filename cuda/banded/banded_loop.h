@@ -19,8 +19,8 @@ IST_HD std::uint32_t take_slots(const Team& team, const BandedArrays& a, bool ke
 }
 
 /// split_cells() with a team a child, for so few that no team has a second one.
-template <class CoopLaunch, class Field>
-IST_HD void split_few(CoopLaunch& coop, const BandedArrays& a, const Field& field) {
+template <class CoopLaunch, class Shape>
+IST_HD void split_few(CoopLaunch& coop, const BandedArrays& a, const Shape& field) {
   BandedState& s = *a.state;
   const auto& team = coop.team();
   const std::uint32_t i = coop.index();

@@ -1,6 +1,6 @@
 #include "cuda/grids/device_grid.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <span>

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include <ist/gpu_arrays.h>
+#include <ist/gpu.h>
 
 #include "cuda/query/lens_sums.h"
 #include "query/base/members.h"

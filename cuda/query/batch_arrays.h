@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_arrays.h>
+#include <ist/gpu.h>
 
 #include "cuda/query/pair_descent.h"
 #include "cuda/query/solid_ref.h"

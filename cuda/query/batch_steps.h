@@ -62,10 +62,11 @@ IST_HD inline bool place_pair(const SolidPairs& batch, std::uint32_t i, PairPlac
 /// Places pair i; why it is none of two trees if not ok.
 IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
   const PairKind kind = kind_of(batch, i);
-  if (kind == PairKind::tree_and_field || kind == PairKind::fields) return QueryStatus::not_held;
+  if (kind == PairKind::tree_and_field || kind == PairKind::fields)
+    return QueryStatus::missing_data;
   if (kind == PairKind::trees && !(solid_of(batch, batch.pairs.a, i).has_spheres() &&
                                    solid_of(batch, batch.pairs.b, i).has_spheres()))
-    return QueryStatus::not_held;
+    return QueryStatus::missing_data;
   return kind == PairKind::trees && place_pair(batch, i, place) ? QueryStatus::ok
                                                                 : QueryStatus::invalid_input;
 }

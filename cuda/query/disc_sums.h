@@ -11,7 +11,7 @@
 #include "query/asset/shared_constants.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/probe/patch_sums.h, query/field/probe_sum.h) have them. What
+// add_patch() and total_of() (query/probe/patch_sums.h, query/shape/probe_sum.h) have them. What
 // edges cut goes to a list, so that the lanes of a warp are full where the work is.
 
 namespace ist::gpu {

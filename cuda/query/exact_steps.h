@@ -45,14 +45,14 @@ IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
   if (kind == PairKind::missing)
     status = QueryStatus::invalid_input;
   else if (kind != PairKind::trees)
-    status = QueryStatus::not_held;
+    status = QueryStatus::missing_data;
   else if (!place_exactly(batch, i, place))
     status = QueryStatus::invalid_input;
   if (status == QueryStatus::ok) {
     const MeshTree& a = solid_of(batch, batch.pairs.a, i).mesh;
     const MeshTree& b = solid_of(batch, batch.pairs.b, i).mesh;
     if (a.header == nullptr || b.header == nullptr)
-      status = QueryStatus::not_held;
+      status = QueryStatus::missing_data;
     else if (boxes_meet(a, b, place.a_from_b) && boxes_meet(b, a, place.b_from_a))
       return true;
   }
@@ -138,8 +138,6 @@ IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   row.volume_max = std::fmin(most, row.volume + error);
   row.volume = std::fmin(most, row.volume);
   if (row.volume > 0) row.centroid = sums.centroid;
-  row.translation_gradient = sums.force;
-  row.rotation_gradient = sums.torque;
   row.force = -sums.force;
   row.torque = -sums.torque;
   row.status = QueryStatus::ok;

@@ -7,7 +7,7 @@
 #include "cuda/query/field_walk.h"
 #include "numerics/host_device.h"
 
-// Boxes and terrains: fields whose triangles are made on the spot (query/field/patch_shapes.h).
+// Boxes and terrains: fields whose triangles are made on the spot (query/shape/patch_shapes.h).
 
 namespace ist::gpu {
 
@@ -97,10 +97,10 @@ class FacetSource {
     int axis;
     double side;
     if (field_.box.faces_near(x, r, axis, side) > 1) return false;
-    DistanceSample at = {r, {}};
+    PlainSample at = {-r, {}};
     for (int k = 0; k < 3; ++k) {
-      at.distance = k == axis ? field_.box.below_face(k, side, x[k]) : at.distance;
-      at.gradient[k] = k == axis ? -side : 0;
+      at.distance = k == axis ? -field_.box.below_face(k, side, x[k]) : at.distance;
+      at.gradient[k] = k == axis ? side : 0;
     }
     part = flat_part(at, r);
     return true;

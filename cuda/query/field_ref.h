@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
-#include "query/field/plain_shapes.h"
+#include "query/shape/plain_shapes.h"
 
 namespace ist::gpu {
 
-/// Those of ist::Field that a batch knows; none, and one whose numbers are out of range.
+/// Those of ist::Shape that a batch knows; none, and one whose numbers are out of range.
 enum class FieldKind : std::uint32_t {
   none,
   unusable,
@@ -19,7 +19,7 @@ enum class FieldKind : std::uint32_t {
   height
 };
 
-/// A field of a batch in plain numbers (ist/field.h), what it points to being where the batch is
+/// A field of a batch in plain numbers (ist/shapes.h), what it points to being where the batch is
 /// worked on.
 struct FieldRef {
   FieldKind kind;

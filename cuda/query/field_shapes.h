@@ -3,11 +3,11 @@
 #include "cuda/query/field_ref.h"
 #include "numerics/host_device.h"
 
-// Which of a field's shapes (query/field/plain_shapes.h) a descent looks at.
+// Which of a field's shapes (query/shape/plain_shapes.h) a descent looks at.
 
 namespace ist::gpu {
 
-/// No nearer to the surface than this, positive inside.
+/// No nearer to the surface than this, negative inside.
 IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:

@@ -18,7 +18,7 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   const FieldRef& field = solid_of(batch, sides.field, i).field;
   const SolidRef& asset = solid_of(batch, sides.tree, i);
   if (!asset.has_spheres()) {
-    write_nothing(batch.answers, i, QueryStatus::not_held);
+    write_nothing(batch.answers, i, QueryStatus::missing_data);
     return -1;
   }
   PairPlace place;
@@ -34,7 +34,7 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   bool sound = true;
   const double d = distance_in(field, x, sound), reach = sure_reach(r, distance_error(field));
   if (sound && d > -reach && d < reach) return group_of(field.kind);
-  if (!sound || d <= -reach) {
+  if (!sound || d >= reach) {
     write_nothing(batch.answers, i, sound ? QueryStatus::ok : QueryStatus::invalid_input);
     return -1;
   }

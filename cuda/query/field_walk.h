@@ -8,8 +8,8 @@
 #include "cuda/query/part_sums.h"
 #include "numerics/host_device.h"
 
-// A tree gone down against a field that tells how far its surface is: FieldDescent
-// (query/field/field_descent.h) depth first, by one team, two blocks at a time.
+// A tree gone down against a field that tells how far its surface is: ShapeDescent
+// (query/shape/shape_descent.h) depth first, by one team, two blocks at a time.
 
 namespace ist::gpu {
 
@@ -111,7 +111,7 @@ class FieldWalk {
         const double d = distance_in(m_.field, x, sound_),
                      reach = sure_reach(r, distance_error(m_.field));
         waits = d > -reach && d < reach;
-        if (d >= reach)
+        if (d <= -reach)
           sums_.add_whole(m_.sums.level[level - 1][child], m_.sums.spheres_below(level - 1, child),
                           m_.place.a_from_b);
       }

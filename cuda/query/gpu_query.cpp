@@ -1,6 +1,6 @@
 #include <ist/gpu_query.h>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include <ist/asset_layout.h>
-#include <ist/error.h>
-#include <ist/field.h>
 #include <ist/gpu_query.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 
 #include "cuda/query/cuts_ref.h"
 #include "cuda/query/field_ref.h"
@@ -21,7 +21,7 @@
 #include "query/asset/sphere_tree.h"
 #include "query/base/pair_place.h"
 #include "query/contact/tree_cuts.h"
-#include "query/field/shapes.h"
+#include "query/shape/shapes.h"
 
 // Solids of a batch in plain numbers. Host code only.
 
@@ -66,45 +66,45 @@ class TreeRegions {
 };
 
 /// The memory that a field points to: heights or distances; none of what is out of range.
-inline std::span<const std::byte> pointed_to(const Field& field) {
+inline std::span<const std::byte> pointed_to(const Shape& field) {
   const auto bytes = [](const auto* from, std::size_t count) {
     return std::as_bytes(std::span(from, count));
   };
-  if (const auto* const f = std::get_if<HeightField>(&field); f != nullptr && is_sound(*f))
+  if (const auto* const f = std::get_if<HeightFieldShape>(&field); f != nullptr && is_sound(*f))
     return bytes(f->heights, std::size_t{f->columns} * f->rows);
-  if (const auto* const g = std::get_if<DistanceGridField>(&field); g != nullptr && is_sound(*g))
+  if (const auto* const g = std::get_if<DistanceGridShape>(&field); g != nullptr && is_sound(*g))
     return bytes(g->distances, std::size_t{g->size[0]} * g->size[1] * g->size[2]);
   return {};
 }
 
 /// `at`: where who works on the field finds what it points to. `unusable` if out of range.
-inline FieldRef field_ref(const Field& field, const std::byte* at) {
+inline FieldRef field_ref(const Shape& field, const std::byte* at) {
   FieldRef ref = {};
   ref.kind = FieldKind::unusable;
   if (!std::visit([](const auto& f) { return is_sound(f); }, field)) return ref;
   const auto* const floats = reinterpret_cast<const float*>(at);
-  if (const auto* const f = std::get_if<HalfSpaceField>(&field)) {
+  if (const auto* const f = std::get_if<HalfSpaceShape>(&field)) {
     ref.kind = FieldKind::half_space;
     ref.half_space = plain(*f);
-  } else if (const auto* const f = std::get_if<BoxField>(&field)) {
+  } else if (const auto* const f = std::get_if<BoxShape>(&field)) {
     ref.kind = FieldKind::box;
     ref.box = plain(*f);
-  } else if (const auto* const f = std::get_if<BallField>(&field)) {
+  } else if (const auto* const f = std::get_if<BallShape>(&field)) {
     ref.kind = FieldKind::ball;
     ref.ball = plain(*f);
-  } else if (const auto* const f = std::get_if<CapsuleField>(&field)) {
+  } else if (const auto* const f = std::get_if<CapsuleShape>(&field)) {
     ref.kind = FieldKind::capsule;
     ref.capsule = plain(*f);
-  } else if (const auto* const f = std::get_if<CylinderField>(&field)) {
+  } else if (const auto* const f = std::get_if<CylinderShape>(&field)) {
     ref.kind = FieldKind::cylinder;
     ref.cylinder = plain(*f);
-  } else if (const auto* const f = std::get_if<HeightField>(&field)) {
+  } else if (const auto* const f = std::get_if<HeightFieldShape>(&field)) {
     if (std::all_of(f->heights, f->heights + std::size_t{f->columns} * f->rows,
                     [](float height) { return std::isfinite(height); }))
       ref.kind = FieldKind::height;
     ref.height = plain(*f);
     ref.height.heights = floats;
-  } else if (const auto* const f = std::get_if<DistanceGridField>(&field)) {
+  } else if (const auto* const f = std::get_if<DistanceGridShape>(&field)) {
     ref.kind = FieldKind::grid;
     ref.grid = plain(*f);
     ref.grid.distances = floats;
@@ -168,7 +168,7 @@ inline double reach_of(const std::vector<FilledBall>& balls, const double* centr
 /// query/detail/coincident.h).
 inline std::uint32_t first_alike(std::span<const GpuSolid> solids, const AssetHeader& of) {
   for (std::uint32_t k = 0;; ++k) {
-    const auto* const tree = std::get_if<TreeView>(&solids[k]);
+    const auto* const tree = std::get_if<AssetView>(&solids[k]);
     if (tree != nullptr && tree->header().content_hash == of.content_hash &&
         tree->header().file_bytes == of.file_bytes)
       return k;
@@ -184,16 +184,16 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
     throw Error("GPU: solid " + std::to_string(i) + " is " + why);
   };
   SolidRef ref = {};
-  if (const auto* const field = std::get_if<Field>(&solids[i])) {
-    if (std::holds_alternative<FunctionField>(*field))
+  if (const auto* const field = std::get_if<Shape>(&solids[i])) {
+    if (std::holds_alternative<FunctionShape>(*field))
       refuse(
-          "a FunctionField, which a GPU cannot call: sample it into a DistanceGridField, or bake "
+          "a FunctionShape, which a GPU cannot call: sample it into a DistanceGridShape, or bake "
           "its solid");
     ref.frame = {{0, 0, 0}, 1};
     ref.field = field_ref(*field, put(pointed_to(*field)));
     return ref;
   }
-  const TreeView& asset = std::get<TreeView>(solids[i]);
+  const AssetView& asset = std::get<AssetView>(solids[i]);
   if (asset.empty()) refuse("an empty asset");
   if (asset.sphere_count() == 0 && !asset.has_mesh())
     refuse("an asset without spheres and without a mesh: bake it with either");

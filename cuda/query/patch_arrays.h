@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_arrays.h>
+#include <ist/gpu.h>
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/patch_memory.h"

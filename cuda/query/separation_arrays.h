@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include <ist/gpu_arrays.h>
+#include <ist/gpu.h>
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/gap_descent.h"

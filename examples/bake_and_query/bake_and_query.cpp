@@ -1,7 +1,7 @@
 // Two mesh files in, the volume by which they overlap out. Links ist::ist.
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <cstdio>
 
@@ -13,7 +13,7 @@ int main(int argc, char** argv) try {
   const ist::Pose pose_b{.t = {0.5, 0, 0}};  // x_world = R x + t; A stays at the origin
   ist::Workspace scratch;
   const ist::Penetration p = ist::penetration({a.view(), {}}, {b.view(), pose_b}, {}, scratch);
-  const Eigen::Vector3d push_on_b = -p.translation_gradient;  // times a pressure [force/u²]
+  const Eigen::Vector3d push_on_b = p.force;  // times a pressure [force/u²]
   std::printf("overlap %g, push B along (%g, %g, %g)\n", p.volume, push_on_b.x(), push_on_b.y(),
               push_on_b.z());
 } catch (const ist::Error& error) {  // names the file and the remedy; queries never throw

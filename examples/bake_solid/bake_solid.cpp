@@ -1,7 +1,7 @@
 // Solids without a mesh file: one from boxes and balls, one from a function. Links ist::ist.
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,8 +15,8 @@ int main() try {
   const auto rod = ist::make_function_solid(
       [](const Eigen::Vector3d& x) {
         const double radius = 0.4 + 0.1 * std::sin(6 * x.x());
-        const double around = (radius - std::hypot(x.y(), x.z())) / std::hypot(1, 0.6);
-        return std::min(around, 1.5 - std::abs(x.x()));
+        const double around = (std::hypot(x.y(), x.z()) - radius) / std::hypot(1, 0.6);
+        return std::max(around, std::abs(x.x()) - 1.5);
       },
       {Eigen::Vector3d(-1.6, -0.6, -0.6), Eigen::Vector3d(1.6, 0.6, 0.6)});
   const ist::Asset a = ist::bake(*mould, settings);

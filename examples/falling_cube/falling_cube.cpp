@@ -1,14 +1,13 @@
 // A rigid body without an engine: a cube of side 1 falls on the floor, tilted, and comes to rest.
-// Mass from the asset, contact law from <ist/response.h>, path as a Motion. Exits with 1 if the
+// Mass from the asset, contact law from <ist/contact_law.h>, path as a Motion. Exits with 1 if the
 // result is unphysical: ist bake cube.obj -o cube.ist --spheres 1000; falling_cube cube.ist
 #include <ist/bake.h>
-#include <ist/error.h>
-#include <ist/field.h>
+#include <ist/contact_law.h>
 #include <ist/mass_properties.h>
-#include <ist/overlap.h>
-#include <ist/response.h>
+#include <ist/query.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
-#include <ist/wrench.h>
+#include <ist/types.h>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -28,7 +27,7 @@ constexpr int kSteps = 10 * 480;
 int main(int argc, char** argv) try {
   if (argc != 2) return std::fprintf(stderr, "usage: falling_cube CUBE.ist\n"), 2;
   const ist::Asset asset = ist::Asset::load(argv[1]);
-  const ist::PlacedField floor{ist::HalfSpaceField{Vector3d::UnitZ(), 0}, {}};  // z ≤ 0
+  const ist::PlacedShape floor{ist::HalfSpaceShape{Vector3d::UnitZ(), 0}, {}};  // z ≤ 0
   ist::Workspace scratch;
   ist::ContactMemory memory;
 
@@ -36,7 +35,7 @@ int main(int argc, char** argv) try {
   const ist::MassProperties own = ist::mass_properties(asset.view());
   const double mass = own.volume, weight = mass * kGravity;
   const double tilt = 0.3;  // [rad] about x
-  ist::PlacedTree cube{asset.view(), {{std::cos(tilt / 2), std::sin(tilt / 2), 0, 0}, {}}};
+  ist::PlacedAsset cube{asset.view(), {{std::cos(tilt / 2), std::sin(tilt / 2), 0, 0}, {}}};
   cube.pose.t[2] = kHeight - ist::mass_properties(cube).centre_of_mass.z();
   const double lowest = ist::bounds(cube).lower.z();  // the edge that touches first
 
@@ -57,16 +56,16 @@ int main(int argc, char** argv) try {
     Vector3d force(0, 0, -weight), torque = Vector3d::Zero();
 
     // A certain no costs a fraction of the patches.
-    if (ist::overlap(floor, cube, scratch) == ist::Overlapping::no) {
+    if (ist::overlap(floor, cube, scratch) == ist::YesNo::no) {
       memory = {};
     } else {
       std::array<ist::ContactPatch, 16> patches;
       const ist::ContactPatches found = ist::contact_patches(floor, cube, {}, scratch, patches);
-      const ist::Twist twist{now.centre_of_mass, velocity, inverse_inertia * spin};
+      const ist::Motion falls{velocity, inverse_inertia * spin, own.centre_of_mass};
       const Vector3d origin(cube.pose.t);
       const ist::ContactForce push =
           ist::contact_force(law, std::span(patches).first(found.count),
-                             ist::relative_motion({}, twist, origin), origin, kStep, memory);
+                             ist::relative_motion(floor, cube, {}, falls), origin, kStep, memory);
       // The law's torque is about the cube's origin; a free body turns about its centre of mass.
       const ist::Wrench on_cube = ist::about({push.force, push.torque}, origin, now.centre_of_mass);
       force += on_cube.force;
@@ -84,7 +83,7 @@ int main(int argc, char** argv) try {
     if (touched < 0) {
       const ist::TimeOfImpact impact =
           ist::time_of_impact(floor, cube, {{}, motion}, {.duration = kStep}, scratch);
-      if (impact.status != ist::ImpactStatus::no_impact) {
+      if (impact.kind != ist::ImpactKind::no_impact) {
         touched = time + impact.time;
         std::printf("%7.4f s  touches, no more than %.2g above the floor\n", touched,
                     impact.distance_max);

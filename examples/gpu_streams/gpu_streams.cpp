@@ -3,8 +3,8 @@
 
 #include <cuda_runtime_api.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/types.h>
 
 #include <atomic>
 #include <cstdio>

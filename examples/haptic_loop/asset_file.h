@@ -10,10 +10,10 @@
 #include <cstdlib>
 
 /// The asset in a file; it stays mapped. Ends the program if there is none.
-inline ist::TreeView map_asset(const char* path) {
+inline ist::AssetView map_asset(const char* path) {
   const int file = open(path, O_RDONLY);
   struct stat info {};
-  ist::TreeView tree;
+  ist::AssetView tree;
   if (file < 0 || fstat(file, &info) != 0 || info.st_size == 0) {
     std::fprintf(stderr, "%s: cannot open\n", path);
     std::exit(1);
@@ -25,7 +25,7 @@ inline ist::TreeView map_asset(const char* path) {
   const ist::AssetStatus status =
       memory == MAP_FAILED
           ? ist::AssetStatus::too_short
-          : ist::TreeView::from_bytes({static_cast<const std::byte*>(memory), size}, tree);
+          : ist::AssetView::from_bytes({static_cast<const std::byte*>(memory), size}, tree);
   if (status != ist::AssetStatus::ok) {
     std::fprintf(stderr, "%s: %s\n", path, describe(status));
     std::exit(1);

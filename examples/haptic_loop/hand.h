@@ -43,10 +43,10 @@ class Stroke {
   void move(const ist::PenetrationAndSeparation& contact, double seconds) {
     time_ += seconds;
     const ist::Penetration& p = contact.penetration;
-    const double area = p.translation_gradient.norm();
+    const double area = p.force.norm();
     const double depth = p.volume > 0 && area > 0 ? p.volume / area : -contact.separation.distance;
     if (p.volume > 0 && area > 0) {
-      out_ = -p.translation_gradient / area;
+      out_ = p.force / area;
     } else if (contact.separation.distance > 0) {
       out_ = contact.separation.normal;
     }

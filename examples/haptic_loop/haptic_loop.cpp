@@ -25,7 +25,7 @@ namespace {
 /// What the hand does: one of the three motions.
 class Motion {
  public:
-  Motion(const Options& options, const ist::TreeView& object, const ist::TreeView& probe)
+  Motion(const Options& options, const ist::AssetView& object, const ist::AssetView& probe)
       : insert_(options) {
     if (std::strcmp(options.motion, "stroke") == 0)
       stroke_.emplace(object.volume(), probe.volume() * std::pow(options.scale, 3));
@@ -51,7 +51,7 @@ class Motion {
 /// The simulation of a tick, without its clock.
 class Session {
  public:
-  Session(const Options& options, const ist::TreeView& object, const ist::TreeView& probe,
+  Session(const Options& options, const ist::AssetView& object, const ist::AssetView& probe,
           double coupling_hz)
       : motion_(options, object, probe),
         object_(object),
@@ -73,7 +73,7 @@ class Session {
 
   /// The query alone: what a loop waits for.
   ist::PenetrationAndSeparation ask() {
-    const ist::PlacedTree a{object_, {}}, b{probe_, pose_of(proxy_.pose()), scale_};
+    const ist::PlacedAsset a{object_, {}}, b{probe_, pose_of(proxy_.pose()), scale_};
     ist::PenetrationSettings settings;
     if (exact_) settings.measure = ist::Measure::exact;
     settings.pair_id = 1;  // a loop: what is near is kept from tick to tick
@@ -107,7 +107,7 @@ class Session {
 
  private:
   Motion motion_;
-  ist::TreeView object_, probe_;
+  ist::AssetView object_, probe_;
   double scale_, period_, time_ = 0;
   bool exact_;
   double deadline_us_;
@@ -144,8 +144,8 @@ bool write_trace(const char* path, const std::vector<Row>& rows) {
 }
 
 /// The motion at a coupling, as fast as it goes.
-Passivity rehearse(const Options& options, const ist::TreeView& object, const ist::TreeView& probe,
-                   double coupling_hz) {
+Passivity rehearse(const Options& options, const ist::AssetView& object,
+                   const ist::AssetView& probe, double coupling_hz) {
   Session session(options, object, probe, coupling_hz);
   const auto ticks = static_cast<std::size_t>(std::ceil(options.seconds * options.rate));
   for (std::size_t i = 0; i < ticks && session.passivity().deficit < INFINITY; ++i)
@@ -154,8 +154,8 @@ Passivity rehearse(const Options& options, const ist::TreeView& object, const is
 }
 
 /// [Hz] The stiffest coupling, to 2 %, up to which the motion stays passive; 0 if none is.
-double stiffest_passive(const Options& options, const ist::TreeView& object,
-                        const ist::TreeView& probe) {
+double stiffest_passive(const Options& options, const ist::AssetView& object,
+                        const ist::AssetView& probe) {
   double kept = 0, lost = 0;
   for (double hz = options.rate / 200; lost == 0 && hz < options.rate; hz *= 1.3)
     (rehearse(options, object, probe, hz).kept() ? kept : lost) = hz;
@@ -171,9 +171,9 @@ double stiffest_passive(const Options& options, const ist::TreeView& object,
 
 int main(int argc, char** argv) {
   const Options options = parse(argc, argv);
-  const ist::TreeView object = map_asset(options.object), probe = map_asset(options.probe);
+  const ist::AssetView object = map_asset(options.object), probe = map_asset(options.probe);
   if (options.exact && !(object.has_mesh() && probe.has_mesh())) {
-    std::fputs("--exact: both assets need their meshes; bake them without --surface none\n",
+    std::fputs("--exact: both assets need their meshes; bake them without --keep-mesh no\n",
                stderr);
     return 1;
   }

@@ -1,8 +1,8 @@
 #pragma once
 
+#include <ist/contact_law.h>
 #include <ist/mass_properties.h>
 #include <ist/query.h>
-#include <ist/response.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -35,9 +35,9 @@ struct Felt {
 class Proxy {
  public:
   /// `coupling_hz`, `contact_hz`: frequency of a mass 1 on either spring.
-  Proxy(const ist::PlacedTree& probe, double coupling_hz, double contact_hz) {
+  Proxy(const ist::PlacedAsset& probe, double coupling_hz, double contact_hz) {
     const ist::MassProperties mass =
-        ist::mass_properties(ist::PlacedTree{probe.tree, {}, probe.scale});
+        ist::mass_properties(ist::PlacedAsset{probe.asset, {}, probe.scale});
     centre_ = mass.centre_of_mass;
     inertia_ = mass.inertia / mass.volume;
     inverse_ = inertia_.inverse();
@@ -76,7 +76,7 @@ class Proxy {
         turning_ * (stiffness_ * twist + damping_ * (turning / seconds - omega));
 
     const HandPose own = pose();
-    ist::RelativeMotion motion;
+    ist::Motion motion;  // about the origin
     motion.velocity = velocity_ - omega.cross(turn_ * centre_);
     motion.angular_velocity = omega;
     const ist::ContactPatch patch = ist::whole_patch(contact);

@@ -360,7 +360,7 @@ class Truth:
     """Exact overlaps of the geoms' own meshes."""
 
     def __init__(self, scene):
-        self.assets = {name: (ist.bake_surface(ist.close_mesh(ist.Mesh(mesh[0], np.asarray(mesh[1], np.uint32)),
+        self.assets = {name: (ist.bake_mesh_only(ist.close_mesh(ist.Mesh(mesh[0], np.asarray(mesh[1], np.uint32)),
                                                               name=name)), float(scale))
                        for name, (mesh, scale) in scene.meshes.items()}
 

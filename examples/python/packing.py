@@ -21,9 +21,9 @@ BOX = np.array([4.0, 4.0, 3.5])  # [u] inner size; it stands on z = 0, its corne
 TRIED = 2000  # poses a part
 MARGIN = 1.02  # parts are queried this much larger
 
-WALLS = [ist.HalfSpaceField(normal=(1, 0, 0)), ist.HalfSpaceField(normal=(-1, 0, 0), offset=-BOX[0]),
-         ist.HalfSpaceField(normal=(0, 1, 0)), ist.HalfSpaceField(normal=(0, -1, 0), offset=-BOX[1]),
-         ist.HalfSpaceField(normal=(0, 0, 1)), ist.HalfSpaceField(normal=(0, 0, -1), offset=-BOX[2])]
+WALLS = [ist.HalfSpaceShape(normal=(1, 0, 0)), ist.HalfSpaceShape(normal=(-1, 0, 0), offset=-BOX[0]),
+         ist.HalfSpaceShape(normal=(0, 1, 0)), ist.HalfSpaceShape(normal=(0, -1, 0), offset=-BOX[1]),
+         ist.HalfSpaceShape(normal=(0, 0, 1)), ist.HalfSpaceShape(normal=(0, 0, -1), offset=-BOX[2])]
 
 
 class Crate:

@@ -54,13 +54,13 @@ assert np.flatnonzero(spoiled).tolist() == [7]
 # %% How far apart, certified; a quick yes or no; contact points for a solver.
 gaps = ist.separation(wheel, box, poses)
 sure = ist.overlap(wheel, box, poses)
-assert (many.volume[sure == ist.Overlapping.yes] > 0).all()
+assert (many.volume[sure == ist.YesNo.yes] > 0).all()
 print(f"largest gap {gaps.distance_max.max():.3g} u, proven free {np.mean(gaps.distance_min > 0):.0%}")
 patches = ist.contact_patches(wheel, box, pose, max_patches=4)
 assert np.allclose(patches.force.sum(axis=0), patches.penetration.force, atol=1e-9)
 
 # %% Floors and walls need no bake. Scales are of the objects.
-floor = ist.HalfSpaceField(normal=(0, 0, 1))
+floor = ist.HalfSpaceShape(normal=(0, 0, 1))
 sunk = ist.penetration(floor, box, [1, 0, 0, 0, 0, 0, -0.25], scales=2.0)
 print(f"a box of edge 2 that is 0.25 deep: {sunk.volume:.3g} u³ (exact: 1)")
 assert abs(sunk.volume - 1) < 0.02
@@ -68,7 +68,7 @@ assert abs(sunk.volume - 1) < 0.02
 # %% When does it land?
 fall = ist.time_of_impact(floor, box, [1, 0, 0, 0, 0, 0, 3], [1, 0, 0, 0, 0, 0, -1], duration=1.0)
 print(f"it lands at {fall.time:.3f} (exact: 0.75)")
-assert fall.status == ist.ImpactStatus.impact and abs(fall.time - 0.75) < 0.01
+assert fall.kind == ist.ImpactKind.impact and abs(fall.time - 0.75) < 0.01
 
 # %% A scene: solids, a pose each, and the pairs to query. Returns gradients by every pose.
 solids = ist.Solids([floor, wheel, box])

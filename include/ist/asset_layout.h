@@ -50,8 +50,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/api.h>
-#include <ist/sphere.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -270,7 +269,7 @@ struct alignas(64) AssetHeader {
   std::uint64_t mesh = 0;        ///< offset of MeshHeader; 0: baked without one
   std::uint32_t mesh_state = 0;  ///< MeshState
   std::uint32_t reserved_mesh = 0;
-  double counted_twice = 0;  ///< unit frame: ∫ (w − 1)⁺ of the input mesh
+  double self_overlap_volume = 0;  ///< unit frame: ∫ (w − 1)⁺ of the input mesh
 };
 static_assert(sizeof(AssetHeader) == 1152);
 

@@ -6,9 +6,8 @@
 #include <span>
 #include <vector>
 
-#include <ist/api.h>
 #include <ist/mesh.h>
-#include <ist/progress.h>
+#include <ist/types.h>
 
 // Few spheres, or capsules, that together cover a whole solid, for motion planners. Lengths are
 // [u], the mesh's own unit and frame.

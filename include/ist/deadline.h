@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include <ist/api.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -32,7 +32,7 @@ class Deadline {
   explicit Deadline(double microseconds = 0) noexcept;
 
   /// Sets the pair budget of the next query, and PenetrationSettings::spheres_only: meshes obey no
-  /// budget. Where spheres alone are too coarse (PairFit::needs_mesh), query without a deadline.
+  /// budget. Where spheres alone are too coarse (SizeMatch::needs_mesh), query without a deadline.
   void limit(PenetrationSettings& settings) const noexcept;
 
   /// Records the answer and the time of a query of the pair under this budget. An answer of NaN,

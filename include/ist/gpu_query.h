@@ -6,20 +6,18 @@
 #include <span>
 #include <variant>
 
-#include <ist/api.h>
-#include <ist/field.h>
+#include <ist/asset.h>
 #include <ist/gpu.h>
-#include <ist/gpu_arrays.h>
-#include <ist/query_enums.h>
-#include <ist/tree_view.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 
 // Penetrations, separations and contact patches of many pairs at once, on a GPU. Solids are
 // uploaded once; poses and answers are arrays in device memory that the caller owns.
 
 namespace IST_API ist {
 
-/// A solid of a batch: an asset, or a field.
-using GpuSolid = std::variant<TreeView, Field>;
+/// A solid of a batch: an asset, or a shape.
+using GpuSolid = std::variant<AssetView, Shape>;
 
 /// Solids in device memory, with all that they point to: assets' bytes, heights, distances.
 ///
@@ -29,9 +27,9 @@ class GpuSolids {
   /// Copies the solids to the device of `settings`; they are not needed afterwards. Pairs refer to
   /// them by index.
   ///
-  /// A field whose numbers are out of range makes its pairs invalid_input, as on the CPU. Throws
+  /// A shape whose numbers are out of range makes its pairs invalid_input, as on the CPU. Throws
   /// Error if the device cannot be used or has no memory left, for an asset without spheres, and
-  /// for a FunctionField, which a GPU cannot call.
+  /// for a FunctionShape, which a GPU cannot call.
   explicit GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings = {});
   ~GpuSolids();
   GpuSolids(GpuSolids&&) noexcept;
@@ -78,7 +76,7 @@ class GpuWorkspace {
 struct GpuPenetrationSettings {
   Measure measure = Measure::matched;  ///< matched or inner
   /// Count of sphere pairs to spend on each pair of assets; matched measure only; 0: no limit. With
-  /// fields it has no effect.
+  /// shapes it has no effect.
   ///
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
   /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
@@ -92,7 +90,7 @@ struct GpuPenetrationSettings {
 /// of the lenses' magnitudes, or of volume^(2/3) if that is more. Under a budget, and for copies of
 /// one asset at nearly the same pose, the answer is the CPU's blend of such sums.
 ///
-/// An asset and a field, in either order: sums are in double. The volume is within 1e-9 of the
+/// An asset and a shape, in either order: sums are in double. The volume is within 1e-9 of the
 /// CPU's, or 1e-15 of the asset's size³ if that is more; gradients likewise. node_visits counts
 /// opened nodes of the asset.
 ///

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-#include <ist/api.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -40,7 +40,7 @@ struct OverlapLenses {
 ///
 /// For pictures: pair by pair, some ten times slower than penetration(). No allocation, lock or
 /// exception. Trees may be shared by threads.
-OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
-                             std::span<OverlapLens> lenses) noexcept;
+OverlapLenses overlap_lenses(const PlacedAsset& a, const PlacedAsset& b,
+                             const LensSettings& settings, std::span<OverlapLens> lenses) noexcept;
 
 }  // namespace ist

@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include <ist/api.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -24,7 +24,7 @@ struct MassProperties {
   double inertia_error = 0;         ///< [u⁵] of each entry
 };
 
-/// Bounds of a solid, for a broad phase. Matched spheres may stick out by TreeView::protrusion():
+/// Bounds of a solid, for a broad phase. Matched spheres may stick out by AssetView::protrusion():
 /// two solids whose bounds are further apart than both protrusions have no penetration in any
 /// measure.
 struct Bounds {
@@ -38,18 +38,37 @@ struct Bounds {
 ///
 /// Stored by the bake: takes nanoseconds. For solids more than 1e60 [u] across the inertia is
 /// infinite, under 1e-60 [u] zero.
-MassProperties mass_properties(const TreeView& tree) noexcept;
+MassProperties mass_properties(const AssetView& tree) noexcept;
 
 /// In the asset's own frame; all zero for an empty view. The box is the mesh's, to the last digit.
-Bounds bounds(const TreeView& tree) noexcept;
+Bounds bounds(const AssetView& tree) noexcept;
 
 /// In the world frame, axes included: under a scale s the volume is s³ times as large, the inertia
 /// s⁵ times. All NaN for an empty tree, and for an invalid pose or scale. The errors do not
 /// include the rounding of the motion.
-MassProperties mass_properties(const PlacedTree& placed) noexcept;
+MassProperties mass_properties(const PlacedAsset& placed) noexcept;
 
 /// In the world frame: the box along the world's axes around the rotated box, and the ball.
 /// Rounding is not added. All NaN as above.
-Bounds bounds(const PlacedTree& placed) noexcept;
+Bounds bounds(const PlacedAsset& placed) noexcept;
+
+/// Whether the sizes of two assets suit each other, independent of their poses.
+struct SizeMatch {
+  /// [u] under the objects' scales: mean radius of the matched spheres, over the share of the solid
+  /// that inner spheres cover. The spheres do not resolve finer features.
+  double feature_size_a = 0, feature_size_b = 0;
+  double ratio = 1;          ///< ≥ 1, coarser grain over the finer
+  bool a_is_coarser = true;  ///< or both are equal
+  bool has_mesh = true;      ///< both assets store their meshes (AssetView::has_mesh)
+  /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. With both meshes
+  /// Measure::matched goes over to these (PenetrationSettings::spheres_only).
+  bool needs_mesh = false;
+
+  bool fits() const noexcept { return has_mesh || !needs_mesh; }
+};
+
+/// Takes nanoseconds. For empty trees, and scales that are not > 0, all members have their
+/// defaults.
+SizeMatch size_match(const PlacedAsset& a, const PlacedAsset& b) noexcept;
 
 }  // namespace ist

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/api.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -42,7 +42,7 @@ struct ImportSettings {
 /// solid, less where holes are visible. Coincident triangles are reduced first, and patches are
 /// oriented outward as seen from infinity. Volumes are sampled in the bounding box, at the same
 /// points on any machine.
-struct Judgement {
+struct RepairQuality {
   double confidence = 0;  ///< [0, 1] (agreement − agreement_error) · kept_surface
   /// [0, 1] ∫ w over the solid, divided by the volume of the solid and of the places outside it
   /// where w ≥ ½.
@@ -81,10 +81,10 @@ struct MeshReport {
   bool closed = false;           ///< bounds a solid
   bool repaired = false;         ///< repair changed the mesh
   bool wrapped = false;          ///< the mesh was made by wrap_mesh()
-  std::optional<Judgement> judged;  ///< of a repaired or wrapped mesh
-  double volume = 0;                ///< [u³] divergence theorem; counts self-overlaps twice
-  Eigen::AlignedBox3d bounds;       ///< [u] of the referenced vertices
-  std::vector<std::string> notes;   ///< one printable sentence per finding
+  std::optional<RepairQuality> judged;  ///< of a repaired or wrapped mesh
+  double volume = 0;                    ///< [u³] divergence theorem; counts self-overlaps twice
+  Eigen::AlignedBox3d bounds;           ///< [u] of the referenced vertices
+  std::vector<std::string> notes;       ///< one printable sentence per finding
 };
 
 /// A mesh that bounds a solid: every edge balanced, every shell oriented. A point is inside where
@@ -132,8 +132,8 @@ ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name,
                       OpenMeshPolicy policy = OpenMeshPolicy::refuse);
 
 /// A closed surface around any triangles. The solid is where their generalised winding number is ½
-/// or more (Judgement states how triangles are oriented first). Parts thinner than the detail are
-/// thickened by the detail on either side. Holes are closed where the winding number passes ½.
+/// or more (RepairQuality states how triangles are oriented first). Parts thinner than the detail
+/// are thickened by the detail on either side. Holes are closed where the winding number passes ½.
 ///
 /// `detail`: edge of the sampling lattice over the diagonal of the mesh's bounds, in [1e-3, 0.1];
 /// finer features are lost. Time grows with its inverse square, memory with its inverse cube.

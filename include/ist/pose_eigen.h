@@ -2,8 +2,7 @@
 
 #include <Eigen/Geometry>
 
-#include <ist/api.h>
-#include <ist/pose.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 

@@ -7,11 +7,9 @@
 #include <span>
 #include <variant>
 
-#include <ist/api.h>
-#include <ist/field.h>
-#include <ist/pose.h>
-#include <ist/query_enums.h>
-#include <ist/tree_view.h>
+#include <ist/asset.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -30,8 +28,8 @@ namespace IST_API ist {
 struct PenetrationSettings {
   Measure measure = Measure::matched;
   /// Matched measure only: spheres answer even where they are too coarse for the contact of two
-  /// solids of unlike sizes, and may be wrong by any factor (<ist/pair_fit.h>). For loops that must
-  /// end in a bounded time: the exact measure obeys no pair budget.
+  /// solids of unlike sizes, and may be wrong by any factor (<ist/mass_properties.h>). For loops
+  /// that must end in a bounded time: the exact measure obeys no pair budget.
   bool spheres_only = false;
 
   /// Count of sphere pairs to spend; two trees in the matched measure only (the inner one has no
@@ -56,9 +54,9 @@ struct PenetrationSettings {
   /// detail that is accurate enough at this overlap, or Measure::exact where no level is, or where
   /// few triangles cross. Neighbours are blended: volume and force stay continuous, and gradients
   /// are those of the blended sum. The prediction comes from the trials of the bake
-  /// (TreeView::predicted_errors), or else from a fit.
+  /// (AssetView::predicted_errors), or else from a fit.
   ///
-  /// Needs the mesh in both assets (TreeView::has_mesh), and no pair budget. Otherwise the finest
+  /// Needs the mesh in both assets (AssetView::has_mesh), and no pair budget. Otherwise the finest
   /// level, or the finest within the budget, answers; if its predicted error is larger than this,
   /// the status is error_exceeded. Assets without spheres are answered by Measure::exact.
   double relative_error = 0;
@@ -95,34 +93,44 @@ struct QuerySettings {
   SeparationSettings separation;
 };
 
-/// A tree at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
-struct PlacedTree {
-  TreeView tree;
+/// An asset at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
+struct PlacedAsset {
+  AssetView asset;
   Pose pose;
   double scale = 1;  ///< > 0, about the object's own origin, before the pose
 };
 
-/// A field at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
-struct PlacedField {
-  Field field;
+/// A shape at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
+struct PlacedShape {
+  Shape shape;
   Pose pose;
   double scale = 1;  ///< > 0
 };
 
-/// A solid of a query: an asset or a field at a pose.
+/// A solid of a query: an asset or a shape at a pose.
 ///
-/// A query takes two assets, or an asset and a field in either order. Two fields hold no spheres:
-/// the answer is not_held.
+/// A query takes two assets, or an asset and a shape in either order. Two shapes hold no spheres:
+/// the answer is missing_data.
 struct PlacedSolid {
   PlacedSolid() = default;
-  PlacedSolid(const PlacedTree& tree) : placed(tree) {}
-  PlacedSolid(const PlacedField& field) : placed(field) {}
-  PlacedSolid(const TreeView& tree, const Pose& pose, double scale = 1)
-      : placed(PlacedTree{tree, pose, scale}) {}
-  PlacedSolid(const Field& field, const Pose& pose, double scale = 1)
-      : placed(PlacedField{field, pose, scale}) {}
+  PlacedSolid(const PlacedAsset& asset) : placed(asset) {}
+  PlacedSolid(const PlacedShape& shape) : placed(shape) {}
+  PlacedSolid(const AssetView& asset, const Pose& pose, double scale = 1)
+      : placed(PlacedAsset{asset, pose, scale}) {}
+  PlacedSolid(const Shape& shape, const Pose& pose, double scale = 1)
+      : placed(PlacedShape{shape, pose, scale}) {}
 
-  std::variant<PlacedTree, PlacedField> placed;
+  std::variant<PlacedAsset, PlacedShape> placed;
+};
+
+/// A rigid motion of constant velocity: one point of the object moves straight, and the object
+/// turns about it. [T] is a unit of time of the caller's.
+struct Motion {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();          ///< [u/T] of `about`, world
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/T] world
+  /// [u] The point that moves straight, the centre of mass for a free body. In the object's own
+  /// frame, before its scale.
+  Eigen::Vector3d about = Eigen::Vector3d::Zero();
 };
 
 /// Overlap of two placed solids. Gradients are taken with respect to a motion of B, A held still.
@@ -140,11 +148,11 @@ struct Penetration {
   double volume_max = 0;
   /// [u] Of the overlap, world. Where solids touch in faces: of these. Zero if there is neither.
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  /// [u²] dV/d(translation of B), world. A pressure [force/u²] pushes B by −pressure times this,
-  /// and A by the opposite. <ist/response.h> has pressures that grow with depth.
-  Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
-  /// [u³/rad] dV/d(rotation vector of B about B's origin), world.
-  Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  /// [u²] The force on B of a pressure of 1 [force/u²]: −dV/d(translation of B), world. The force
+  /// on A is the opposite. Contact laws (<ist/contact_law.h>) have pressures that grow with depth.
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  /// [u³/rad] Its torque on B about B's origin: −dV/d(rotation vector of B), world.
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
   /// [u²] Measure::exact, where the solids touch: of the faces that lie on each other. 0 where they
   /// touch in points and edges alone.
   double contact_area = 0;
@@ -153,7 +161,7 @@ struct Penetration {
   Eigen::Vector3d contact_normal = Eigen::Vector3d::Zero();
   QueryStatus status = QueryStatus::ok;
   std::uint32_t node_visits = 0;  ///< node pairs opened
-  /// Non-empty lenses summed, spheres tested against a field, and spheres that lie wholly in the
+  /// Non-empty lenses summed, spheres tested against a shape, and spheres that lie wholly in the
   /// other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
   /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
@@ -163,7 +171,7 @@ struct Penetration {
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
-/// spheres, or inner spheres and a field. All zero once these overlap. Of solids that are farther
+/// spheres, or inner spheres and a shape. All zero once these overlap. Of solids that are farther
 /// than SeparationSettings::max_distance see there.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
@@ -229,7 +237,7 @@ class Workspace {
 /// The mesh must have no more than c blocks. What these return here may be too little for them (a
 /// bolt in its nut: 10,710, where 34,816 are needed): use the default capacity.
 ///
-/// Throws Error for an empty asset, a scale out of range, or two fields.
+/// Throws Error for an empty asset, a scale out of range, or two shapes.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 
 /// Volume, wrench and centroid of the overlap.
@@ -239,12 +247,12 @@ std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 /// returned volume. Copies of one asset at nearly the same pose are evaluated as unlike levels of
 /// detail, since the sum over coincident equal spheres is too large.
 ///
-/// With a field, the volume is the sum over the asset's spheres of the part inside the field.
-/// volume_min and volume_max include the field's error. max_visits applies; pair_budget has no
-/// effect. Measure::exact returns not_held: a field has no mesh. A field whose numbers are out of
-/// range gives invalid_input.
+/// With a shape, the volume is the sum over the asset's spheres of the part inside the shape.
+/// volume_min and volume_max include the shape's error. max_visits applies; pair_budget has no
+/// effect. Measure::exact returns missing_data: a shape has no mesh. A shape whose numbers are out
+/// of range gives invalid_input.
 ///
-/// No allocation, lock or exception. Trees and fields may be shared by threads; the workspace may
+/// No allocation, lock or exception. Trees and shapes may be shared by threads; the workspace may
 /// not. This holds for all queries.
 Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept;
@@ -261,19 +269,19 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 /// `whole`: the answer of penetration() for this pair by lenses
 /// (PenetrationSettings::spheres_only), in the matched measure, without a pair budget. Takes a few
 /// nanoseconds.
-Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
-                               const PlacedTree& b) noexcept;
+Penetration without_protrusion(const Penetration& whole, const PlacedAsset& a,
+                               const PlacedAsset& b) noexcept;
 
 /// Distance, witness points, and a certified interval for the solids.
 ///
-/// If both assets keep a mesh (TreeView::has_mesh), this is the distance of the surfaces. The
-/// interval is as wide as rounding and the meshes' error (TreeView::mesh_error). It is zero if the
+/// If both assets keep a mesh (AssetView::has_mesh), this is the distance of the surfaces. The
+/// interval is as wide as rounding and the meshes' error (AssetView::mesh_error). It is zero if the
 /// surfaces cross or one solid contains the other. Otherwise it is the distance of the inner
 /// spheres, exact to about 1e-6 of the objects' size, and all zero once these overlap. A stopped
 /// query returns the nearest points that it found; its interval is still certified.
 ///
-/// Batches on the GPU (<ist/gpu_query.h>) always use the inner spheres. The distance from a field
-/// is that of the asset's inner spheres, certified as far as the field's are: see each field.
+/// Batches on the GPU (<ist/gpu_query.h>) always use the inner spheres. The distance from a shape
+/// is that of the asset's inner spheres, certified as far as the shape's are: see each shape.
 ///
 /// If the gap is nearly constant over a large area, as between the threads of a nut and a bolt, a
 /// query takes many times longer: in a loop, set pair_id, and max_distance to what matters.
@@ -308,17 +316,16 @@ struct ContactPatch {
   /// level face differ by a factor of two and more, depending on the spheres they contain.
   double depth = 0;
   double volume = 0;  ///< [u³] part of Penetration::volume
-  /// [u²] part of −translation_gradient: the force on B of a pressure of 1 [force/u²]. The force on
-  /// A is the opposite.
+  /// [u²] part of Penetration::force.
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
-  /// [u³/rad] part of −rotation_gradient, about B's origin: the moment of `force` at `point`, and
-  /// `twist` times `normal`.
+  /// [u³/rad] part of Penetration::torque, about B's origin: the moment of `force` at `point`, and
+  /// `torsion` times `normal`.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
   /// [u] World: the point of the wrench's central axis that is nearest to the centroid. `force`
-  /// applied there has the patch's torque except for `twist`. It is far away where forces nearly
+  /// applied there has the patch's torque except for `torsion`. It is far away where forces nearly
   /// cancel, and the centroid if the area is 0.
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  double twist = 0;  ///< [u³/rad] residual moment about the normal of a force at `point`
+  double torsion = 0;  ///< [u³/rad] residual moment about the normal of a force at `point`
 };
 
 struct ContactPatches {
@@ -336,7 +343,7 @@ struct ContactPatches {
 /// Volumes, forces and torques sum to the whole's to about 1e-15.
 ///
 /// By spheres the contact is divided along the tree of the smaller solid (B's if equal or if A is
-/// too coarse; the asset's if the other is a field), always at the same places. The estimate of a
+/// too coarse; the asset's if the other is a shape), always at the same places. The estimate of a
 /// stopped query is divided too. It costs 1.7 (one patch) to 2.4 (32) times a penetration. Under a
 /// pair budget or a relative error the patches are those of the level of detail, or of
 /// Measure::exact, with the largest weight in the blend. The difference between the blend and that
@@ -369,7 +376,7 @@ struct OverlapOutline {
 /// the closed curves on which the surfaces cross. The measure is Measure::exact whatever the
 /// settings say. Seen from outside A, A's surface inside B is to the left of each segment. A patch
 /// that lies wholly inside the other solid has no outline.
-OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
+OverlapOutline overlap_outline(const PlacedAsset& a, const PlacedAsset& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept;
@@ -384,7 +391,7 @@ OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
 /// updated; it no longer equals the sum of the patches.
 ///
 /// `patches`: those that contact_patches() wrote for these two under these settings.
-void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
+void without_protrusion(std::span<ContactPatch> patches, const PlacedAsset& a, const PlacedAsset& b,
                         const ContactSettings& settings) noexcept;
 
 /// Two placed solids of a batch.
@@ -427,5 +434,25 @@ void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSetti
                            std::span<Workspace> workspaces, std::span<ContactPatches> answers,
                            std::span<ContactPatch> patches,
                            const ParallelFor& parallel = {}) noexcept;
+
+/// Whether two placed solids share a point.
+///
+/// Yes: two inner spheres meet, and these lie in the solids. No: no two cover balls meet, and these
+/// contain the solids. Unknown: the solids are near each other or hardly touch, or 256 pairs of
+/// nodes have been opened.
+///
+/// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration. With
+/// a shape, it is certain as far as the shape's distances are: see each shape. Two shapes:
+/// missing_data.
+YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept;
+
+/// Whether two placed solids come within `margin` [u] ≥ 0 of each other. Yes and no are certain.
+///
+/// If both assets keep a mesh, `unknown` is left only where the distance is the margin to rounding
+/// and the meshes' errors. Otherwise inner spheres and their covers decide, as above. Takes about
+/// as long as overlap(), or a few microseconds, unless the distance is near the margin. A margin
+/// that is negative, or NaN: invalid_input.
+YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
+                    Workspace& workspace) noexcept;
 
 }  // namespace ist

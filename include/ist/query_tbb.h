@@ -1,7 +1,7 @@
 #pragma once
 
-#include <ist/api.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 

@@ -7,11 +7,10 @@
 #include <span>
 #include <vector>
 
-#include <ist/api.h>
-#include <ist/overlap.h>
 #include <ist/query.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
 #include <ist/time_of_impact.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 
@@ -40,7 +39,7 @@ struct SceneBody {
   /// The caller's number, unique in its scene: bodies are named by it, and pairs are in its order.
   std::uint32_t number = 0;
   PlacedSolid solid;
-  bool moves = true;          ///< two bodies that do not move are not asked, nor are two fields
+  bool moves = true;          ///< two bodies that do not move are not asked, nor are two shapes
   std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
   std::uint32_t layers = 1;   ///< bits
   std::uint32_t meets = ~0u;  ///< bits: layers of bodies that it meets; both must agree
@@ -57,8 +56,8 @@ enum class SceneEvent : std::uint32_t { begins = 0, stays = 1 };
 struct ScenePair {
   std::uint32_t a = 0, b = 0;  ///< numbers, a < b; A of the query is `a`
   SceneEvent event = SceneEvent::begins;
-  Overlapping overlapping = Overlapping::unknown;  ///< SceneAnswer::overlap alone
-  std::uint32_t slot = ~0u;                        ///< where its answers are
+  YesNo overlapping = YesNo::unknown;  ///< SceneAnswer::overlap alone
+  std::uint32_t slot = ~0u;            ///< where its answers are
   std::uint32_t patch_count = 0;
 };
 
@@ -149,15 +148,15 @@ class Scene {
   std::span<const ContactPatch> patches(const ScenePair& pair) const noexcept;
 
   /// What decides the next step: bodies, rules, exclusions and the pairs that met, with the content
-  /// hashes of assets. Of a filter it holds what it refuses now. Throws Error for a FunctionField.
+  /// hashes of assets. Of a filter it holds what it refuses now. Throws Error for a FunctionShape.
   std::vector<std::byte> record() const;
   /// The scene that was recorded, of which the next step has the same bits. Throws Error where the
   /// record is none or an asset is missing, naming its hash, whatever the bytes.
-  static Scene replay(std::span<const std::byte> record, std::span<const TreeView> assets,
+  static Scene replay(std::span<const std::byte> record, std::span<const AssetView> assets,
                       std::size_t workers = 1);
 
   /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.
-  /// Bodies that rays do not support (<ist/surface.h>) and those that are refused are passed.
+  /// Bodies that rays do not support (<ist/raycast.h>) and those that are refused are passed.
   SceneHit raycast(const Ray& ray) const noexcept;
   /// Bodies whose boxes meet a box [u], in no order: how many there are; as many as fit are
   /// written.

@@ -19,7 +19,7 @@
 #ifdef __cplusplus
 #include <cstdint>
 
-#include <ist/api.h>
+#include <ist/types.h>
 
 namespace IST_API ist {
 

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
@@ -138,7 +138,7 @@ void run_bake(const BakeOptions& options) {
   if (!options.closed_mesh.empty())
     require_output(options.closed_mesh, options.mesh, "the closed mesh");
   settings.packing.device = usable_device(options.device);
-  if (!settings.surface_only) announce_device(settings.packing.device);
+  if (!settings.mesh_only) announce_device(settings.packing.device);
   if (robot) return bake_robot(options, settings);
 
   const auto start = std::chrono::steady_clock::now();

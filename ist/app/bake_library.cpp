@@ -1,7 +1,7 @@
 #include "app/bake_library.h"
 
 #include <fmt/format.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
 
@@ -223,7 +223,7 @@ RunSettings settings_for(const LibraryRun& run) {
 
 }  // namespace
 
-std::vector<std::string> warnings_of(const TreeView& tree) {
+std::vector<std::string> warnings_of(const AssetView& tree) {
   std::vector<std::string> warnings;
   if (const PredictedErrors errors = tree.predicted_errors();
       errors.target_error > 0 && !errors.target_met())

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 #include "library/summary.h"
 
@@ -36,7 +36,7 @@ struct LibraryRun {
 void run_library(const LibraryRun& run);
 
 /// What is wrong with an asset that was baked: a missed target, coarse spheres, overlapping parts.
-std::vector<std::string> warnings_of(const TreeView& tree);
+std::vector<std::string> warnings_of(const AssetView& tree);
 
 /// On stdout, as JSON or as a table for a person; nothing where a person wants quiet.
 /// `failed`: only assets that are not done are listed; all are counted.

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <ist/asset_layout.h>
 #include "app/commands.h"

@@ -1,8 +1,8 @@
 #include <fmt/format.h>
-#include <ist/error.h>
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <array>
@@ -37,8 +37,8 @@ struct ClashOptions {
 using Triangle = std::array<Vector3d, 3>;
 
 /// The triangles of a part in its place.
-std::vector<Triangle> triangles_of(const PlacedTree& solid) {
-  const AssetHeader& asset = solid.tree.header();
+std::vector<Triangle> triangles_of(const PlacedAsset& solid) {
+  const AssetHeader& asset = solid.asset.header();
   const char* const bytes = reinterpret_cast<const char*>(&asset);
   const auto& mesh = *reinterpret_cast<const MeshHeader*>(bytes + asset.mesh);
   const auto* const vertices = reinterpret_cast<const double*>(bytes + mesh.vertices);
@@ -60,7 +60,7 @@ std::vector<Triangle> triangles_of(const PlacedTree& solid) {
 }
 
 /// The pieces of a triangle that lie in a solid, to a size of `finest`.
-void add_inside(const Triangle& t, const PlacedTree& solid, const Eigen::AlignedBox3d& near,
+void add_inside(const Triangle& t, const PlacedAsset& solid, const Eigen::AlignedBox3d& near,
                 double finest, std::vector<Triangle>& out) {
   Eigen::AlignedBox3d box(t[0]);
   box.extend(t[1]).extend(t[2]);
@@ -105,7 +105,7 @@ std::string drawn(const Assembly& assembly, const ClashReport& report) {
     add_mesh(scene, part.name, kGrey, triangles_of(part.solid));
   for (const Clash& clash : report.pairs) {
     if (!report.is_clash(clash)) continue;
-    const PlacedTree &a = assembly.parts[clash.a].solid, &b = assembly.parts[clash.b].solid;
+    const PlacedAsset &a = assembly.parts[clash.a].solid, &b = assembly.parts[clash.b].solid;
     const Bounds in_a = bounds(a), in_b = bounds(b);
     const Eigen::AlignedBox3d both = Eigen::AlignedBox3d(in_a.lower, in_a.upper)
                                          .intersection(Eigen::AlignedBox3d(in_b.lower, in_b.upper));

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
+#include <ist/asset.h>
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
-#include <ist/tree_view.h>
+#include <ist/types.h>
 
 #include <array>
 #include <cmath>
@@ -38,7 +38,7 @@ std::array<double, 4> colour_of(std::size_t level) {
 /// coordinates as floats about the asset's middle, where the node above them all stands.
 ///
 /// `detail` in [0, header().detail_count], 0 for Measure::inner. The file's bytes.
-std::string tree_glb(const TreeView& view, Measure measure, std::uint32_t detail,
+std::string tree_glb(const AssetView& view, Measure measure, std::uint32_t detail,
                      const std::string& name) {
   const AssetHeader& header = view.header();
   const TreeHeader& tree =
@@ -90,7 +90,7 @@ void run_export(const ExportOptions& options) {
   const Format format = format_of(options.output);
   const Asset asset = Asset::load(options.asset);
   if (asset.view().sphere_count() == 0)
-    throw Error(options.asset + ": has no spheres; bake it again without --surface-only");
+    throw Error(options.asset + ": has no spheres; bake it again without --mesh-only");
   const std::uint32_t details = asset.view().header().detail_count;
   if (options.detail > details)
     throw Error(

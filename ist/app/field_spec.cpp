@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "library/settings/numbers.h"
 
@@ -83,7 +83,7 @@ class Spec {
     return value;
   }
 
-  HalfSpaceField plane() const {
+  HalfSpaceShape plane() const {
     const Vector3d normal(values_[0], values_[1], values_[2]);
     const double length = normal.stableNorm();
     if (!(length > 0)) fail("the normal is zero and has no direction");
@@ -110,16 +110,16 @@ class Spec {
 
 bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
 
-Field parse_field(const std::string& text) {
+Shape parse_field(const std::string& text) {
   const Kind* const kind = kind_of(text);
   if (kind == nullptr) throw Error("'" + text + "' does not describe a field");
   const Spec spec(text, *kind);
   const std::string_view name = kind->name;
   if (name == "plane") return spec.plane();
-  if (name == "box") return BoxField{Vector3d(spec.length(0), spec.length(1), spec.length(2))};
-  if (name == "ball") return BallField{spec.length(0)};
-  if (name == "capsule") return CapsuleField{spec.length(0), spec.length(1, true)};
-  return CylinderField{spec.length(0), spec.length(1)};
+  if (name == "box") return BoxShape{Vector3d(spec.length(0), spec.length(1), spec.length(2))};
+  if (name == "ball") return BallShape{spec.length(0)};
+  if (name == "capsule") return CapsuleShape{spec.length(0), spec.length(1, true)};
+  return CylinderShape{spec.length(0), spec.length(1)};
 }
 
 }  // namespace ist::app

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 // Fields on the command line, lengths in [u], in the field's own frame:
 //   plane:nx,ny,nz,d   the solid n · x ≤ d, n of any length above 0
@@ -17,6 +17,6 @@ namespace ist::app {
 bool is_field_spec(const std::string& text);
 
 /// Throws Error that says what of the description is wrong and what is expected.
-Field parse_field(const std::string& text);
+Shape parse_field(const std::string& text);
 
 }  // namespace ist::app

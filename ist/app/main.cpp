@@ -1,4 +1,4 @@
-#include <ist/error.h>
+#include <ist/types.h>
 #include <ist/version.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>

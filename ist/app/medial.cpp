@@ -1,4 +1,4 @@
-#include <ist/medial.h>
+#include <ist/bake.h>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -6,7 +6,7 @@
 #include <chrono>
 #include <memory>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/mesh_notes.h"

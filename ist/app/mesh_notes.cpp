@@ -1,7 +1,7 @@
 #include "app/mesh_notes.h"
 
 #include <fmt/format.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -123,7 +123,7 @@ nlohmann::ordered_json closing_json(const MeshReport& report) {
                            "volume_ratio", "input_mean", "input_max", "made_mean", "made_max"})
     json[name] = nullptr;
   if (!report.judged) return json;
-  const Judgement& judged = *report.judged;
+  const RepairQuality& judged = *report.judged;
   json["method"] = report.wrapped ? "wrap" : "repair";
   json["confidence"] = judged.confidence;
   json["agreement"] = judged.agreement;

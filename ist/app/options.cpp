@@ -1,8 +1,8 @@
 #include "app/options.h"
 
 #include <fmt/format.h>
-#include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
 
 #include <unistd.h>

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 #include <CLI/CLI.hpp>
 
 #include <functional>

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <ist/error.h>
-#include <ist/progress.h>
+#include <ist/types.h>
 
 #include "app/interrupt.h"
 #include "library/whole_progress.h"

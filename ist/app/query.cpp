@@ -1,4 +1,4 @@
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -9,8 +9,8 @@
 #include <memory>
 
 #include <ist/bake.h>
-#include <ist/error.h>
-#include <ist/pair_fit.h>
+#include <ist/mass_properties.h>
+#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/field_spec.h"
@@ -91,7 +91,7 @@ std::vector<PoseRow> asked_rows(const QueryOptions& options) {
 
 /// Answers every row, `repeat` rounds over all rows in turn, so that no row finds the branch
 /// predictor trained by itself. A row's time is the least of its rounds.
-std::vector<Answer> answer(const PlacedSolid& a, const TreeView& b,
+std::vector<Answer> answer(const PlacedSolid& a, const AssetView& b,
                            const std::vector<PoseRow>& rows, const QueryOptions& options) {
   using Clock = std::chrono::steady_clock;
   std::vector<Answer> answers;
@@ -101,7 +101,7 @@ std::vector<Answer> answer(const PlacedSolid& a, const TreeView& b,
   Workspace workspace;
   for (std::size_t round = 0; round < options.repeat; ++round)
     for (Answer& answer : answers) {
-      const PlacedTree placed_b{b, answer.row.pose, answer.row.scale_b};
+      const PlacedAsset placed_b{b, answer.row.pose, answer.row.scale_b};
       const Clock::time_point start = Clock::now();
       const PenetrationAndSeparation result = query(a, placed_b, options.settings, workspace);
       const Clock::time_point end = Clock::now();
@@ -138,12 +138,12 @@ void check_settings(const QueryOptions& options) {
 }
 
 /// Throws Error if an asset does not hold what the measure asks.
-void require_held(const std::string& path, const TreeView& tree, Measure measure) {
+void require_held(const std::string& path, const AssetView& tree, Measure measure) {
   if (measure != Measure::exact) {
     if (tree.sphere_count() > 0) return;
     throw Error(
         fmt::format("{}: has no spheres, which --measure {} needs; use --measure exact, or bake it "
-                    "again without --surface-only",
+                    "again without --mesh-only",
                     path, measure == Measure::inner ? "inner" : "matched"));
   }
   if (tree.has_mesh()) return;
@@ -152,22 +152,22 @@ void require_held(const std::string& path, const TreeView& tree, Measure measure
     throw Error(fmt::format(
         "{}: {}; use --measure matched, or bake a mesh whose parts do not overlap", path, twice));
   throw Error(path +
-              ": has no mesh, which --measure exact needs; bake it again with --surface all, or "
+              ": has no mesh, which --measure exact needs; bake it again with --keep-mesh yes, or "
               "use --measure matched");
 }
 
 /// Says once on stderr where spheres alone are asked for what they cannot tell.
-void warn_of_misfit(const TreeView& a, const TreeView& b, const std::vector<PoseRow>& rows,
+void warn_of_misfit(const AssetView& a, const AssetView& b, const std::vector<PoseRow>& rows,
                     const QueryOptions& options) {
   const PenetrationSettings& settings = options.settings.penetration;
   if (settings.measure != Measure::matched || settings.spheres_only) return;
   for (const PoseRow& row : rows) {
-    const PairFit fit = pair_fit({a, {}, 1}, {b, {}, row.scale_b});
+    const SizeMatch fit = size_match({a, {}, 1}, {b, {}, row.scale_b});
     if (fit.fits()) continue;
     spdlog::warn(
         "{}: its spheres are {:.2g} times as coarse as those of {}, and {} has no mesh: volumes "
         "and "
-        "forces may be far off. Bake it again with --surface all",
+        "forces may be far off. Bake it again with --keep-mesh yes",
         fit.a_is_coarser ? options.a : options.asset_b, fit.ratio,
         fit.a_is_coarser ? options.asset_b : options.a, a.has_mesh() ? options.asset_b : options.a);
     return;
@@ -179,7 +179,7 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
   if (is_field_spec(options.a)) {
     const Asset b = Asset::load(options.asset_b);
     require_held(options.asset_b, b.view(), measure);
-    return answer(PlacedField{parse_field(options.a), {}, 1}, b.view(), rows, options);
+    return answer(PlacedShape{parse_field(options.a), {}, 1}, b.view(), rows, options);
   }
   const Asset a = Asset::load(options.a);
   const Asset b = Asset::load(options.asset_b);
@@ -191,7 +191,7 @@ std::vector<Answer> answer(const std::vector<PoseRow>& rows, const QueryOptions&
     require_held(options.asset_b, b.view(), measure);
   }
   warn_of_misfit(a.view(), b.view(), rows, options);
-  std::vector<Answer> answers = answer(PlacedTree{a.view(), {}, 1}, b.view(), rows, options);
+  std::vector<Answer> answers = answer(PlacedAsset{a.view(), {}, 1}, b.view(), rows, options);
   for (Answer& one : answers) {
     one.surfaces = a.view().has_mesh() && b.view().has_mesh();
     one.exact = measure == Measure::exact && one.result.penetration.status == QueryStatus::ok;
@@ -280,7 +280,7 @@ void add_query(CLI::App& app) {
   command->add_flag("--csv", options->csv, "Print CSV (the default with --poses)")->excludes(json);
   command->footer(
       "Gradients are with respect to a motion of B, in A's frame. A pressure k [force/u²]\n"
-      "exerts the force −k·dVdt and, about B's origin, the torque −k·dVdr on B.\n"
+      "exerts k times the force and, about B's origin, the torque on B.\n"
       "A field defines A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"

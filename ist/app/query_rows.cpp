@@ -1,7 +1,7 @@
 #include "app/query_rows.h"
 
 #include <fmt/format.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <istream>
 
 #include <algorithm>
@@ -239,9 +239,8 @@ std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparati
   const Separation& s = r.separation;
   std::vector<std::pair<std::string, double>> out = {
       {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
-  for (const auto& [name, v] : {std::pair{"c", p.centroid},
-                                {"dVdt", p.translation_gradient},
-                                {"dVdr", p.rotation_gradient}})
+  for (const auto& [name, v] :
+       {std::pair{"c", p.centroid}, {"force_", p.force}, {"torque_", p.torque}})
     for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
   out.insert(out.end(), {{"distance", s.distance},
                          {"distance_min", s.distance_min},
@@ -360,9 +359,8 @@ std::string answer_text(const Answer& answer, const PenetrationSettings& setting
   }
   if (known) {
     line("centroid", short_vector(p.centroid) + " u", "of the overlap, in A's frame");
-    line("force/k", short_vector(-p.translation_gradient) + " u²", "on B: −dV/d(translation of B)");
-    line("torque/k", short_vector(-p.rotation_gradient) + " u³",
-         "on B about its origin: −dV/d(rotation of B)");
+    line("force/k", short_vector(p.force) + " u²", "on B: −dV/d(translation of B)");
+    line("torque/k", short_vector(p.torque) + " u³", "on B about its origin: −dV/d(rotation of B)");
   }
   if (answer.has_distance()) {
     const bool farther = std::isinf(s.distance_max);

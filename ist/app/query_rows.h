@@ -42,7 +42,7 @@ struct Answer {
   bool exact = false;     ///< the measure is: it knows what touches
 
   /// Surfaces alone have no spheres to be apart.
-  bool has_distance() const { return result.separation.status != QueryStatus::not_held; }
+  bool has_distance() const { return result.separation.status != QueryStatus::missing_data; }
   /// Of the halves that there are the one that says most.
   QueryStatus status() const {
     const QueryStatus overlap = result.penetration.status, gap = result.separation.status;

@@ -1,7 +1,7 @@
 #include "app/reference.h"
 
 #include <fmt/format.h>
-#include <ist/error.h>
+#include <ist/types.h>
 #include <ist/version.h>
 
 #include <algorithm>

@@ -5,7 +5,7 @@
 #include <string>
 
 #include <ist/cover_spheres.h>
-#include <ist/progress.h>
+#include <ist/types.h>
 
 #include "app/sphere_output.h"
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "app/glb_scene.h"
 #include "app/mesh_notes.h"

@@ -11,7 +11,7 @@
 
 #include <ist/bake.h>
 #include <ist/cover_spheres.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
@@ -117,7 +117,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
     if (shapes.empty()) continue;
     SphereLink& one = out.links.emplace_back();
     one.name = link.name;
-    one.has_mesh = std::any_of(shapes.begin(), shapes.end(), [](const PlacedShape& placed) {
+    one.has_mesh = std::any_of(shapes.begin(), shapes.end(), [](const PlacedLinkShape& placed) {
       return !std::holds_alternative<LinkBall>(placed.shape);
     });
     const auto geometry = [&] {

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/mass_properties.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
+#include <ist/types.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -113,13 +113,13 @@ std::string bitmap(const std::array<unsigned char, kSide * kSide>& grey) {
 }
 
 /// The solid from the front, right and above, Z up; empty without a mesh.
-std::string picture(const TreeView& tree) {
+std::string picture(const AssetView& tree) {
   if (!tree.has_mesh()) return "";
   const Bounds around = bounds(tree);
   const Vector3d out = Vector3d(1, -2, 1.2).normalized();
   const Vector3d right = Vector3d::UnitZ().cross(out).normalized(), up = out.cross(right);
   const Vector3d light = (out + 0.6 * up - 0.5 * right).normalized();
-  const PlacedTree placed = {tree, {}};
+  const PlacedAsset placed = {tree, {}};
   std::array<unsigned char, kSide * kSide> grey;
   for (int row = 0; row < kSide; ++row)
     for (int column = 0; column < kSide; ++column) {

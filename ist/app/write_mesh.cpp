@@ -6,7 +6,7 @@
 #include <iterator>
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "app/options.h"
 #include "bake/asset/atomic_file.h"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "bake/aside.h"
 #include "bake/asset/asset_writer.h"
@@ -264,7 +264,7 @@ AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid) {
 void keep(const KeptMesh& kept, AssetArrays& arrays) {
   arrays.mesh = kept.mesh;
   arrays.header.mesh_state = static_cast<std::uint32_t>(kept.state);
-  arrays.header.counted_twice = kept.counted_twice;
+  arrays.header.self_overlap_volume = kept.self_overlap_volume;
 }
 
 Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, SharedMesh& kept,
@@ -290,7 +290,7 @@ Asset bake(const ClosedMesh& mesh, const PackingSettings& settings,
   });
 }
 
-Asset bake_surface(const ClosedMesh& mesh, unsigned threads, const ProgressCallback& progress) {
+Asset bake_mesh_only(const ClosedMesh& mesh, unsigned threads, const ProgressCallback& progress) {
   return thread_arena(threads).execute([&] {
     const ResolvedMesh resolved = resolve(mesh, progress);
     const MeshSolid solid(resolved);

@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-#include <ist/error.h>
-#include <ist/field.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <array>
@@ -155,15 +155,15 @@ class TargetBake {
   }
 
   /// The solid's own triangles, by which volumes are exact.
-  TreeView own_mesh() {
-    const TreeView baked = best_->asset.view();
+  AssetView own_mesh() {
+    const AssetView baked = best_->asset.view();
     if (baked.mesh_state() == MeshState::unresolved)
       throw Error(mesh_.name +
                   ": the mesh counts volume twice, so that no error can be measured. " +
                   resolved_.resolution.reason + " Bake it to a number of spheres, or wrap it");
     if (baked.mesh_state() == MeshState::own || baked.mesh_state() == MeshState::resolved)
       return baked;
-    if (!own_mesh_) own_mesh_ = bake_surface(mesh_, settings_.threads);
+    if (!own_mesh_) own_mesh_ = bake_mesh_only(mesh_, settings_.threads);
     return own_mesh_->view();
   }
 
@@ -210,7 +210,7 @@ class TargetBake {
   /// Asks a candidate about what it has not been asked about; false: the time is over.
   bool judge(Candidate& candidate) {
     Stage stage("predict", watch_.strict());
-    const TreeView& tree = candidate.asset.view();
+    const AssetView& tree = candidate.asset.view();
     const std::size_t all = poses_.size() + others_.size();
     const auto next = [&] {
       const std::size_t done = candidate.errors.size() + candidate.other_errors.size();

@@ -1,6 +1,6 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/ist_bake.h>
+#include <ist/c_bake.h>
 #include <ist/mesh.h>
 
 #include <cstdio>
@@ -16,10 +16,10 @@ using namespace ist;
 
 ist_status_t ist_bake(const double* vertices, std::size_t vertex_count,
                       const std::uint32_t* triangles, std::size_t triangle_count,
-                      const ist_bake_settings_t* settings, ist_tree_t* tree, char* message,
+                      const ist_bake_settings_t* settings, ist_asset_t* out, char* message,
                       std::size_t message_size) {
-  if (tree == nullptr) return IST_NULL_POINTER;
-  *tree = {};
+  if (out == nullptr) return IST_NULL_POINTER;
+  *out = {};
   if (message != nullptr && message_size > 0) *message = 0;
   if ((vertices == nullptr && vertex_count > 0) || (triangles == nullptr && triangle_count > 0))
     return IST_NULL_POINTER;
@@ -37,14 +37,14 @@ ist_status_t ist_bake(const double* vertices, std::size_t vertex_count,
     packing.threads = wanted.threads;
     if (wanted.spheres > 0) packing.max_spheres = wanted.spheres;
     const Asset asset =
-        wanted.surface_only != 0 ? bake_surface(closed, wanted.threads) : bake(closed, packing);
+        wanted.mesh_only != 0 ? bake_mesh_only(closed, wanted.threads) : bake(closed, packing);
     const std::size_t size = asset.bytes().size();
     HookedArray<std::byte> bytes = {static_cast<std::byte*>(take_memory({}, size, kAssetAlignment)),
                                     {{}, size, kAssetAlignment}};
     std::memcpy(bytes.get(), asset.bytes().data(), size);
-    const ist_status_t status = ist_tree_view(bytes.get(), size, tree);
+    const ist_status_t status = ist_asset_view(bytes.get(), size, out);
     if (status != IST_OK) return status;
-    c_api::TreeHandle& handle = c_api::TreeHandle::in(*tree);
+    c_api::AssetHandle& handle = c_api::AssetHandle::in(*out);
     handle.size = size;
     handle.bytes = bytes.release();
     return IST_OK;

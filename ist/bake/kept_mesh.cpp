@@ -39,13 +39,12 @@ struct Box {
 };
 
 /// Patches in an order whose groups of 16, 256, … lie together.
-std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
-  std::vector<BlockPatch> patches = cut_into_patches(in_floats(surface));
+std::vector<BlockPatch> patches_in_order(const MeshView& mesh) {
+  std::vector<BlockPatch> patches = cut_into_patches(in_floats(mesh));
   std::vector<std::array<float, 3>> middles(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
     Box box;
-    for (const std::uint32_t v : patches[p].vertices)
-      box.add(surface.vertices + 3 * std::size_t{v});
+    for (const std::uint32_t v : patches[p].vertices) box.add(mesh.vertices + 3 * std::size_t{v});
     for (std::size_t k = 0; k < 3; ++k) middles[p][k] = (box.low[k] + box.high[k]) / 2;
   }
   std::vector<BlockPatch> sorted;
@@ -55,9 +54,9 @@ std::vector<BlockPatch> patches_in_order(const MeshView& surface) {
 }
 
 /// Vertices are numbered as blocks first use them.
-void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patches,
+void lay_out_blocks(const MeshView& mesh, const std::vector<BlockPatch>& patches,
                     MeshArrays& arrays) {
-  std::vector<std::uint32_t> number(surface.vertex_count, kNoVertex);
+  std::vector<std::uint32_t> number(mesh.vertex_count, kNoVertex);
   std::uint32_t used = 0;
   arrays.blocks.resize(patches.size());
   for (std::size_t b = 0; b < patches.size(); ++b) {
@@ -70,7 +69,7 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
       if (number[v] == kNoVertex) {
         number[v] = used++;
         for (std::size_t k = 0; k < 3; ++k)
-          arrays.vertices.push_back(surface.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
+          arrays.vertices.push_back(mesh.vertices[3 * std::size_t{v} + k] + 0.0);  // −0 is 0
       }
       block.vertex[i] = number[v];
     }
@@ -78,7 +77,7 @@ void lay_out_blocks(const MeshView& surface, const std::vector<BlockPatch>& patc
       std::fill_n(block.corner[k], kWidth, std::uint8_t{0});
       for (std::size_t i = 0; i < patch.triangles.size(); ++i) {
         block.corner[k][i] =
-            patch.place_of(surface.triangles[3 * std::size_t{patch.triangles[i]} + k]);
+            patch.place_of(mesh.triangles[3 * std::size_t{patch.triangles[i]} + k]);
       }
     }
     arrays.header.triangle_count += block.triangles;
@@ -282,12 +281,12 @@ void find_slabs(MeshArrays& arrays) {
 /// an order whose groups of 16, 256, … are compact, boxes around them, shells and neighbours.
 /// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
 ///
-/// `surface`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
+/// `mesh`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
 /// `header.rounding` are the caller's to set. Same bytes for any number of threads and on any
 /// machine.
-MeshArrays lay_out_mesh(const MeshView& surface) {
+MeshArrays lay_out_mesh(const MeshView& mesh) {
   MeshArrays arrays;
-  lay_out_blocks(surface, patches_in_order(surface), arrays);
+  lay_out_blocks(mesh, patches_in_order(mesh), arrays);
   find_neighbours(arrays);
   std::vector<Box> boxes(arrays.blocks.size());
   for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = box_of(arrays, arrays.blocks[b]);
@@ -314,10 +313,10 @@ KeptMesh keep_mesh(const MeshSolid& solid, const Resolution& resolution) {
   const double scale = solid.frame().scale();
   if (resolution.how == Resolution::How::resolved) {
     kept.state = MeshState::resolved;
-    kept.counted_twice = resolution.counted_twice / (scale * scale * scale);
+    kept.self_overlap_volume = resolution.counted_twice / (scale * scale * scale);
   } else {
-    kept.counted_twice = estimate_counted_twice(solid);
-    kept.state = kept.counted_twice > 0 ? MeshState::unresolved : MeshState::own;
+    kept.self_overlap_volume = estimate_counted_twice(solid);
+    kept.state = kept.self_overlap_volume > 0 ? MeshState::unresolved : MeshState::own;
   }
   if (kept.state == MeshState::unresolved) return kept;
   MeshArrays mesh = lay_out_mesh(solid.arrays());

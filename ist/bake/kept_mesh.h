@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 #include "bake/aside.h"
 #include "bake/asset/asset_writer.h"
@@ -18,7 +18,7 @@ inline constexpr std::size_t kMostAround = 256;
 struct KeptMesh {
   std::shared_ptr<const MeshArrays> mesh;  ///< null: none, and `state` says why
   MeshState state = MeshState::none;
-  double counted_twice = 0;  ///< unit frame, as TreeView::counted_twice
+  double self_overlap_volume = 0;  ///< unit frame, as AssetView::self_overlap_volume
 };
 
 /// `resolution`: how the solid's mesh was made. Same bytes for any number of threads and on any

@@ -1,6 +1,5 @@
-#include <ist/error.h>
-#include <ist/medial.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 
 #include <string>
 

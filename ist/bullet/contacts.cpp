@@ -519,12 +519,15 @@ void PairAlgorithm::push(const btCollisionObject& first, const btCollisionObject
 
   btRigidBody* const b = movable(second);
   btRigidBody* const a = movable(first);
-  const auto twist_of = [](const btRigidBody* moved) {
-    if (moved == nullptr) return Twist();
-    return Twist{to_eigen(moved->getCenterOfMassPosition()), to_eigen(moved->getLinearVelocity()),
-                 to_eigen(moved->getAngularVelocity())};
+  const auto motion_of = [&](const btRigidBody* moved) {  // of its point at B's origin
+    if (moved == nullptr) return Motion();
+    const Eigen::Vector3d velocity = to_eigen(moved->getLinearVelocity()),
+                          turning = to_eigen(moved->getAngularVelocity()),
+                          centre = to_eigen(moved->getCenterOfMassPosition());
+    return Motion{velocity + turning.cross(contact.origin - centre), turning};
   };
-  const RelativeMotion motion = relative_motion(twist_of(a), twist_of(b), contact.origin);
+  const Motion of_a = motion_of(a), of_b = motion_of(b);
+  const Motion motion{of_b.velocity - of_a.velocity, of_b.angular_velocity - of_a.angular_velocity};
   ContactLaw law = settings.law;
   law.stiffness = spring_of(state_->meeting, first, second, settings, step).stiffness;
   law.friction = gCalculateCombinedFrictionCallback(&first, &second);

@@ -10,9 +10,9 @@
 #include <optional>
 
 #include <ist/bullet/convert.h>
+#include <ist/contact_law.h>
 #include <ist/mass_properties.h>
-#include <ist/support.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 namespace ist::bullet {
 
@@ -57,8 +57,8 @@ std::optional<Penetration> push_across(const Penetration& apart, const Separatio
   constexpr double kHardly = 1e-6;  // its size is no matter
   const Eigen::Vector3d force = kHardly * (reach * reach) * normal;
   push.volume = 0;
-  push.translation_gradient = -force;
-  push.rotation_gradient = force.cross(push.centroid - origin_b);
+  push.force = force;
+  push.torque = (push.centroid - origin_b).cross(force);
   return push;
 }
 
@@ -180,7 +180,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
     constexpr double kAlike = 0.99;
     double areas = 0;
     for (const ContactPatch& patch : room.first(contact.count)) areas += patch.area;
-    if (contact.inside || !(whole->translation_gradient.norm() > kAlike * areas)) return;
+    if (contact.inside || !(whole->force.norm() > kAlike * areas)) return;
   }
 
   const auto radius = [](const Shape* shape) {
@@ -193,7 +193,7 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   for (const bool of_second : {false, true}) {
     const PlacedSolid& solid = of_second ? b : a;
     if (polygon.add(of_second, solid)) continue;
-    if (partner_) partner_->add_faces(std::get<PlacedField>(solid.placed), of_second, polygon);
+    if (partner_) partner_->add_faces(std::get<PlacedShape>(solid.placed), of_second, polygon);
   }
   const std::optional<std::size_t> corners = polygon.corners(room);
   if (!corners) return;
@@ -207,8 +207,7 @@ bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& cont
   // that push against each other.
   constexpr double kWhole = 0.99, kNone = 0.01;
   const double overlap = contact.whole.volume;
-  if (!(contact.whole.translation_gradient.norm() < kNone * std::pow(overlap, 2.0 / 3)))
-    return false;
+  if (!(contact.whole.force.norm() < kNone * std::pow(overlap, 2.0 / 3))) return false;
   for (const int inner : {0, 1}) {
     const Shape* const shape = inner == 0 ? first_ : second_;
     Eigen::Vector3d centre;
@@ -274,9 +273,9 @@ double Meeting::share_until_impact(const Places& from, const Places& to, const P
   const double motion = largest_motion(between(from), between(to));
   if (!(motion > threshold)) return 1;
   const TimeOfImpact found = impact(from, to, in_body, settings);
-  if (found.status == ImpactStatus::no_impact) return 1;
+  if (found.kind == ImpactKind::no_impact && found.status == QueryStatus::ok) return 1;
   const double stride = threshold / motion;
-  if (found.status != ImpactStatus::overlapping) return std::min(1.0, found.time + kDepth * stride);
+  if (found.kind != ImpactKind::overlapping) return std::min(1.0, found.time + kDepth * stride);
 
   // In contact. Their mean depth tells most where they slide or turn, as a nut on its thread.
   const auto depth_after = [&](double share) {

@@ -41,7 +41,7 @@ Vector on_segment(const Vector& x, const Vector& a, const Vector& b) {
 }
 
 /// A cone about the z axis, its base below: in the half-plane of distance from the axis and height.
-FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   const auto& cone = *static_cast<const btConeShape*>(context);
   const double radius = cone.getRadius(), height = cone.getHeight();
   const double out = std::hypot(x.x(), x.y());
@@ -49,18 +49,18 @@ FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept 
   const Eigen::Vector2d rim(radius, -height / 2);
   const Eigen::Vector2d side = Eigen::Vector2d(height, radius).normalized();  // outward
   const double to_side = side.dot(apex - point), to_base = x.z() + height / 2;
-  FieldSample sample;
+  ShapeSample sample;
   Eigen::Vector2d gradient;
   if (to_side >= 0 && to_base >= 0) {
-    sample.distance = std::min(to_side, to_base);
-    gradient = to_side < to_base ? Eigen::Vector2d(-side) : Eigen::Vector2d(0, 1);
+    sample.distance = -std::min(to_side, to_base);
+    gradient = to_side < to_base ? side : Eigen::Vector2d(0, -1);
   } else {
-    const Eigen::Vector2d base = on_segment(point, foot, rim) - point;
-    const Eigen::Vector2d mantle = on_segment(point, rim, apex) - point;
+    const Eigen::Vector2d base = point - on_segment(point, foot, rim);
+    const Eigen::Vector2d mantle = point - on_segment(point, rim, apex);
     gradient = base.squaredNorm() < mantle.squaredNorm() ? base : mantle;
     const double distance = gradient.norm();
-    sample.distance = -distance;
-    gradient = distance > 0 ? Eigen::Vector2d(gradient / distance) : Eigen::Vector2d(-side);
+    sample.distance = distance;
+    gradient = distance > 0 ? Eigen::Vector2d(gradient / distance) : side;
   }
   const Eigen::Vector2d radial =
       out > 0 ? Eigen::Vector2d(x.head<2>() / out) : Eigen::Vector2d(1, 0);
@@ -68,11 +68,11 @@ FieldSample cone_sample(const void* context, const Eigen::Vector3d& x) noexcept 
   return sample;
 }
 
-FieldSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample mesh_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const MeshDistance*>(context)->at(x);
 }
 
-FieldSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
+ShapeSample hull_sample(const void* context, const Eigen::Vector3d& x) noexcept {
   return static_cast<const HullDistance*>(context)->at(x);
 }
 
@@ -98,19 +98,19 @@ std::vector<btVector3> corners_of(const btPolyhedralConvexShape& shape) {
 
 /// Bullet tells nobody what its terrain is made of: an heir may look.
 struct Terrain : btHeightfieldTerrainShape {
-  static bool find(const btHeightfieldTerrainShape& shape, PlacedField& placed, btVector3& origin) {
+  static bool find(const btHeightfieldTerrainShape& shape, PlacedShape& placed, btVector3& origin) {
     if (shape.*(&Terrain::m_upAxis) != 2 || shape.*(&Terrain::m_heightDataType) != PHY_FLOAT) {
       return false;
     }
     const btVector3& scaling = shape.getLocalScaling();
-    HeightField field;
+    HeightFieldShape field;
     field.heights = shape.*(&Terrain::m_heightfieldDataFloat);
     field.columns = static_cast<std::uint32_t>(shape.*(&Terrain::m_heightStickWidth));
     field.rows = static_cast<std::uint32_t>(shape.*(&Terrain::m_heightStickLength));
     for (int k = 0; k < 2; ++k) field.spacing[k] = double{scaling[k]} / scaling.z();
     field.lowest = shape.*(&Terrain::m_minHeight);
     field.highest = shape.*(&Terrain::m_maxHeight);
-    placed.field = field;
+    placed.shape = field;
     placed.scale = scaling.z();
     // Bullet's is centred, ist's begins at the first height's foot.
     origin = -scaling * (shape.*(&Terrain::m_localOrigin));
@@ -144,13 +144,13 @@ HullDistance::HullDistance(const std::vector<btVector3>& points) {
   }
 }
 
-FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
-  FieldSample inside{std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
+ShapeSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
+  ShapeSample inside{-std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
   double nearest = std::numeric_limits<double>::infinity();
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (const Face& face : faces_) {
     const double out = face.normal.dot(x) - face.offset;
-    if (-out < inside.distance) inside = {-out, -face.normal};
+    if (out > inside.distance) inside = {out, face.normal};
     if (out <= 0) continue;
     bool over = true;
     const std::size_t count = face.corners.size();
@@ -159,13 +159,13 @@ FieldSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
       const Eigen::Vector3d& b = face.corners[(i + 1) % count];
       if ((b - a).cross(face.normal).dot(x - a) <= 0) continue;
       over = false;
-      const Eigen::Vector3d to_edge = on_segment(x, a, b) - x;
-      if (to_edge.norm() < nearest) nearest = to_edge.norm(), way = to_edge / nearest;
+      const Eigen::Vector3d from_edge = x - on_segment(x, a, b);
+      if (from_edge.norm() < nearest) nearest = from_edge.norm(), way = from_edge / nearest;
     }
-    if (over && out < nearest) nearest = out, way = -face.normal;
+    if (over && out < nearest) nearest = out, way = face.normal;
   }
-  if (inside.distance >= 0) return inside;
-  return {-nearest, way};
+  if (inside.distance <= 0) return inside;
+  return {nearest, way};
 }
 
 void HullDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
@@ -292,16 +292,16 @@ Eigen::Vector3d MeshDistance::Triangle::nearest(const Eigen::Vector3d& x) const 
   return share;
 }
 
-FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
+ShapeSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
   // Where several triangles are as near, as at a common side, all of them tell front from back: by
   // the angles at which they meet there. Sides that two of them share cancel; a border is left.
   constexpr double kAsNear = 1 + 1e-9, kNone = 1e-6;
-  if (boxes_.empty()) return {-1e100, Eigen::Vector3d::Zero()};
+  if (boxes_.empty()) return {1e100, Eigen::Vector3d::Zero()};
   if (level_) {
     const Eigen::Vector3d& up = triangles_[0].normal;
     const double depth = up.dot(triangles_[0].centre - x);
-    if (depth < thickness_ - depth) return {depth, -up};
-    return {thickness_ - depth, up};
+    if (depth < thickness_ - depth) return {-depth, up};
+    return {depth - thickness_, -up};
   }
   // The triangles of the nearest box say first how near is near.
   const auto foot_on = [&](const Triangle& triangle, const Eigen::Vector3d& share) {
@@ -360,19 +360,19 @@ FieldSample MeshDistance::at(const Eigen::Vector3d& x) const noexcept {
       front += angle * triangle.normal;
     }
   }
-  if (size == 0) return {-1e100, Eigen::Vector3d::Zero()};
+  if (size == 0) return {1e100, Eigen::Vector3d::Zero()};
   front.normalize();
   const Eigen::Vector3d out = x - foot;
   const double length = out.norm(), depth = -front.dot(out);
   const Eigen::Vector3d away = length > kNone * kNone * std::sqrt(size) ? out / length : front;
-  if (depth <= 0) return {-length, -away};
+  if (depth <= 0) return {length, away};
   if (border.squaredNorm() > kNone * kNone * size) {
     const Eigen::Vector3d beside = out + std::min(depth, thickness_) * front;
     const double gap = beside.norm();
-    if (gap > kNone * length) return {-gap, -beside / gap};
+    if (gap > kNone * length) return {gap, beside / gap};
   }
-  if (length < thickness_ - length) return {length, away};
-  return {thickness_ - length, -away};
+  if (length < thickness_ - length) return {-length, -away};
+  return {length - thickness_, away};
 }
 
 std::optional<Partner> Partner::of(const btCollisionShape& shape) {
@@ -380,33 +380,33 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
   switch (shape.getShapeType()) {
     case STATIC_PLANE_PROXYTYPE: {
       const auto& plane = static_cast<const btStaticPlaneShape&>(shape);
-      partner.field_.field =
-          HalfSpaceField{to_eigen(plane.getPlaneNormal()), plane.getPlaneConstant()};
+      partner.field_.shape =
+          HalfSpaceShape{to_eigen(plane.getPlaneNormal()), plane.getPlaneConstant()};
       return partner;
     }
     case BOX_SHAPE_PROXYTYPE:
-      partner.field_.field =
-          BoxField{to_eigen(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin())};
+      partner.field_.shape =
+          BoxShape{to_eigen(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin())};
       return partner;
     case SPHERE_SHAPE_PROXYTYPE:
-      partner.field_.field = BallField{static_cast<const btSphereShape&>(shape).getRadius()};
+      partner.field_.shape = BallShape{static_cast<const btSphereShape&>(shape).getRadius()};
       return partner;
     case CAPSULE_SHAPE_PROXYTYPE: {
       const auto& capsule = static_cast<const btCapsuleShape&>(shape);
-      partner.field_.field = CapsuleField{capsule.getRadius(), capsule.getHalfHeight()};
+      partner.field_.shape = CapsuleShape{capsule.getRadius(), capsule.getHalfHeight()};
       partner.in_shape_ = from_z_to(capsule.getUpAxis());
       return partner;
     }
     case CYLINDER_SHAPE_PROXYTYPE: {
       const auto& cylinder = static_cast<const btCylinderShape&>(shape);
       const int up = cylinder.getUpAxis();
-      partner.field_.field =
-          CylinderField{cylinder.getRadius(), cylinder.getHalfExtentsWithMargin()[up]};
+      partner.field_.shape =
+          CylinderShape{cylinder.getRadius(), cylinder.getHalfExtentsWithMargin()[up]};
       partner.in_shape_ = from_z_to(up);
       return partner;
     }
     case CONE_SHAPE_PROXYTYPE:
-      partner.field_.field = FunctionField{cone_sample, &shape, 0};
+      partner.field_.shape = FunctionShape{cone_sample, &shape, 0};
       partner.in_shape_ = from_z_to(static_cast<const btConeShape&>(shape).getConeUpIndex());
       return partner;
     case CONVEX_HULL_SHAPE_PROXYTYPE:
@@ -417,7 +417,7 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
           corners_of(static_cast<const btPolyhedralConvexShape&>(shape));
       partner.hull_ = std::make_shared<const HullDistance>(points);
       if (partner.hull_->faces() < 4) return std::nullopt;
-      partner.field_.field = FunctionField{hull_sample, partner.hull_.get(), 0};
+      partner.field_.shape = FunctionShape{hull_sample, partner.hull_.get(), 0};
       return partner;
     }
     case TERRAIN_SHAPE_PROXYTYPE: {
@@ -440,26 +440,26 @@ std::optional<Partner> Partner::of(const btCollisionShape& shape) {
   }
 }
 
-PlacedField Partner::placed(const btTransform& shape, const btVector3& lower,
+PlacedShape Partner::placed(const btTransform& shape, const btVector3& lower,
                             const btVector3& upper, double thickness) const {
-  PlacedField placed = field_;
+  PlacedShape placed = field_;
   placed.pose = to_pose(shape * in_shape_);
   if (mesh_ != nullptr) {
     thread_local MeshDistance near;
     near.gather(*mesh_, lower, upper, thickness);
-    placed.field = FunctionField{mesh_sample, &near, 0};
+    placed.shape = FunctionShape{mesh_sample, &near, 0};
   }
   return placed;
 }
 
-void Partner::add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const {
+void Partner::add_faces(const PlacedShape& placed, bool of_b, SupportPolygon& polygon) const {
   const Eigen::Isometry3d pose = to_isometry(placed.pose);
   if (hull_ != nullptr) return hull_->add_faces(pose, of_b, polygon);
   if (mesh_ != nullptr) {
-    const auto& near = std::get<FunctionField>(placed.field);
+    const auto& near = std::get<FunctionShape>(placed.shape);
     return static_cast<const MeshDistance*>(near.context)->add_faces(pose, of_b, polygon);
   }
-  const auto* const cylinder = std::get_if<CylinderField>(&placed.field);
+  const auto* const cylinder = std::get_if<CylinderShape>(&placed.shape);
   if (cylinder == nullptr) return;
   constexpr int kSides = 32;
   for (const double sign : {-1.0, 1.0}) {

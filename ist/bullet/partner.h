@@ -10,8 +10,8 @@
 #include <vector>
 
 #include <ist/bullet/shape.h>
+#include <ist/contact_law.h>
 #include <ist/query.h>
-#include <ist/support.h>
 
 namespace ist::bullet {
 
@@ -22,7 +22,7 @@ class HullDistance {
   explicit HullDistance(const std::vector<btVector3>& points);
 
   std::size_t faces() const { return faces_.size(); }
-  FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  ShapeSample at(const Eigen::Vector3d& x) const noexcept;
   void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
@@ -43,7 +43,7 @@ class MeshDistance : public btTriangleCallback {
   void gather(const btConcaveShape& shape, const btVector3& lower, const btVector3& upper,
               double thickness);
 
-  FieldSample at(const Eigen::Vector3d& x) const noexcept;
+  ShapeSample at(const Eigen::Vector3d& x) const noexcept;
   void add_faces(const Eigen::Isometry3d& pose, bool of_b, SupportPolygon& polygon) const;
 
  private:
@@ -74,7 +74,7 @@ class Partner {
 
   /// For an asset in a box in the shape's frame: see MeshDistance::gather(). Triangles last until
   /// the thread's next call.
-  PlacedField placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
+  PlacedShape placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
 
   /// [u] What placed() says of distances holds for motions up to this.
@@ -84,7 +84,7 @@ class Partner {
 
   /// Its flat faces, where SupportPolygon::add() does not know them. `placed`: by placed(), in the
   /// same thread and not before another.
-  void add_faces(const PlacedField& placed, bool of_b, SupportPolygon& polygon) const;
+  void add_faces(const PlacedShape& placed, bool of_b, SupportPolygon& polygon) const;
 
   const btCollisionShape& shape() const { return *shape_; }
 
@@ -92,7 +92,7 @@ class Partner {
   explicit Partner(const btCollisionShape& shape) : shape_(&shape) {}
 
   const btCollisionShape* shape_;
-  PlacedField field_;  // its pose is in_shape_, each time
+  PlacedShape field_;  // its pose is in_shape_, each time
   btTransform in_shape_ = btTransform::getIdentity();
   std::shared_ptr<const HullDistance> hull_;
   const btConcaveShape* mesh_ = nullptr;

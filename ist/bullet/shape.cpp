@@ -10,11 +10,11 @@
 #include <ist/asset_layout.h>
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 namespace ist::bullet {
 
-BodyFrame body_frame(const TreeView& tree) {
+BodyFrame body_frame(const AssetView& tree) {
   const MassProperties mass = mass_properties(tree);
   BodyFrame frame{Eigen::Isometry3d::Identity(), mass.inertia.diagonal() / mass.volume};
   const Eigen::Matrix3d diagonal = mass.inertia.diagonal().asDiagonal();
@@ -29,7 +29,7 @@ BodyFrame body_frame(const TreeView& tree) {
   return frame;
 }
 
-Shape::Shape(const TreeView& tree) : tree_(tree), frame_(body_frame(tree)) {
+Shape::Shape(const AssetView& tree) : tree_(tree), frame_(body_frame(tree)) {
   m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE;
   if (tree.sphere_count() == 0) {
     warn("An asset without spheres collides with nothing: bake it with spheres.");
@@ -90,7 +90,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
   };
   // A ray's triangles are found one after another, until one hit is the last that counts.
   if (auto* const ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
-    const PlacedTree mesh_placed{tree_, to_pose(mesh_in_body_), scale_};
+    const PlacedAsset mesh_placed{tree_, to_pose(mesh_in_body_), scale_};
     const Eigen::Vector3d from = to_eigen(ray->m_from), way = to_eigen(ray->m_to) - from;
     const double length = way.norm(), past = 1e-9 * (length + reach());
     for (double begin = 0; begin < ray->m_hitFraction * length;) {

@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "clash/sources.h"
 #include "library/input_mesh.h"
@@ -173,13 +173,13 @@ Made make(const ClashShape& shape, const MeshSettings& closing) {
     if (!shape.mesh) {
       out.asset = std::make_shared<const Asset>(Asset::load(shape.name));
       if (!out.asset->view().has_mesh())
-        out.fault = shape.name + ": keeps no mesh; bake it again with --surface all";
+        out.fault = shape.name + ": keeps no mesh; bake it again with --keep-mesh yes";
       return out;
     }
     const ClosedMesh closed = close_as_asked(shape.mesh(), shape.name, closing);
     out.notes = closed.report.notes;
     // One thread: many shapes are made at once.
-    out.asset = std::make_shared<const Asset>(bake_surface(closed, 1));
+    out.asset = std::make_shared<const Asset>(bake_mesh_only(closed, 1));
   } catch (const Error& error) {
     out.fault = error.what();
   }
@@ -249,7 +249,7 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
     }
     const ClashShape& from = source.shapes[part.shape];
     out.assets.push_back(shape.asset);
-    out.parts.push_back({part.name, PlacedTree{shape.asset->view(), rows[0].poses[i], part.scale},
+    out.parts.push_back({part.name, PlacedAsset{shape.asset->view(), rows[0].poses[i], part.scale},
                          from.rounding, part.scale * from.slack});
     for (std::size_t r = 0; r < rows.size(); ++r) out.rows[r].poses.push_back(rows[r].poses[i]);
     kept.push_back(i);

@@ -13,11 +13,11 @@
 #include <tuple>
 #include <utility>
 
-#include <ist/error.h>
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
+#include <ist/raycast.h>
 #include <ist/scene.h>
-#include <ist/surface.h>
+#include <ist/types.h>
 
 #include "clash/world_mesh.h"
 #include "mesh/import/source_file.h"
@@ -39,9 +39,9 @@ struct Scratch {
 /// A part as pairs see it.
 struct Placed {
   Placed(const ClashPart& given, const ClashSettings& settings) : part(given) {
-    const PlacedTree& solid = part.solid;
-    if (!solid.tree.has_mesh()) throw Error(part.name + ": its asset keeps no mesh");
-    const Bounds world = bounds(solid), own = bounds(solid.tree);
+    const PlacedAsset& solid = part.solid;
+    if (!solid.asset.has_mesh()) throw Error(part.name + ": its asset keeps no mesh");
+    const Bounds world = bounds(solid), own = bounds(solid.asset);
     if (!world.lower.allFinite() || !world.upper.allFinite())
       throw Error(part.name +
                   ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, "
@@ -53,10 +53,10 @@ struct Placed {
     // Coordinates, and poses of as many digits, are each off by up to this.
     touch = settings.touch_within >= 0
                 ? settings.touch_within / 2
-                : 4 * part.rounding * largest + part.slack + solid.scale * solid.tree.mesh_error();
+                : 4 * part.rounding * largest + part.slack + solid.scale * solid.asset.mesh_error();
     margin = touch + settings.clearance / 2 + 4 * kFloat64 * largest;
     box = {world.lower.array() - margin, world.upper.array() + margin};
-    volume = solid.tree.volume() * solid.scale * solid.scale * solid.scale;
+    volume = solid.asset.volume() * solid.scale * solid.scale * solid.scale;
     diameter = 2 * world.radius;
   }
   /// Made when it is asked for first. `all`: a box around the assembly.
@@ -164,7 +164,7 @@ class PairQuery {
 
  private:
   /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
-  Sums patches(const PlacedTree& solid_b, Penetration& found, double* depth = nullptr) {
+  Sums patches(const PlacedAsset& solid_b, Penetration& found, double* depth = nullptr) {
     const ContactPatches all =
         contact_patches(a_.part.solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
     found = all.penetration;
@@ -201,16 +201,16 @@ class PairQuery {
   void way_out(Clash& out, const Sums& whole) {
     const Vector3d by =
         std::min(kFlush * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
-    Vector3d force = -aside(-by).translation_gradient;
+    Vector3d force = aside(-by).force;
     if ((force - whole.force).norm() > 1e-4 * whole.force.norm())
-      force = (force - aside(by).translation_gradient) / 2;
+      force = (force + aside(by).force) / 2;
     if (!(force.norm() > whole.area / 4)) return;
     out.direction = unit(force);
     if (parts_ == 1) out.depth = whole.volume / force.norm();
   }
 
-  PlacedTree moved(const Vector3d& by) const {
-    PlacedTree solid = b_.part.solid;
+  PlacedAsset moved(const Vector3d& by) const {
+    PlacedAsset solid = b_.part.solid;
     for (int k = 0; k < 3; ++k) solid.pose.t[k] += by[k];
     return solid;
   }
@@ -267,7 +267,7 @@ class PairQuery {
     Penetration found;
     if (!out.direction.isZero(0)) {
       found = aside(-by * out.direction);
-      out.contact_area = std::max(0.0, -found.translation_gradient.dot(out.direction));
+      out.contact_area = std::max(0.0, found.force.dot(out.direction));
     } else if (out.volume > 0) {
       out.contact_area = patches(b_.part.solid, found).area;
     }

@@ -14,7 +14,7 @@ namespace ist {
 /// A part of an assembly. Its asset keeps a mesh.
 struct ClashPart {
   std::string name;
-  PlacedTree solid;
+  PlacedAsset solid;
   /// What its coordinates are rounded by, as a share of them: that of float32 or of float64.
   double rounding = 0;
   double slack = 0;  ///< [u] how far its mesh may lie from the shape that is meant

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "library/text.h"
 

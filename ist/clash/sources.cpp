@@ -10,8 +10,8 @@
 #include <tuple>
 #include <utility>
 
-#include <ist/error.h>
 #include <ist/pose_eigen.h>
+#include <ist/types.h>
 
 #include "library/settings/spelling.h"
 #include "mesh/import/source_file.h"
@@ -263,7 +263,7 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
             append_mesh(all.mesh, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
           return std::move(all.mesh);
         }};
-    for (const PlacedShape& one : shapes) {
+    for (const PlacedLinkShape& one : shapes) {
       if (std::holds_alternative<LinkMesh>(one.shape))
         shape.rounding =
             std::max(shape.rounding, rounding_of_file(std::get<LinkMesh>(one.shape).file));

@@ -14,8 +14,8 @@ constexpr double kParallel = 1e-7;  ///< of normals
 
 }  // namespace
 
-WorldMesh::WorldMesh(const PlacedTree& solid, const Eigen::Vector3d& origin, double size) {
-  const AssetHeader& asset = solid.tree.header();
+WorldMesh::WorldMesh(const PlacedAsset& solid, const Eigen::Vector3d& origin, double size) {
+  const AssetHeader& asset = solid.asset.header();
   const MeshTree mesh = mesh_of(solid);
   const Eigen::Isometry3d place = to_isometry(solid.pose);
   const double unit = std::ldexp(1.0, asset.exponent);

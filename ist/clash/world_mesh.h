@@ -17,7 +17,7 @@ struct WorldMesh {
   };
 
   /// `origin`, `size`: of the whole assembly.
-  WorldMesh(const PlacedTree& solid, const Eigen::Vector3d& origin, double size);
+  WorldMesh(const PlacedAsset& solid, const Eigen::Vector3d& origin, double size);
 
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Plane> planes;  ///< by key

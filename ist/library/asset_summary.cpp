@@ -29,7 +29,7 @@ std::uint64_t round_count(double count) {
 
 }  // namespace
 
-std::optional<std::uint64_t> enough_spheres(const TreeView& tree) {
+std::optional<std::uint64_t> enough_spheres(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   if (!(h.coverage < kCoarse) || !(h.volume > 0)) return std::nullopt;
   // The last quarter: what one of its spheres covers of the solid.
@@ -47,14 +47,14 @@ std::optional<std::uint64_t> enough_spheres(const TreeView& tree) {
   return round_count(count);
 }
 
-std::string describe_coarseness(const TreeView& tree) {
+std::string describe_coarseness(const AssetView& tree) {
   if (tree.header().sphere_count == 0 || !(tree.header().coverage < kCoarse)) return "";
   const std::string coarse =
       fmt::format("the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; ",
                   100 * tree.header().coverage);
   if (const auto enough = enough_spheres(tree))
     return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
-  return coarse + "no number of spheres is enough. Bake the surface alone (--surface-only)";
+  return coarse + "no number of spheres is enough. Bake the mesh alone (--mesh-only)";
 }
 
 namespace {
@@ -88,7 +88,7 @@ nlohmann::ordered_json predicted_json(const AssetHeader& h) {
 }
 
 /// What was asked of the error and what became of it; empty where nothing was.
-nlohmann::ordered_json target_json(const TreeView& tree) {
+nlohmann::ordered_json target_json(const AssetView& tree) {
   nlohmann::ordered_json result = nlohmann::ordered_json::object();
   const PredictedErrors errors = tree.predicted_errors();
   if (errors.target_error == 0) return result;
@@ -124,16 +124,16 @@ const char* why_missed(StopReason stop) {
 /// The file ends with the mesh.
 std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
 
-nlohmann::ordered_json mesh_json(const TreeView& tree) {
+nlohmann::ordered_json mesh_json(const AssetView& tree) {
   return {{"state", name_of(tree.mesh_state())},
           {"triangles", tree.mesh_triangles()},
           {"bytes", mesh_bytes(tree.header())},
           {"error", tree.has_mesh() ? nlohmann::ordered_json(tree.mesh_error())
                                     : nlohmann::ordered_json(nullptr)},
-          {"counted_twice", tree.counted_twice()}};
+          {"self_overlap_volume", tree.self_overlap_volume()}};
 }
 
-std::string describe_mesh(const TreeView& tree) {
+std::string describe_mesh(const AssetView& tree) {
   if (!tree.has_mesh())
     return tree.mesh_state() == MeshState::unresolved ? "none: parts of the mesh overlap" : "none";
   const char* const whose = tree.mesh_state() == MeshState::own ? "all of the mesh"
@@ -147,7 +147,7 @@ std::string describe_mesh(const TreeView& tree) {
 
 nlohmann::ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-nlohmann::ordered_json mass_json(const TreeView& tree) {
+nlohmann::ordered_json mass_json(const AssetView& tree) {
   const MassProperties mass = mass_properties(tree);
   const Eigen::Matrix3d& m = mass.inertia;
   return {{"volume", mass.volume},
@@ -158,7 +158,7 @@ nlohmann::ordered_json mass_json(const TreeView& tree) {
           {"inertia_error", mass.inertia_error}};
 }
 
-nlohmann::ordered_json bounds_json(const TreeView& tree) {
+nlohmann::ordered_json bounds_json(const AssetView& tree) {
   const Bounds held = bounds(tree);
   return {{"lower", json_of(held.lower)},
           {"upper", json_of(held.upper)},
@@ -182,7 +182,7 @@ nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
 
 }  // namespace
 
-std::string describe_asset(const TreeView& tree) {
+std::string describe_asset(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
   std::string text;
@@ -191,7 +191,7 @@ std::string describe_asset(const TreeView& tree) {
   };
   const bool alone = h.sphere_count == 0;
   line("spheres",
-       alone ? "none: a surface alone, for exact queries only"
+       alone ? "none: a mesh alone, for exact queries only"
              : fmt::format("{}, {:.3f} % of the volume (stopped by: {})", grouped(h.sphere_count),
                            100 * h.coverage, name_of(static_cast<StopReason>(h.stop_reason))));
   if (const std::string coarse = describe_coarseness(tree); !coarse.empty())
@@ -262,7 +262,7 @@ std::string describe_asset(const TreeView& tree) {
   return text;
 }
 
-nlohmann::ordered_json asset_json(const TreeView& tree) {
+nlohmann::ordered_json asset_json(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
   const auto grid = static_cast<GridMode>(h.asked_grid);
@@ -314,20 +314,20 @@ nlohmann::ordered_json asset_json(const TreeView& tree) {
   return json;
 }
 
-std::string describe_counted_twice(const TreeView& tree) {
+std::string describe_counted_twice(const AssetView& tree) {
   const bool resolved = tree.mesh_state() == MeshState::resolved;
   if (!resolved && tree.mesh_state() != MeshState::unresolved) return "";
-  if (tree.counted_twice() == 0)
+  if (tree.self_overlap_volume() == 0)
     return "parts of the mesh touch: the asset represents their union, without the walls between "
            "them";
   return fmt::format(
       "parts of the mesh overlap and count {:.3g} u³, {:.2g} % of the volume, more than once: {}",
-      tree.counted_twice(), 100 * tree.counted_twice() / tree.volume(),
+      tree.self_overlap_volume(), 100 * tree.self_overlap_volume() / tree.volume(),
       resolved ? "the asset represents their union"
                : "the mesh is not kept, and exact queries are not possible");
 }
 
-std::string describe_target(const TreeView& tree) {
+std::string describe_target(const AssetView& tree) {
   const PredictedErrors errors = tree.predicted_errors();
   if (errors.target_error == 0) return "";
   const std::string asked = fmt::format("target {:.4g} % at {:.4g} % overlap",

@@ -5,23 +5,23 @@
 #include <optional>
 #include <string>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 namespace ist {
 
 /// The header of an asset, lengths and volumes in the mesh's own unit, for a person.
-std::string describe_asset(const TreeView& tree);
+std::string describe_asset(const AssetView& tree);
 
 /// The same, every field with all its digits.
-nlohmann::ordered_json asset_json(const TreeView& tree);
+nlohmann::ordered_json asset_json(const AssetView& tree);
 
 /// "the mesh counts 0.2 u³, 0.3 % of the volume, more than once: it is not kept, and exact queries
 /// are not answered"; "" for one that does not.
-std::string describe_counted_twice(const TreeView& tree);
+std::string describe_counted_twice(const AssetView& tree);
 
 /// "target 1 % at 0.1 % overlap: met, 0.84 % measured against the worst partner, edge, of 170 poses
 /// in all", or missed and why; "" where no error was asked for.
-std::string describe_target(const TreeView& tree);
+std::string describe_target(const AssetView& tree);
 
 /// Of an asset whose spheres are too coarse for thin parts of the solid, about how many would do.
 /// Nothing where they cover enough.
@@ -29,10 +29,10 @@ std::string describe_target(const TreeView& tree);
 /// As long as spheres are as wide as the walls, each covers as much as the one before; once these
 /// are full, later ones are smaller. So the count is what the last spheres of the asset say, with
 /// room for that.
-std::optional<std::uint64_t> enough_spheres(const TreeView& tree);
+std::optional<std::uint64_t> enough_spheres(const AssetView& tree);
 
 /// "the spheres are too coarse for thin parts: 19 % of the solid is covered; about 60,000 spheres
 /// would do", or that no number would; "" where they are not.
-std::string describe_coarseness(const TreeView& tree);
+std::string describe_coarseness(const AssetView& tree);
 
 }  // namespace ist

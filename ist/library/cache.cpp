@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 #include <nlohmann/json.hpp>

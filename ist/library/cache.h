@@ -36,7 +36,7 @@ CacheKey cache_key(const Job& job);
 struct CacheEntry {
   Asset asset;
   std::vector<std::string> notes;         ///< MeshReport::notes of the mesh
-  std::optional<double> confidence = {};  ///< Judgement's, of a mesh that was not closed
+  std::optional<double> confidence = {};  ///< RepairQuality's, of a mesh that was not closed
 };
 
 /// An entry but for its asset as a line of JSON: the key, what was found about the mesh, and a hash

@@ -60,7 +60,7 @@ std::string joined_columns(const char* before, const char* between, const char* 
 
 }  // namespace
 
-std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail) {
+std::vector<ExportedSphere> exported_spheres(const AssetView& tree, std::uint32_t detail) {
   const AssetHeader& header = tree.header();
   const double scale = std::ldexp(1.0, header.exponent);
   const Sphere* const inner = at<Sphere>(header, header.inner_spheres);

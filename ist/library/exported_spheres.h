@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 namespace ist {
 
@@ -20,7 +20,7 @@ struct ExportedSphere {
 
 /// Those of a detail in [0, header().detail_count]: the first of the inner spheres, with the
 /// matched spheres that stand for them.
-std::vector<ExportedSphere> exported_spheres(const TreeView& tree, std::uint32_t detail);
+std::vector<ExportedSphere> exported_spheres(const AssetView& tree, std::uint32_t detail);
 
 // Text of a whole file: columns x,y,z,r,ex,ey,ez,er,c, 17 digits.
 std::string spheres_csv(std::span<const ExportedSphere> spheres);

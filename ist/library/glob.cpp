@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <fnmatch.h>
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <algorithm>
 #include <functional>
 #include <iterator>

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 namespace ist {
 
@@ -45,7 +45,7 @@ InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings)
 Baked bake_as_asked(const ClosedMesh& mesh, const BakeSettings& asked,
                     const ProgressCallback& progress) {
   const PackingSettings& settings = asked.packing;
-  if (asked.surface_only) return {bake_surface(mesh, settings.threads, progress)};
+  if (asked.mesh_only) return {bake_mesh_only(mesh, settings.threads, progress)};
   if (!(asked.target.relative_error > 0)) return {bake(mesh, settings, progress)};
   TargetedAsset found = bake_to_error(mesh, asked.target, settings, progress);
   Baked baked = {std::move(found.asset)};

@@ -31,7 +31,7 @@ struct Baked {
   std::vector<PartnerError> partners = {};
 };
 
-/// bake_surface(), bake_to_error() or bake(), as the settings ask. Throws Error.
+/// bake_mesh_only(), bake_to_error() or bake(), as the settings ask. Throws Error.
 Baked bake_as_asked(const ClosedMesh& mesh, const BakeSettings& asked,
                     const ProgressCallback& progress);
 

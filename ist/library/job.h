@@ -10,17 +10,17 @@ namespace ist {
 
 /// What an asset must be, or it fails. The bytes of an asset do not depend on it.
 struct Demands {
-  bool surface = false;   ///< it holds its mesh, for exact queries
+  bool mesh = false;      ///< it holds its mesh, for exact queries
   double coverage = 0;    ///< at least; share of the solid's volume
   double confidence = 0;  ///< at least; of a mesh that had to be closed
 };
 
 /// One asset to bake.
 struct Job {
-  std::string name;                       ///< of the asset: NAME.ist
-  std::string mesh;                       ///< path
-  std::optional<PlacedShape> shape = {};  ///< of a robot's link: that mesh in the link's frame
-  std::string urdf = {};                  ///< the robot's, for messages
+  std::string name;                           ///< of the asset: NAME.ist
+  std::string mesh;                           ///< path
+  std::optional<PlacedLinkShape> shape = {};  ///< of a robot's link: that mesh in the link's frame
+  std::string urdf = {};                      ///< the robot's, for messages
   BakeSettings settings;
   Demands demands;
 };

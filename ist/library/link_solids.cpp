@@ -1,8 +1,8 @@
 #include "library/link_solids.h"
 
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/pose_eigen.h>
+#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 
 #include <utility>
@@ -22,14 +22,14 @@ std::string LinkSolids::add(const ClosedMesh* mesh, std::span<const CoverSphere>
   assets_.emplace_back();
   try {
     if (spheres.empty()) {
-      assets_.back() = std::make_unique<const Asset>(bake_surface(*mesh));
+      assets_.back() = std::make_unique<const Asset>(bake_mesh_only(*mesh));
       return "";
     }
     TriangleMesh all = mesh == nullptr ? TriangleMesh{} : mesh->mesh;
     for (const CoverSphere& s : spheres)
       append_mesh(all, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
     assets_.back() =
-        std::make_unique<const Asset>(bake_surface(close_mesh(std::move(all), "link")));
+        std::make_unique<const Asset>(bake_mesh_only(close_mesh(std::move(all), "link")));
     return "";
   } catch (const Error& error) {
     return error.what();

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "library/glob.h"
 #include "library/settings/numbers.h"
@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 using Line = toml::source_index;
 
 /// Keys that no bake has: what the asset must be.
-constexpr std::string_view kDemands[] = {"require-surface", "min-coverage", "min-confidence"};
+constexpr std::string_view kDemands[] = {"require-mesh", "min-coverage", "min-confidence"};
 
 /// Which files, and what assets of them are called.
 bool is_file_key(std::string_view key) {
@@ -181,7 +181,7 @@ class Reader {
         text_of(value, is_flag ? SettingKind::flag : SettingKind::share);
     const std::optional<double> share = text && !is_flag ? parse_share(*text) : std::nullopt;
     if (is_flag && text) {
-      demands.surface = *text == "true";
+      demands.mesh = *text == "true";
     } else if (share && *share >= 0 && *share <= 1) {
       (name == kDemands[1] ? demands.coverage : demands.confidence) = *share;
     } else {

@@ -27,14 +27,14 @@ struct JobResult {
   std::string asset;         ///< path
   std::string content_hash;  ///< AssetHeader's, in 16 digits
   std::uint64_t bytes = 0, spheres = 0;
-  double coverage = 0;                        ///< share of the solid's volume
-  double volume = 0, protrusion = 0;          ///< as TreeView has them
-  std::string mesh_state;                     ///< name_of(TreeView::mesh_state())
-  std::uint64_t mesh_triangles = 0;           ///< kept for exact queries
-  double mesh_error = 0, counted_twice = 0;   ///< as TreeView has them
+  double coverage = 0;                             ///< share of the solid's volume
+  double volume = 0, protrusion = 0;               ///< as AssetView has them
+  std::string mesh_state;                          ///< name_of(AssetView::mesh_state())
+  std::uint64_t mesh_triangles = 0;                ///< kept for exact queries
+  double mesh_error = 0, self_overlap_volume = 0;  ///< as AssetView has them
   std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
   std::optional<bool> target_met;
-  std::optional<double> confidence;  ///< Judgement's, of a mesh that was repaired or wrapped
+  std::optional<double> confidence;  ///< RepairQuality's, of a mesh that was repaired or wrapped
 
   bool done() const { return status == JobStatus::baked || status == JobStatus::cached; }
 };

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "library/settings/spelling.h"
 
@@ -15,7 +15,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// The description of a primitive, as parse_field() takes it.
-std::string field_spec_of(const Shape& shape) {
+std::string field_spec_of(const LinkShape& shape) {
   if (const auto* box = std::get_if<LinkBox>(&shape))
     return fmt::format("box:{:.17g},{:.17g},{:.17g}", box->half_extents.x(), box->half_extents.y(),
                        box->half_extents.z());
@@ -30,7 +30,7 @@ Json pose_json(const Eigen::Quaterniond& q, const Eigen::Vector3d& t) {
   return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()};
 }
 
-bool equal(const PlacedShape& a, const PlacedShape& b) {
+bool equal(const PlacedLinkShape& a, const PlacedLinkShape& b) {
   const LinkMesh &m = std::get<LinkMesh>(a.shape), &n = std::get<LinkMesh>(b.shape);
   return m.file == n.file && m.scale == n.scale && a.rotation.coeffs() == b.rotation.coeffs() &&
          a.translation == b.translation;
@@ -49,7 +49,7 @@ RobotModel read_robot_for(const RobotOptions& options, const std::string& input)
       link.visual.clear();
     }
     any = any || !link.shapes(options.shapes()).empty();
-    for (const PlacedShape& placed : link.shapes(options.shapes()))
+    for (const PlacedLinkShape& placed : link.shapes(options.shapes()))
       if (const auto* fault = std::get_if<LinkFault>(&placed.shape)) throw Error(fault->what);
   }
   if (any) return robot;
@@ -94,7 +94,7 @@ RobotAssets robot_assets(const RobotModel& robot, LinkShapes which, const std::s
                          const Job& like) {
   RobotAssets out;
   out.name = file_name_of(robot.name);
-  const auto asset_of = [&](const RobotLink& link, const PlacedShape& shape) {
+  const auto asset_of = [&](const RobotLink& link, const PlacedLinkShape& shape) {
     const auto known = std::find_if(out.jobs.begin(), out.jobs.end(),
                                     [&](const Job& job) { return equal(*job.shape, shape); });
     if (known != out.jobs.end()) {
@@ -117,7 +117,7 @@ RobotAssets robot_assets(const RobotModel& robot, LinkShapes which, const std::s
   Json links = Json::object();
   for (const RobotLink& link : robot.links) {
     Json& shapes = links[link.name] = Json::array();
-    for (const PlacedShape& shape : link.shapes(which))
+    for (const PlacedLinkShape& shape : link.shapes(which))
       if (std::holds_alternative<LinkMesh>(shape.shape))  // the asset is in the link's frame
         shapes.push_back(
             {{"asset", asset_of(link, shape) + ".ist"},

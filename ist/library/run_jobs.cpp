@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
-#include <ist/error.h>
 #include <ist/gpu.h>
+#include <ist/types.h>
 #include <nlohmann/json.hpp>
 
 #include <oneapi/tbb/global_control.h>
@@ -51,14 +51,14 @@ void write_asset(const fs::path& path, const Asset& asset) {
 }
 
 /// Another run, on a machine with more time, would give another asset.
-bool was_out_of_time(const TreeView& tree) {
+bool was_out_of_time(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   const auto late = static_cast<std::uint32_t>(StopReason::time_limit);
   return h.stop_reason == late || (h.asked_error > 0 && h.search_stop == late);
 }
 
 void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& result) {
-  const TreeView& tree = entry.asset.view();
+  const AssetView& tree = entry.asset.view();
   result.content_hash = fmt::format("{:016x}", tree.header().content_hash);
   result.bytes = entry.asset.bytes().size();
   result.spheres = tree.sphere_count();
@@ -68,7 +68,7 @@ void describe(const CacheEntry& entry, const RunSettings& settings, JobResult& r
   result.mesh_state = name_of(tree.mesh_state());
   result.mesh_triangles = tree.mesh_triangles();
   result.mesh_error = tree.mesh_error();
-  result.counted_twice = tree.counted_twice();
+  result.self_overlap_volume = tree.self_overlap_volume();
   if (const PredictedErrors errors = tree.predicted_errors(); errors.target_error > 0) {
     result.target_error = errors.target_error;
     result.target_met = errors.target_met();
@@ -94,12 +94,12 @@ CacheEntry bake_entry(const Job& job, const BakeMesh& bake) {
 
 /// Throws Error where an asset is not what its manifest demands.
 void check_demands(const Job& job, const CacheEntry& entry) {
-  const TreeView& tree = entry.asset.view();
+  const AssetView& tree = entry.asset.view();
   const Demands& demands = job.demands;
-  if (demands.surface && !tree.has_mesh())
+  if (demands.mesh && !tree.has_mesh())
     throw Error(
-        fmt::format("{}: require-surface: the asset holds no surface to query; its mesh is "
-                    "'{}'. Repair the mesh, and keep it with surface = \"all\"",
+        fmt::format("{}: require-mesh: the asset keeps no mesh; its input is "
+                    "'{}'. Repair the mesh, and keep it with keep-mesh = \"yes\"",
                     job.mesh, name_of(tree.mesh_state())));
   if (!(tree.coverage() >= demands.coverage))
     throw Error(
@@ -267,7 +267,7 @@ class Run {
     packing.device = Device::cpu;
     packing.threads = threads_of_a_job();
     std::optional<GpuPlaces::Place> place;
-    if (gpus_.places() != 0 && !settings.surface_only) {
+    if (gpus_.places() != 0 && !settings.mesh_only) {
       place.emplace(gpus_);
       packing.device = Device::cuda;
       packing.gpu.device = place->gpu();

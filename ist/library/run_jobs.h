@@ -1,7 +1,7 @@
 #pragma once
 
-#include <ist/packing.h>
-#include <ist/tree_view.h>
+#include <ist/asset.h>
+#include <ist/bake.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -48,7 +48,7 @@ struct RunSettings {
   unsigned jobs = 0;         ///< at once; 0: as many as threads, and besides those that are on GPUs
   std::uint64_t memory = 0;  ///< [bytes] of all jobs together; 0: most of what is available
   /// What is to be said of an asset; called from any thread.
-  std::function<std::vector<std::string>(const TreeView&)> warnings_of;
+  std::function<std::vector<std::string>(const AssetView&)> warnings_of;
 };
 
 /// Who looks on, from the thread that runs the jobs.

@@ -11,7 +11,7 @@
 #include <optional>
 #include <string_view>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 namespace ist {
 namespace {
@@ -39,7 +39,7 @@ void for_each_field(Result& result, const Visit& visit) {
   visit("mesh_state", result.mesh_state, kIfDone, kLater);
   visit("mesh_triangles", result.mesh_triangles, kIfDone, kLater);
   visit("mesh_error", result.mesh_error, kIfDone, kLater);
-  visit("counted_twice", result.counted_twice, kIfDone, kLater);
+  visit("self_overlap_volume", result.self_overlap_volume, kIfDone, kLater);
   visit("target_error", result.target_error);
   visit("measured_error", result.error);
   visit("target_met", result.target_met);

@@ -47,8 +47,8 @@ const char* name_of(QueryStatus status) noexcept {
       return "budget_exhausted";
     case QueryStatus::invalid_input:
       return "invalid_input";
-    case QueryStatus::not_held:
-      return "not_held";
+    case QueryStatus::missing_data:
+      return "missing_data";
     case QueryStatus::error_exceeded:
       return "error_exceeded";
   }

@@ -5,7 +5,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 #include <ist/query.h>
 
 #include "library/settings/bake_settings.h"

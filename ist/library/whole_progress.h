@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/progress.h>
+#include <ist/types.h>
 
 namespace ist {
 

@@ -25,12 +25,12 @@ namespace {
 /// Contact patches of two trees by lenses.
 class LensPatches {
  public:
-  LensPatches(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+  LensPatches(const PlacedAsset& a, const TreeHeader& tree_a, const PlacedAsset& b,
               const TreeHeader& tree_b, const RelativePose& pose, Workspace::Impl& scratch)
       : pose_(pose),
         scratch_(scratch),
-        tree_a_(a.tree.header(), tree_a),
-        tree_b_(b.tree.header(), tree_b),
+        tree_a_(a.asset.header(), tree_a),
+        tree_b_(b.asset.header(), tree_b),
         of_b_(divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
                         tree_b_.header->root[3] * pose.a_from_b.scale)) {}
 
@@ -71,7 +71,7 @@ class LensPatches {
 /// measure.
 class ChosenPart final : public LargestPart {
  public:
-  ChosenPart(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose, bool inner,
+  ChosenPart(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose, bool inner,
              Workspace& workspace, std::span<ContactPatch> patches)
       : a_(a), b_(b), pose_(pose), inner_(inner), workspace_(workspace), patches_(patches) {}
 
@@ -90,13 +90,13 @@ class ChosenPart final : public LargestPart {
   std::optional<ContactPatches> parts;  ///< of the exact measure
 
  private:
-  const TreeHeader& tree_of(const PlacedTree& placed, std::uint32_t detail) const noexcept {
-    const AssetHeader& header = placed.tree.header();
+  const TreeHeader& tree_of(const PlacedAsset& placed, std::uint32_t detail) const noexcept {
+    const AssetHeader& header = placed.asset.header();
     return inner_ ? header.inner_tree : matched_tree(header, detail);
   }
 
-  const PlacedTree& a_;
-  const PlacedTree& b_;
+  const PlacedAsset& a_;
+  const PlacedAsset& b_;
   const RelativePose& pose_;
   const bool inner_;
   Workspace& workspace_;
@@ -105,7 +105,7 @@ class ChosenPart final : public LargestPart {
 
 }  // namespace
 
-ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
+ContactPatches find_patches(const PlacedAsset& a, const PlacedAsset& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a, b);
@@ -115,7 +115,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
     found.penetration = with_error_status(found.penetration, settings);
     return found;
   }
-  if (lack_spheres(a, b)) return not_held<ContactPatches>();
+  if (lack_spheres(a, b)) return missing_data<ContactPatches>();
   if (!pose || workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
   const bool inner = settings.measure == Measure::inner;
@@ -153,7 +153,7 @@ ContactPatches find_patches(const PlacedTree& a, const PlacedTree& b,
   return result;
 }
 
-OverlapOutline overlap_outline(const PlacedTree& a, const PlacedTree& b,
+OverlapOutline overlap_outline(const PlacedAsset& a, const PlacedAsset& b,
                                const ContactSettings& settings, Workspace& workspace,
                                std::span<ContactPatch> patches,
                                std::span<OutlineSegment> segments) noexcept {

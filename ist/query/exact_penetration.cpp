@@ -18,7 +18,7 @@ namespace ist {
 namespace {
 
 template <class Query>
-Query query_of(const PlacedTree& a, const MeshTree& mesh_a, const PlacedTree& b,
+Query query_of(const PlacedAsset& a, const MeshTree& mesh_a, const PlacedAsset& b,
                const MeshTree& mesh_b, const RelativePose& pose, ExactScratch& scratch) {
   const double moved_b =
       moved_by_poses(a, b, mesh_b, pose) + pose.a_from_b.scale * moved_in_mesh(mesh_b);
@@ -29,7 +29,7 @@ ExactInWorld in_world(const ExactSums& sums, const exact::Point& origin, const P
   return {sums.volume(), sums.moment, sums.force, sums.torque, origin, place};
 }
 
-Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const PlacedTree& b,
+Penetration whole_answer(const ExactOverlap& found, const PlacedAsset& a, const PlacedAsset& b,
                          const RelativePose& pose) {
   const ExactInWorld sums = in_world(found.sums, found.origin, pose);
   Penetration answer;
@@ -44,8 +44,8 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const P
   if (answer.volume > 0) answer.centroid = vector(sums.centroid);
   if (found.contact.area > 0)
     answer.centroid = pose.to_world(1 / found.contact.area * vector(found.contact.moment));
-  answer.translation_gradient = vector(sums.force);
-  answer.rotation_gradient = vector(sums.torque);
+  answer.force = -vector(sums.force);
+  answer.torque = -vector(sums.torque);
   answer.touching = found.contact.touching;
   answer.contact_area = found.contact.area * (pose.unit_a * pose.unit_a);
   // Normals that cancel leave what areas round.
@@ -59,9 +59,9 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedTree& a, const P
 
 /// What spheres say, where a limit stops the exact query.
 template <class Answer, class Spheres>
-Answer stopped(const PlacedTree& a, const PlacedTree& b, Answer answer, const Spheres& by_spheres,
+Answer stopped(const PlacedAsset& a, const PlacedAsset& b, Answer answer, const Spheres& by_spheres,
                Penetration& (*whole)(Answer&)) {
-  if (a.tree.sphere_count() > 0 && b.tree.sphere_count() > 0) answer = by_spheres();
+  if (a.asset.sphere_count() > 0 && b.asset.sphere_count() > 0) answer = by_spheres();
   bound_by_solids(a, b, whole(answer));
   whole(answer).status = QueryStatus::budget_exhausted;
   return answer;
@@ -150,10 +150,10 @@ double exact_deepest(double volume) noexcept {
   return y;
 }
 
-Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
+Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept {
-  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<Penetration>();
+  if (a.asset.header().mesh == 0 || b.asset.header().mesh == 0) return missing_data<Penetration>();
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
@@ -165,17 +165,18 @@ Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
     others.relative_error = 0;
     return penetration(a, b, others, workspace);
   };
-  return stopped<Penetration>(a, b, not_held<Penetration>(), by_spheres,
+  return stopped<Penetration>(a, b, missing_data<Penetration>(), by_spheres,
                               [](Penetration& answer) -> Penetration& { return answer; });
 }
 
-OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
+OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
                              const ContactSettings& settings, Workspace& workspace,
                              std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
                              bool divides) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<OverlapOutline>();
-  if (a.tree.header().mesh == 0 || b.tree.header().mesh == 0) return not_held<OverlapOutline>();
+  if (a.asset.header().mesh == 0 || b.asset.header().mesh == 0)
+    return missing_data<OverlapOutline>();
   OverlapOutline answer;
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
@@ -190,7 +191,7 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
       return find_patches(a, b, others, workspace, patches);
     };
     answer.contact = stopped<ContactPatches>(
-        a, b, not_held<ContactPatches>(), by_spheres,
+        a, b, missing_data<ContactPatches>(), by_spheres,
         [](ContactPatches& stopped) -> Penetration& { return stopped.penetration; });
     return answer;
   }
@@ -202,8 +203,8 @@ OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
     if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
       join(parts);
       const bool by_b = volume_of(b) <= volume_of(a);
-      const PlacedTree& smaller = by_b ? b : a;
-      const double radius = smaller.scale * smaller.tree.header().ball_radius / pose->unit_a;
+      const PlacedAsset& smaller = by_b ? b : a;
+      const double radius = smaller.scale * smaller.asset.header().ball_radius / pose->unit_a;
       parts = {scratch.octants.get(),
                query.split(parts, by_b, kNearOctants * radius, patches.size())};
       keep_largest(parts, patches.size(), true);

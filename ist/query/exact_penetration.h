@@ -7,7 +7,7 @@
 namespace ist {
 
 /// penetration() by Measure::exact. `pose` is that of the two.
-Penetration exact_penetration(const PlacedTree& a, const PlacedTree& b,
+Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
@@ -16,7 +16,7 @@ double exact_deepest(double volume) noexcept;
 
 /// contact_patches() and overlap_outline() by Measure::exact. `divides`: parts into octants, as far
 /// as there is room.
-OverlapOutline exact_patches(const PlacedTree& a, const PlacedTree& b,
+OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
                              const ContactSettings& settings, Workspace& workspace,
                              std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
                              bool divides) noexcept;

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// The tree that settings name; none if there is no such level of detail or measure.
-std::optional<SphereTree> tree_of(const TreeView& view, Measure measure,
+std::optional<SphereTree> tree_of(const AssetView& view, Measure measure,
                                   std::uint32_t detail) noexcept {
   const AssetHeader& asset = view.header();
   if (measure == Measure::exact) return std::nullopt;
@@ -38,12 +38,12 @@ struct Place {
 /// Both trees gone down together, the larger node opened first. As deep as both are high.
 class LensSearch {
  public:
-  LensSearch(const PlacedTree& a, const SphereTree& tree_a, const PlacedTree& b,
+  LensSearch(const PlacedAsset& a, const SphereTree& tree_a, const PlacedAsset& b,
              const SphereTree& tree_b, const RelativePose& pose, std::span<OverlapLens> room)
       : tree_a_(tree_a),
         tree_b_(tree_b),
-        index_a_(at<std::uint32_t>(a.tree.header(), tree_a.header->sphere_index)),
-        index_b_(at<std::uint32_t>(b.tree.header(), tree_b.header->sphere_index)),
+        index_a_(at<std::uint32_t>(a.asset.header(), tree_a.header->sphere_index)),
+        index_b_(at<std::uint32_t>(b.asset.header(), tree_b.header->sphere_index)),
         pose_(pose),
         room_(room) {}
 
@@ -111,13 +111,13 @@ class LensSearch {
 
 }  // namespace
 
-OverlapLenses overlap_lenses(const PlacedTree& a, const PlacedTree& b, const LensSettings& settings,
-                             std::span<OverlapLens> lenses) noexcept {
-  if (lack_spheres(a, b)) return {QueryStatus::not_held, 0, 0};
+OverlapLenses overlap_lenses(const PlacedAsset& a, const PlacedAsset& b,
+                             const LensSettings& settings, std::span<OverlapLens> lenses) noexcept {
+  if (lack_spheres(a, b)) return {QueryStatus::missing_data, 0, 0};
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose) return {QueryStatus::invalid_input, 0, 0};
-  const auto tree_a = tree_of(a.tree, settings.measure, settings.detail_a);
-  const auto tree_b = tree_of(b.tree, settings.measure, settings.detail_b);
+  const auto tree_a = tree_of(a.asset, settings.measure, settings.detail_a);
+  const auto tree_b = tree_of(b.asset, settings.measure, settings.detail_b);
   if (!tree_a || !tree_b) return {QueryStatus::invalid_input, 0, 0};
   return LensSearch(a, *tree_a, b, *tree_b, *pose, lenses).find();
 }

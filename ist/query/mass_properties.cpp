@@ -15,15 +15,15 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 /// x_world = rotation (scale · x) + translation; nothing for what a query would call invalid.
-std::optional<Matrix3d> rotation_of(const PlacedTree& placed) noexcept {
-  if (placed.tree.empty()) return std::nullopt;
+std::optional<Matrix3d> rotation_of(const PlacedAsset& placed) noexcept {
+  if (placed.asset.empty()) return std::nullopt;
   const std::optional<Eigen::Quaterniond> q = usable_rotation(placed.pose, placed.scale);
   return q ? std::optional(q->toRotationMatrix()) : std::nullopt;
 }
 
 }  // namespace
 
-MassProperties mass_properties(const TreeView& tree) noexcept {
+MassProperties mass_properties(const AssetView& tree) noexcept {
   const AssetHeader& h = tree.header();
   const double unit = std::ldexp(1.0, h.exponent);
   const auto turning = [&](double value) { return std::ldexp(value, 5 * h.exponent); };
@@ -42,17 +42,17 @@ MassProperties mass_properties(const TreeView& tree) noexcept {
   return result;
 }
 
-Bounds bounds(const TreeView& tree) noexcept {
+Bounds bounds(const AssetView& tree) noexcept {
   const AssetHeader& h = tree.header();
   return {vector(h.box_lower), vector(h.box_upper), vector(h.ball_centre), h.ball_radius};
 }
 
-MassProperties mass_properties(const PlacedTree& placed) noexcept {
+MassProperties mass_properties(const PlacedAsset& placed) noexcept {
   const std::optional<Matrix3d> rotation = rotation_of(placed);
   if (!rotation)
     return {kNone, Vector3d::Constant(kNone), Matrix3d::Constant(kNone), kNone, kNone, kNone};
   const double s = placed.scale, cube = s * s * s;
-  MassProperties result = mass_properties(placed.tree);
+  MassProperties result = mass_properties(placed.asset);
   result.volume *= cube;
   result.volume_error *= cube;
   result.centre_of_mass = *rotation * (s * result.centre_of_mass) + vector(placed.pose.t);
@@ -64,11 +64,11 @@ MassProperties mass_properties(const PlacedTree& placed) noexcept {
   return result;
 }
 
-Bounds bounds(const PlacedTree& placed) noexcept {
+Bounds bounds(const PlacedAsset& placed) noexcept {
   const std::optional<Matrix3d> rotation = rotation_of(placed);
   const Vector3d none = Vector3d::Constant(kNone);
   if (!rotation) return {none, none, none, kNone};
-  const Bounds own = bounds(placed.tree);
+  const Bounds own = bounds(placed.asset);
   const double s = placed.scale;
   const Vector3d origin = vector(placed.pose.t);
   const Vector3d middle = *rotation * (s * (own.lower + own.upper) / 2) + origin;

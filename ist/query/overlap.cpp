@@ -1,4 +1,4 @@
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include <algorithm>
 #include <bit>
@@ -35,20 +35,20 @@ class MeetingSearch {
              pose.rounding_of_world();
   }
 
-  Overlapping run() {
+  YesNo run() {
     NodePair pair{0, 0, a_.top, b_.top};
-    if (root_cover_gap() > error_) return Overlapping::no;
+    if (root_cover_gap() > error_) return YesNo::no;
     do {
-      if (!waiting_.grant()) return Overlapping::unknown;
+      if (!waiting_.grant()) return YesNo::unknown;
       if (pair.level_a == 0 && pair.level_b == 0) {
         const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
-        if (leaf.gap < -error_) return Overlapping::yes;
+        if (leaf.gap < -error_) return YesNo::yes;
         covers_meet_ |= leaf.cover <= error_;
       } else {
         open(pair);
       }
     } while (waiting_.take_best(covers_meet_, pair));
-    return covers_meet_ ? Overlapping::unknown : Overlapping::no;
+    return covers_meet_ ? YesNo::unknown : YesNo::no;
   }
 
  private:
@@ -110,13 +110,14 @@ class MeetingSearch {
 
 }  // namespace
 
-Overlapping find_overlap(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return Overlapping::unknown;
+YesNoAnswer find_overlap(const PlacedAsset& a, const PlacedAsset& b,
+                         Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return {YesNo::unknown, QueryStatus::missing_data};
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
-  const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
-  const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
-  return MeetingSearch(tree_a, tree_b, *pose, *workspace.impl()).run();
+  if (!pose || workspace.impl() == nullptr) return {YesNo::unknown, QueryStatus::invalid_input};
+  const SphereTree tree_a = sphere_tree(a.asset, Measure::inner);
+  const SphereTree tree_b = sphere_tree(b.asset, Measure::inner);
+  return {MeetingSearch(tree_a, tree_b, *pose, *workspace.impl()).run(), QueryStatus::ok};
 }
 
 }  // namespace ist

@@ -11,10 +11,10 @@
 namespace ist {
 namespace {
 
-Penetration by_spheres(const PlacedTree& a, const PlacedTree& b,
+Penetration by_spheres(const PlacedAsset& a, const PlacedAsset& b,
                        const PenetrationSettings& settings, const RelativePose& pose,
                        Workspace& workspace) noexcept {
-  const AssetHeader &header_a = a.tree.header(), &header_b = b.tree.header();
+  const AssetHeader &header_a = a.asset.header(), &header_b = b.asset.header();
   const bool inner = settings.measure == Measure::inner;
   if (!inner &&
       (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b)))
@@ -26,11 +26,11 @@ Penetration by_spheres(const PlacedTree& a, const PlacedTree& b,
 
 }  // namespace
 
-Penetration find_penetration(const PlacedTree& a, const PlacedTree& b,
+Penetration find_penetration(const PlacedAsset& a, const PlacedAsset& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a, b);
   const PairMethod method = pair_method(a, b, settings, pose);
-  if (method.spheres && lack_spheres(a, b)) return not_held<Penetration>();
+  if (method.spheres && lack_spheres(a, b)) return missing_data<Penetration>();
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (!method.spheres)
     return with_error_status(exact_penetration(a, b, settings, *pose, workspace), settings);

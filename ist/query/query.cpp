@@ -1,6 +1,5 @@
 #include <ist/query.h>
 
-#include <ist/overlap.h>
 #include <ist/time_of_impact.h>
 #include <cmath>
 #include <utility>
@@ -11,24 +10,24 @@
 #include "query/descent/workspace.h"
 #include "query/solid_queries.h"
 
-// Every query of two solids: as they come, or turned over where the second is the field.
+// Every query of two solids: as they come, or turned over where the second is the shape.
 
 namespace ist {
 namespace {
 
-/// ask(a, b) of assets, or of a field and an asset. Its answer comes back by turn(answer), if the
-/// order was the other one; two fields get `none`.
+/// ask(a, b) of assets, or of a shape and an asset. Its answer comes back by turn(answer), if the
+/// order was the other one; two shapes get `none`.
 template <class Answer, class Ask, class Turn>
 Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace,
                 const Answer& none, const Ask& ask, const Turn& turn) noexcept {
   const WorkspaceInUse in_use(workspace);
-  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
-  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
   if (tree_b != nullptr)
     return tree_a != nullptr ? ask(*tree_a, *tree_b)
-                             : ask(*std::get_if<PlacedField>(&a.placed), *tree_b);
+                             : ask(*std::get_if<PlacedShape>(&a.placed), *tree_b);
   if (tree_a == nullptr) return none;
-  Answer answer = ask(*std::get_if<PlacedField>(&b.placed), *tree_a);
+  Answer answer = ask(*std::get_if<PlacedShape>(&b.placed), *tree_a);
   turn(answer);
   return answer;
 }
@@ -70,8 +69,8 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
                         const PenetrationSettings& settings, Workspace& workspace) noexcept {
   if (!are_known(settings)) return invalid_input<Penetration>();
   return ask_pair(
-      a, b, workspace, not_held<Penetration>(),
-      [&](const auto& x, const PlacedTree& y) {
+      a, b, workspace, missing_data<Penetration>(),
+      [&](const auto& x, const PlacedAsset& y) {
         return find_penetration(x, y, settings, workspace);
       },
       [&](Penetration& answer) { turn_over(pose_of(a), pose_of(b), answer); });
@@ -80,8 +79,8 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
                       const SeparationSettings& settings, Workspace& workspace) noexcept {
   return ask_pair(
-      a, b, workspace, not_held<Separation>(),
-      [&](const auto& x, const PlacedTree& y) {
+      a, b, workspace, missing_data<Separation>(),
+      [&](const auto& x, const PlacedAsset& y) {
         return find_separation(x, y, settings, workspace);
       },
       [](Separation& answer) { turn_witnesses(answer); });
@@ -105,8 +104,8 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
                                std::span<ContactPatch> patches) noexcept {
   if (!are_known(settings) || patches.empty()) return invalid_input<ContactPatches>();
   return ask_pair(
-      a, b, workspace, not_held<ContactPatches>(),
-      [&](const auto& x, const PlacedTree& y) {
+      a, b, workspace, missing_data<ContactPatches>(),
+      [&](const auto& x, const PlacedAsset& y) {
         return find_patches(x, y, settings, workspace, patches);
       },
       [&](ContactPatches& answer) {
@@ -115,36 +114,37 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
       });
 }
 
-Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept {
+YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept {
   return ask_pair(
-      a, b, workspace, Overlapping::unknown,
-      [&](const auto& x, const PlacedTree& y) { return find_overlap(x, y, workspace); },
-      [](Overlapping) {});
+      a, b, workspace, YesNoAnswer{YesNo::unknown, QueryStatus::missing_data},
+      [&](const auto& x, const PlacedAsset& y) { return find_overlap(x, y, workspace); },
+      [](const YesNoAnswer&) {});
 }
 
-Overlapping overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
+YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
                     Workspace& workspace) noexcept {
-  if (!(margin >= 0)) return Overlapping::unknown;
+  if (!(margin >= 0)) return {YesNo::unknown, QueryStatus::invalid_input};
   const WorkspaceInUse in_use(workspace);
   const SeparationSettings settings{.max_distance = margin};
-  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
-  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
   const Separation gap = tree_a != nullptr && tree_b != nullptr
                              ? find_separation(*tree_a, *tree_b, settings, workspace, margin)
                              : separation(a, b, settings, workspace);
-  if (std::isnan(gap.distance_max)) return Overlapping::unknown;
-  if (gap.distance_max <= margin) return Overlapping::yes;
-  return gap.distance_min > margin || std::isinf(gap.distance_max) ? Overlapping::no
-                                                                   : Overlapping::unknown;
+  if (std::isnan(gap.distance_max)) return {YesNo::unknown, gap.status};
+  if (gap.distance_max <= margin) return {YesNo::yes, QueryStatus::ok};
+  if (gap.distance_min > margin || std::isinf(gap.distance_max))
+    return {YesNo::no, QueryStatus::ok};
+  return {YesNo::unknown, gap.status};
 }
 
 TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
-  const bool turned = std::holds_alternative<PlacedField>(b.placed);
+  const bool turned = std::holds_alternative<PlacedShape>(b.placed);
   const Motions ordered = turned ? Motions{motions.b, motions.a} : motions;
   return ask_pair(
-      a, b, workspace, not_held<TimeOfImpact>(),
-      [&](const auto& x, const PlacedTree& y) {
+      a, b, workspace, missing_data<TimeOfImpact>(),
+      [&](const auto& x, const PlacedAsset& y) {
         return find_impact(x, y, ordered, settings, workspace);
       },
       [](TimeOfImpact& answer) { turn_witnesses(answer); });

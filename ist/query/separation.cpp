@@ -193,7 +193,7 @@ class GapDescent {
 /// Between the surfaces that both assets keep.
 class SurfaceGap {
  public:
-  SurfaceGap(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+  SurfaceGap(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
              const SeparationSettings& settings, double enough, Workspace::Impl& scratch)
       : a_(a),
         b_(b),
@@ -234,8 +234,8 @@ class SurfaceGap {
  private:
   /// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
   void ask_spheres() {
-    const SphereTree a = sphere_tree(a_.tree, Measure::inner),
-                     b = sphere_tree(b_.tree, Measure::inner);
+    const SphereTree a = sphere_tree(a_.asset, Measure::inner),
+                     b = sphere_tree(b_.asset, Measure::inner);
     const double off =
         distance_error(Precision::float64, span(a.root(), b.root(), pose_.a_from_b)) +
         pose_.rounding_of_world();
@@ -279,8 +279,8 @@ class SurfaceGap {
   /// Nodes that are opened for a bound: more of them bring little.
   static constexpr std::uint32_t kGlance = 64;
 
-  const PlacedTree& a_;
-  const PlacedTree& b_;
+  const PlacedAsset& a_;
+  const PlacedAsset& b_;
   const RelativePose& pose_;
   const SeparationSettings& settings_;
   Workspace::Impl& scratch_;
@@ -293,11 +293,11 @@ class SurfaceGap {
 
 }  // namespace
 
-Separation find_separation(const PlacedTree& a, const PlacedTree& b,
+Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace,
                            double enough) noexcept {
   const bool surfaces = !settings.inner_spheres && keeps_mesh(a) && keeps_mesh(b);
-  if (!surfaces && lack_spheres(a, b)) return not_held<Separation>();
+  if (!surfaces && lack_spheres(a, b)) return missing_data<Separation>();
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   Separation result;
@@ -308,8 +308,8 @@ Separation find_separation(const PlacedTree& a, const PlacedTree& b,
     return result;
   }
   if (surfaces) return SurfaceGap(a, b, *pose, settings, enough, *workspace.impl()).find();
-  const SphereTree tree_a = sphere_tree(a.tree, Measure::inner);
-  const SphereTree tree_b = sphere_tree(b.tree, Measure::inner);
+  const SphereTree tree_a = sphere_tree(a.asset, Measure::inner);
+  const SphereTree tree_b = sphere_tree(b.asset, Measure::inner);
   const double length = span(tree_a.root(), tree_b.root(), pose->a_from_b);
   const double world_error = distance_error(Precision::float64, length) + pose->rounding_of_world();
   constexpr double kNoLimit = std::numeric_limits<double>::infinity();

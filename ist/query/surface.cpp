@@ -1,4 +1,4 @@
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "query/base/relative_pose.h"
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_queries.h"
-#include "query/field/with_shape.h"
+#include "query/shape/with_shape.h"
 
 namespace ist {
 namespace {
@@ -27,11 +27,11 @@ SurfacePoint refused(QueryStatus status) noexcept {
   return {kNone, kNone, Vector3d::Constant(kNone), Vector3d::Constant(kNone), ~0u, status};
 }
 template <>
-Containment refused(QueryStatus status) noexcept {
-  return {false, status};
+YesNoAnswer refused(QueryStatus status) noexcept {
+  return {YesNo::unknown, status};
 }
 
-/// A solid's own frame: an asset's unit frame, a field's own.
+/// A solid's own frame: an asset's unit frame, a shape's own.
 struct SolidFrame {
   Eigen::Matrix3d rotation;
   Vector3d origin;  ///< [u] world
@@ -59,12 +59,12 @@ exact::Point point(const Vector3d& x) noexcept { return {x.x(), x.y(), x.z()}; }
 struct OwnRay {
   Vector3d origin;
   Vector3d direction;  ///< unit
-  double longest;
+  double max_distance;
 
   static std::optional<OwnRay> of(const Ray& ray, const SolidFrame& frame) noexcept {
     const double largest = ray.direction.cwiseAbs().maxCoeff();
     const std::optional<Vector3d> origin = frame.own(ray.origin);
-    if (!origin || !(largest > 0) || !ray.direction.allFinite() || !(ray.longest > 0))
+    if (!origin || !(largest > 0) || !ray.direction.allFinite() || !(ray.max_distance > 0))
       return std::nullopt;
     // Halves: a power of two keeps the digits, and neither it nor a square overflows.
     const int exponent = std::ilogb(largest);
@@ -72,7 +72,7 @@ struct OwnRay {
       return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent);
     });
     return OwnRay{*origin, (frame.rotation.transpose() * scaled).normalized(),
-                  std::min(ray.longest, kFarthestPose) / frame.unit};
+                  std::min(ray.max_distance, kFarthestPose) / frame.unit};
   }
 };
 
@@ -85,13 +85,13 @@ RayHit hit_at(const SolidFrame& frame, const OwnRay& ray, double distance, const
 /// An asset's mesh at a place.
 class MeshOfSolid {
  public:
-  explicit MeshOfSolid(const PlacedTree& placed) noexcept {
-    if (placed.tree.empty()) return;
+  explicit MeshOfSolid(const PlacedAsset& placed) noexcept {
+    if (placed.asset.empty()) return;
     if (!keeps_mesh(placed)) {
-      status_ = QueryStatus::not_held;
+      status_ = QueryStatus::missing_data;
       return;
     }
-    const AssetHeader& asset = placed.tree.header();
+    const AssetHeader& asset = placed.asset.header();
     frame_ = SolidFrame::of(placed.pose, placed.scale,
                             {asset.centre[0], asset.centre[1], asset.centre[2]}, asset.exponent);
     if (!frame_) return;
@@ -105,7 +105,7 @@ class MeshOfSolid {
     const std::optional<OwnRay> ray = OwnRay::of(given, *frame_);
     if (!ray) return refused<RayHit>(QueryStatus::invalid_input);
     // Nothing is further.
-    const double length = std::min(ray->longest, ray->origin.cwiseAbs().sum() + 4 * extent_);
+    const double length = std::min(ray->max_distance, ray->origin.cwiseAbs().sum() + 4 * extent_);
     const Vector3d end = ray->origin + length * ray->direction;
     const MeshHit hit =
         end == ray->origin ? MeshHit() : first_hit(*mesh_, point(ray->origin), point(end));
@@ -133,11 +133,11 @@ class MeshOfSolid {
             QueryStatus::ok};
   }
 
-  Containment answer(const Vector3d& given, Containment) const noexcept {
-    if (status_ != QueryStatus::ok) return refused<Containment>(status_);
+  YesNoAnswer answer(const Vector3d& given, YesNoAnswer) const noexcept {
+    if (status_ != QueryStatus::ok) return refused<YesNoAnswer>(status_);
     const std::optional<Vector3d> x = frame_->own(given);
-    if (!x) return refused<Containment>(QueryStatus::invalid_input);
-    return {is_inside({*mesh_}, point(*x)), QueryStatus::ok};
+    if (!x) return refused<YesNoAnswer>(QueryStatus::invalid_input);
+    return {is_inside({*mesh_}, point(*x)) ? YesNo::yes : YesNo::no, QueryStatus::ok};
   }
 
  private:
@@ -184,23 +184,23 @@ Chord within_radius(const Vector3d& x, const Vector3d& d, double radius) noexcep
   return {middle - half, middle + half};
 }
 
-Chord chord_of(const HalfSpaceShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+Chord chord_of(const HalfSpaceSampler& s, const Vector3d& x, const Vector3d& d) noexcept {
   const Vector3d normal(s.normal);
   return below(normal.dot(x), normal.dot(d), s.offset);
 }
-Chord chord_of(const BoxShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+Chord chord_of(const BoxSampler& s, const Vector3d& x, const Vector3d& d) noexcept {
   Chord chord;
   for (int k = 0; k < 3; ++k) chord = chord.within(between(x[k], d[k], s.half[k]));
   return chord;
 }
-Chord chord_of(const BallShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+Chord chord_of(const BallSampler& s, const Vector3d& x, const Vector3d& d) noexcept {
   return within_radius(x, d, s.radius);
 }
-Chord chord_of(const CylinderShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+Chord chord_of(const CylinderSampler& s, const Vector3d& x, const Vector3d& d) noexcept {
   return within_radius({x.x(), x.y(), 0}, {d.x(), d.y(), 0}, s.radius)
       .within(between(x.z(), d.z(), s.half));
 }
-Chord chord_of(const CapsuleShape& s, const Vector3d& x, const Vector3d& d) noexcept {
+Chord chord_of(const CapsuleSampler& s, const Vector3d& x, const Vector3d& d) noexcept {
   const Vector3d end(0, 0, s.half);
   return within_radius({x.x(), x.y(), 0}, {d.x(), d.y(), 0}, s.radius)
       .within(between(x.z(), d.z(), s.half))
@@ -208,29 +208,29 @@ Chord chord_of(const CapsuleShape& s, const Vector3d& x, const Vector3d& d) noex
       .with(within_radius(x + end, d, s.radius));
 }
 
-template <class Shape>
-concept HasChord = requires(const Shape& s, const Vector3d& x) {
+template <class Sampler>
+concept HasChord = requires(const Sampler& s, const Vector3d& x) {
   chord_of(s, x, x);
 };
 
-template <class Shape>
-RayHit shape_hit(Shape& shape, const SolidFrame& frame, const OwnRay& ray) noexcept {
-  if constexpr (HasChord<Shape>) {
+template <class Sampler>
+RayHit shape_hit(Sampler& shape, const SolidFrame& frame, const OwnRay& ray) noexcept {
+  if constexpr (HasChord<Sampler>) {
     const Chord chord = chord_of(shape, ray.origin, ray.direction);
     const double distance = chord.first >= 0 ? chord.first : chord.last;
-    if (chord.empty() || !(distance >= 0) || !(distance <= ray.longest)) return {};
+    if (chord.empty() || !(distance >= 0) || !(distance <= ray.max_distance)) return {};
     const Vector3d at = ray.origin + distance * ray.direction;
-    return hit_at(frame, ray, distance, -shape.nearest(at).gradient, ~0u);
+    return hit_at(frame, ray, distance, shape.nearest(at).gradient, ~0u);
   } else {
-    return refused<RayHit>(QueryStatus::not_held);
+    return refused<RayHit>(QueryStatus::missing_data);
   }
 }
 
-/// A field at a place.
-class PlacedShape {
+/// A shape at a place.
+class ShapeAtPose {
  public:
-  explicit PlacedShape(const PlacedField& placed) noexcept
-      : field_(placed.field),
+  explicit ShapeAtPose(const PlacedShape& placed) noexcept
+      : field_(placed.shape),
         frame_(SolidFrame::of(placed.pose, placed.scale, Vector3d::Zero(), 0)) {}
 
   RayHit answer(const Ray& given) const noexcept {
@@ -244,25 +244,25 @@ class PlacedShape {
 
   SurfacePoint answer(const Vector3d& given, SurfacePoint) const noexcept {
     return with_sample<SurfacePoint>(
-        given, [&](const Vector3d& x, const FieldSample& at, double error) {
+        given, [&](const Vector3d& x, const ShapeSample& at, double error) {
           // Where all directions are alike one of them serves.
           const double slope = at.gradient.norm();
           const Vector3d gradient =
-              slope > 0 ? Vector3d(-at.gradient / slope) : Vector3d::UnitX().eval();
+              slope > 0 ? Vector3d(at.gradient / slope) : Vector3d::UnitX().eval();
           const double rounding = 1e-15 * (x.norm() + std::abs(at.distance)) +
                                   1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
-          return SurfacePoint{-at.distance * frame_->unit,
+          return SurfacePoint{at.distance * frame_->unit,
                               frame_->unit * (error + rounding),
-                              frame_->world(x + at.distance * gradient),
+                              frame_->world(x - at.distance * gradient),
                               frame_->rotation * gradient,
                               ~0u,
                               QueryStatus::ok};
         });
   }
 
-  Containment answer(const Vector3d& given, Containment) const noexcept {
-    return with_sample<Containment>(given, [](const Vector3d&, const FieldSample& at, double) {
-      return Containment{at.distance > 0, QueryStatus::ok};
+  YesNoAnswer answer(const Vector3d& given, YesNoAnswer) const noexcept {
+    return with_sample<YesNoAnswer>(given, [](const Vector3d&, const ShapeSample& at, double) {
+      return YesNoAnswer{at.distance < 0 ? YesNo::yes : YesNo::no, QueryStatus::ok};
     });
   }
 
@@ -277,18 +277,18 @@ class PlacedShape {
         field_, [&](auto& shape) { return use(*x, shape.nearest(*x), shape.error()); }, refuse);
   }
 
-  const Field& field_;
+  const Shape& field_;
   std::optional<SolidFrame> frame_;
 };
 
 /// Runs `use(solid)` with what answers.
 template <class Use>
-auto with_solid(const PlacedTree& placed, const Use& use) noexcept {
+auto with_solid(const PlacedAsset& placed, const Use& use) noexcept {
   return use(MeshOfSolid(placed));
 }
 template <class Use>
-auto with_solid(const PlacedField& placed, const Use& use) noexcept {
-  return use(PlacedShape(placed));
+auto with_solid(const PlacedShape& placed, const Use& use) noexcept {
+  return use(ShapeAtPose(placed));
 }
 
 template <class Asked, class Answer, class... Kind>
@@ -316,8 +316,8 @@ RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept {
 SurfacePoint closest_point(const PlacedSolid& solid, const Vector3d& point) noexcept {
   return answer_one(solid, point, SurfacePoint(), SurfacePoint());
 }
-Containment contains(const PlacedSolid& solid, const Vector3d& point) noexcept {
-  return answer_one(solid, point, Containment(), Containment());
+YesNoAnswer contains(const PlacedSolid& solid, const Vector3d& point) noexcept {
+  return answer_one(solid, point, YesNoAnswer(), YesNoAnswer());
 }
 
 void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
@@ -329,8 +329,8 @@ void closest_point(const PlacedSolid& solid, std::span<const Vector3d> points,
   answer_all(solid, points, answers, SurfacePoint());
 }
 void contains(const PlacedSolid& solid, std::span<const Vector3d> points,
-              std::span<Containment> answers) noexcept {
-  answer_all(solid, points, answers, Containment());
+              std::span<YesNoAnswer> answers) noexcept {
+  answer_all(solid, points, answers, YesNoAnswer());
 }
 
 }  // namespace ist

@@ -2,9 +2,9 @@
 
 #include "query/base/no_answer.h"
 #include "query/exact/mesh_queries.h"
-#include "query/field/with_shape.h"
-#include "query/impact/field_search.h"
 #include "query/impact/pair_search.h"
+#include "query/impact/shape_search.h"
+#include "query/shape/with_shape.h"
 #include "query/solid_queries.h"
 
 namespace ist {
@@ -17,7 +17,7 @@ constexpr double kErrors = 10;
 
 TimeOfImpact overlap() noexcept {
   TimeOfImpact result;
-  result.status = ImpactStatus::overlapping;
+  result.kind = ImpactKind::overlapping;
   return result;
 }
 
@@ -28,8 +28,8 @@ double tolerance_of(const ImpactSettings& settings, double smaller, double error
                                 : std::max(kTolerance * smaller, kErrors * errors);
 }
 
-double bounding_radius(const PlacedTree& placed) noexcept {
-  return placed.tree.header().inner_tree.root[3];
+double bounding_radius(const PlacedAsset& placed) noexcept {
+  return placed.asset.header().inner_tree.root[3];
 }
 
 /// Whether one solid holds a part of the other without their meshes meeting there.
@@ -40,12 +40,12 @@ bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) no
 
 }  // namespace
 
-TimeOfImpact find_impact(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
+TimeOfImpact find_impact(const PlacedAsset& a, const PlacedAsset& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
+  if (lack_spheres(a, b)) return missing_data<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
-  const ImpactSide side_a(a.tree), side_b(b.tree);
+  const ImpactSide side_a(a.asset), side_b(b.asset);
   if (hold(side_a, side_b, frame->start)) return overlap();
   const double smaller =
       std::min(bounding_radius(a) * frame->a.unit, bounding_radius(b) * frame->b.unit);
@@ -55,18 +55,18 @@ TimeOfImpact find_impact(const PlacedTree& a, const PlacedTree& b, const Motions
   return PairSearch(*frame, side_a, side_b, loop).run();
 }
 
-TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motions& motions,
+TimeOfImpact find_impact(const PlacedShape& a, const PlacedAsset& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<TimeOfImpact>();
+  if (lack_spheres(a, b)) return missing_data<TimeOfImpact>();
   const std::optional<MovingFrame> frame = moving_frame(a, b, motions, settings.duration);
   if (!frame || workspace.impl() == nullptr) return invalid_input<TimeOfImpact>();
-  const ImpactSide side(b.tree);
+  const ImpactSide side(b.asset);
   const double tolerance = tolerance_of(settings, bounding_radius(b) * frame->b.unit,
                                         side.mesh_error() * frame->b.unit, frame->unit);
   return with_shape(
-      a.field,
-      [&]<class Shape>(Shape& shape) {
-        if constexpr (kConvex<Shape> && !std::is_same_v<Shape, HalfSpaceShape>) {
+      a.shape,
+      [&]<class Sampler>(Sampler& shape) {
+        if constexpr (kConvex<Sampler> && !std::is_same_v<Sampler, HalfSpaceSampler>) {
           // All of it is inside B, if its middle is and the surfaces do not meet.
           double middle[3];
           frame->start.b_from_a.apply({0, 0, 0}, middle);
@@ -75,7 +75,7 @@ TimeOfImpact find_impact(const PlacedField& a, const PlacedTree& b, const Motion
             return overlap();
         }
         ImpactLoop loop(*frame, tolerance, settings, *workspace.impl());
-        return FieldSearch<Shape>(shape, *frame, side, loop).run();
+        return ShapeSearch<Sampler>(shape, *frame, side, loop).run();
       },
       invalid_input<TimeOfImpact>);
 }

@@ -27,14 +27,14 @@ constexpr double kFlat = 4500;
 
 /// [u] Scale of the layer in which a solid's matched spheres stick out and leave room: their mean
 /// radius, but for balls and the like, whose few large spheres fit better than that.
-double skin_of(const PlacedTree& placed) {
-  const AssetHeader& asset = placed.tree.header();
+double skin_of(const PlacedAsset& placed) {
+  const AssetHeader& asset = placed.asset.header();
   return std::ldexp(placed.scale, asset.exponent) *
          std::min(asset.matched_tree.mean_radius, 3 * asset.protrusion);
 }
 
 /// [u] Of two solids' layers together.
-double skin_of(const PlacedTree& a, const PlacedTree& b) {
+double skin_of(const PlacedAsset& a, const PlacedAsset& b) {
   const double of_a = skin_of(a), of_b = skin_of(b);
   return std::sqrt((of_a * of_a + of_b * of_b) / 2);
 }
@@ -59,10 +59,11 @@ Left left_at(double depth, double flat) {
 
 }  // namespace
 
-Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
-                               const PlacedTree& b) noexcept {
-  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 || !(whole.volume > 0)) return whole;
-  const double area = whole.translation_gradient.norm();
+Penetration without_protrusion(const Penetration& whole, const PlacedAsset& a,
+                               const PlacedAsset& b) noexcept {
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0 || !(whole.volume > 0))
+    return whole;
+  const double area = whole.force.norm();
   const double skin = skin_of(a, b);
   if (!(whole.volume < kDeepOverlap * (skin * area))) return whole;
   const double depth = whole.volume / (skin * area);
@@ -70,14 +71,14 @@ Penetration without_protrusion(const Penetration& whole, const PlacedTree& a,
   Penetration result = whole;
   result.volume *= left.volume;
   result.volume_min = std::min(result.volume_min, result.volume);
-  result.translation_gradient *= left.force;
-  result.rotation_gradient *= left.force;
+  result.force *= left.force;
+  result.torque *= left.force;
   return result;
 }
 
-void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, const PlacedTree& b,
+void without_protrusion(std::span<ContactPatch> patches, const PlacedAsset& a, const PlacedAsset& b,
                         const ContactSettings& settings) noexcept {
-  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0 ||
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0 ||
       settings.measure != Measure::matched)
     return;
   const std::optional<RelativePose> pose = relative_pose(a, b);
@@ -105,7 +106,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedTree& a, co
     patch.area *= left.force;
     patch.force *= left.force;
     patch.torque *= left.force;
-    patch.twist *= left.force;
+    patch.torsion *= left.force;
     patch.depth = patch.area > 0 ? patch.volume / patch.area : 0;
     if (patch.area > 0) continue;
     patch.normal.setZero();

@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -137,12 +137,12 @@ RelativePose scales_of(const std::optional<RelativePose>& pose) {
   return *pose;
 }
 
-std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
-  const PlacedTree still_a{a.tree, {}, a.scale}, still_b{b.tree, {}, b.scale};
+std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
+  const PlacedAsset still_a{a.asset, {}, a.scale}, still_b{b.asset, {}, b.scale};
   const RelativePose a_from_b = scales_of(relative_pose(still_a, still_b));
   Capacity capacity;
-  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return capacity.value();
-  const AssetHeader &header_a = a.tree.header(), &header_b = b.tree.header();
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return capacity.value();
+  const AssetHeader &header_a = a.asset.header(), &header_b = b.asset.header();
   const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
     capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
   };
@@ -160,24 +160,24 @@ std::size_t capacity_of(const PlacedTree& a, const PlacedTree& b) {
   return capacity.value();
 }
 
-std::size_t capacity_of(const PlacedField& a, const PlacedTree& b) {
-  scales_of(relative_pose(Pose{}, a.scale, PlacedTree{b.tree, {}, b.scale}));
+std::size_t capacity_of(const PlacedShape& a, const PlacedAsset& b) {
+  scales_of(relative_pose(Pose{}, a.scale, PlacedAsset{b.asset, {}, b.scale}));
   Capacity capacity;
-  if (b.tree.sphere_count() == 0) return capacity.value();
+  if (b.asset.sphere_count() == 0) return capacity.value();
   for (const Measure measure : {Measure::matched, Measure::inner})
-    capacity.add_count(sphere_tree(b.tree, measure).count(0));
+    capacity.add_count(sphere_tree(b.asset, measure).count(0));
   return capacity.value();
 }
 
 }  // namespace
 
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b) {
-  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
-  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
   if (tree_a != nullptr && tree_b != nullptr) return capacity_of(*tree_a, *tree_b);
-  if (tree_b != nullptr) return capacity_of(*std::get_if<PlacedField>(&a.placed), *tree_b);
-  if (tree_a != nullptr) return capacity_of(*std::get_if<PlacedField>(&b.placed), *tree_a);
-  throw Error("workspace_capacity: no query takes two fields");
+  if (tree_b != nullptr) return capacity_of(*std::get_if<PlacedShape>(&a.placed), *tree_b);
+  if (tree_a != nullptr) return capacity_of(*std::get_if<PlacedShape>(&b.placed), *tree_a);
+  throw Error("workspace_capacity: no query takes two shapes");
 }
 
 }  // namespace ist

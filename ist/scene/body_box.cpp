@@ -27,18 +27,18 @@ SceneBox box_around(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) 
   return out;
 }
 
-std::optional<BodyBox::Turned> BodyBox::of(const Field& field) noexcept {
+std::optional<BodyBox::Turned> BodyBox::of(const Shape& field) noexcept {
   const auto around = [](double x, double y, double z) {
     return Turned{Eigen::Vector3d::Zero(), {x, y, z}};
   };
-  if (const auto* box = std::get_if<BoxField>(&field)) return Turned{{0, 0, 0}, box->half_extents};
-  if (const auto* ball = std::get_if<BallField>(&field))
+  if (const auto* box = std::get_if<BoxShape>(&field)) return Turned{{0, 0, 0}, box->half_extents};
+  if (const auto* ball = std::get_if<BallShape>(&field))
     return around(ball->radius, ball->radius, ball->radius);
-  if (const auto* capsule = std::get_if<CapsuleField>(&field))
+  if (const auto* capsule = std::get_if<CapsuleShape>(&field))
     return around(capsule->radius, capsule->radius, capsule->radius + capsule->half_height);
-  if (const auto* cylinder = std::get_if<CylinderField>(&field))
+  if (const auto* cylinder = std::get_if<CylinderShape>(&field))
     return around(cylinder->radius, cylinder->radius, cylinder->half_height);
-  if (const auto* grid = std::get_if<DistanceGridField>(&field)) {
+  if (const auto* grid = std::get_if<DistanceGridShape>(&field)) {
     const Eigen::Vector3d half =
         grid->spacing / 2 *
         Eigen::Vector3d(grid->size[0] - 1.0, grid->size[1] - 1.0, grid->size[2] - 1.0);
@@ -49,16 +49,16 @@ std::optional<BodyBox::Turned> BodyBox::of(const Field& field) noexcept {
 
 BodyBox::BodyBox(const PlacedSolid& solid) noexcept {
   double error = 0;  // of the mesh
-  if (const auto* tree = std::get_if<PlacedTree>(&solid.placed)) {
-    const Bounds own = bounds(tree->tree);
+  if (const auto* tree = std::get_if<PlacedAsset>(&solid.placed)) {
+    const Bounds own = bounds(tree->asset);
     box_ = Turned{(own.lower + own.upper) / 2, (own.upper - own.lower) / 2};
     scale_ = tree->scale;
-    sticks_out_ = tree->scale * tree->tree.protrusion();
-    error = tree->scale * tree->tree.mesh_error();
-    empty_ = tree->tree.empty();
+    sticks_out_ = tree->scale * tree->asset.protrusion();
+    error = tree->scale * tree->asset.mesh_error();
+    empty_ = tree->asset.empty();
   } else {
-    const auto& field = std::get<PlacedField>(solid.placed);
-    box_ = of(field.field);
+    const auto& field = std::get<PlacedShape>(solid.placed);
+    box_ = of(field.shape);
     scale_ = field.scale;
   }
   if (!box_) return;

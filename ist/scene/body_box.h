@@ -45,7 +45,7 @@ class BodyBox {
   struct Turned {
     Eigen::Vector3d middle, half;
   };
-  static std::optional<Turned> of(const Field& field) noexcept;
+  static std::optional<Turned> of(const Shape& field) noexcept;
 
   std::optional<Turned> box_;  ///< in the solid's own frame, scaled; none: it has no end
   double scale_ = 1;

@@ -1,6 +1,6 @@
-#include <ist/error.h>
-#include <ist/ist_scene.h>
+#include <ist/c_scene.h>
 #include <ist/scene.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -74,7 +74,7 @@ static_assert(offsetof(ist_scene_pair_t, b) == offsetof(ScenePair, b));
 static_assert(offsetof(ist_scene_pair_t, stays) == offsetof(ScenePair, event));
 static_assert(static_cast<int>(SceneEvent::begins) == 0);
 static_assert(offsetof(ist_scene_pair_t, overlapping) == offsetof(ScenePair, overlapping));
-static_assert(sizeof(ScenePair::overlapping) == sizeof(ist_overlapping_t));
+static_assert(sizeof(ScenePair::overlapping) == sizeof(ist_yes_no_t));
 static_assert(offsetof(ist_scene_pair_t, slot) == offsetof(ScenePair, slot));
 static_assert(offsetof(ist_scene_pair_t, patch_count) == offsetof(ScenePair, patch_count));
 static_assert(sizeof(ist_scene_pair_name_t) == sizeof(ScenePairName));

@@ -1,6 +1,6 @@
 #include <ist/scene.h>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -54,7 +54,7 @@ void Scene::add(const SceneBody& body) {
   all.bodies[at].kept = BodyBox(body.solid);
   all.filtered[at] = {body.number, body.group,
                       body.layers, body.meets,
-                      body.moves,  std::holds_alternative<PlacedField>(body.solid.placed)};
+                      body.moves,  std::holds_alternative<PlacedShape>(body.solid.placed)};
   all.place(all.bodies[at], false);
 }
 

@@ -53,7 +53,7 @@ struct Scene::Impl {
     std::uint32_t body[2];       ///< indices, of the lower number first
     std::uint32_t slot = kNone;  ///< of its answer; kNone: there is none
     std::uint32_t patches = 0;
-    Overlapping overlapping = Overlapping::unknown;
+    YesNo overlapping = YesNo::unknown;
     bool meet = false;
   };
 
@@ -239,9 +239,10 @@ struct Scene::Impl {
     const PlacedSolid &solid_a = a.given.solid, &solid_b = b.given.solid;
     const SceneRule& rule = rule_of(two.body[0], two.body[1]);
     if (rule.answer == SceneAnswer::overlap) {
-      two.overlapping = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
-                                        : overlap(solid_a, solid_b, workspace);
-      two.meet = two.overlapping != Overlapping::no;
+      const YesNoAnswer found = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
+                                                : overlap(solid_a, solid_b, workspace);
+      two.overlapping = found.answer;
+      two.meet = two.overlapping != YesNo::no;
     }
     if (two.slot == kNone) return;
     Penetration& p = penetrations[two.slot];
@@ -253,7 +254,7 @@ struct Scene::Impl {
       const TimeOfImpact found = time_of_impact(solid_a, solid_b, {a.given.motion, b.given.motion},
                                                 rule.impact, workspace);
       impacts[two.slot] = found;
-      two.meet = found.status != ImpactStatus::no_impact;
+      two.meet = found.kind != ImpactKind::no_impact || found.status != QueryStatus::ok;
       return;
     }
     if (rule.answer == SceneAnswer::patches) {

@@ -11,7 +11,7 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
   // (also for a ray that is not usable)
   if (!ray.origin.allFinite() || !ray.direction.allFinite() || ray.direction.isZero(0)) return best;
   const Eigen::Vector3d unit = ray.direction.stableNormalized();
-  double longest = ray.longest;
+  double longest = ray.max_distance;
   const auto enter = [&](const SceneBox& box) {
     double from = 0, to = longest;
     for (int k = 0; k < 3; ++k) {

@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/scene.h>
+#include <ist/types.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -44,7 +44,7 @@ class Writer {
     return count;
   }
   void floats(const float* const& values, std::size_t count) { bytes(values, 4 * count); }
-  void tree(const TreeView& tree) {
+  void tree(const AssetView& tree) {
     if (tree.empty()) fail("a body without an asset cannot be recorded");
     number(tree.header().content_hash);
   }
@@ -62,7 +62,7 @@ class Writer {
 
 class Reader {
  public:
-  Reader(std::span<const std::byte> bytes, std::span<const TreeView> assets,
+  Reader(std::span<const std::byte> bytes, std::span<const AssetView> assets,
          std::deque<std::vector<float>>& kept)
       : left_(bytes), assets_(assets), kept_(kept) {}
 
@@ -96,10 +96,10 @@ class Reader {
     left_ = left_.subspan(4 * count);
     values = own.data();
   }
-  void tree(TreeView& tree) {
+  void tree(AssetView& tree) {
     std::uint64_t hash = 0;
     number(hash);
-    const auto found = std::find_if(assets_.begin(), assets_.end(), [&](const TreeView& one) {
+    const auto found = std::find_if(assets_.begin(), assets_.end(), [&](const AssetView& one) {
       return !one.empty() && one.header().content_hash == hash;
     });
     if (found == assets_.end()) {
@@ -124,7 +124,7 @@ class Reader {
 
  private:
   std::span<const std::byte> left_;
-  std::span<const TreeView> assets_;
+  std::span<const AssetView> assets_;
   std::deque<std::vector<float>>& kept_;
 };
 
@@ -156,26 +156,26 @@ void pass(Io& io, SceneRule& rule) {
 }
 
 template <class Io>
-void pass(Io& io, HalfSpaceField& field) {
+void pass(Io& io, HalfSpaceShape& field) {
   pass(io, field.normal);
   io.number(field.offset);
 }
 template <class Io>
-void pass(Io& io, BoxField& field) {
+void pass(Io& io, BoxShape& field) {
   pass(io, field.half_extents);
 }
 template <class Io>
-void pass(Io& io, BallField& field) {
+void pass(Io& io, BallShape& field) {
   io.number(field.radius);
 }
-template <class Io, class Field>
-requires(std::is_same_v<Field, CapsuleField> ||
-         std::is_same_v<Field, CylinderField>) void pass(Io& io, Field& field) {
+template <class Io, class Shape>
+requires(std::is_same_v<Shape, CapsuleShape> ||
+         std::is_same_v<Shape, CylinderShape>) void pass(Io& io, Shape& field) {
   io.number(field.radius);
   io.number(field.half_height);
 }
 template <class Io>
-void pass(Io& io, HeightField& field) {
+void pass(Io& io, HeightFieldShape& field) {
   io.number(field.columns);
   io.number(field.rows);
   for (double* const x : {&field.spacing[0], &field.spacing[1], &field.lowest, &field.highest})
@@ -183,7 +183,7 @@ void pass(Io& io, HeightField& field) {
   io.floats(field.heights, std::size_t{field.columns} * field.rows);
 }
 template <class Io>
-void pass(Io& io, DistanceGridField& field) {
+void pass(Io& io, DistanceGridShape& field) {
   std::size_t count = 1;
   for (std::uint32_t& size : field.size) {
     io.number(size);
@@ -196,7 +196,7 @@ void pass(Io& io, DistanceGridField& field) {
   io.floats(field.distances, count);
 }
 template <class Io>
-void pass(Io&, FunctionField&) {
+void pass(Io&, FunctionShape&) {
   fail("a function of the caller's cannot be recorded");
 }
 
@@ -215,10 +215,10 @@ void pass(Io& io, PlacedSolid& solid) {
         io.number(placed.scale);
       },
       solid.placed);
-  if (auto* const tree = std::get_if<PlacedTree>(&solid.placed)) {
-    io.tree(tree->tree);
+  if (auto* const tree = std::get_if<PlacedAsset>(&solid.placed)) {
+    io.tree(tree->asset);
   } else {
-    Field& field = std::get<PlacedField>(solid.placed).field;
+    Shape& field = std::get<PlacedShape>(solid.placed).shape;
     pass_alternative(io, field);
     std::visit([&](auto& of) { pass(io, of); }, field);
   }
@@ -287,7 +287,7 @@ std::vector<std::byte> Scene::record() const {
   return std::move(writer.out);
 }
 
-Scene Scene::replay(std::span<const std::byte> record, std::span<const TreeView> assets,
+Scene Scene::replay(std::span<const std::byte> record, std::span<const AssetView> assets,
                     std::size_t workers) {
   RecordHeader header;
   const RecordHeader own;

@@ -1,5 +1,5 @@
 #include <ist/cover_spheres.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <tbb/parallel_for.h>
 

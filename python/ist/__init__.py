@@ -11,7 +11,7 @@ from . import _calls, _core, _shown
 
 # Before anything is taken from there. One answer's code is an enum's.
 for _owner in (_core, _core.gpu, *(x for x in vars(_core).values() if isinstance(x, type))):
-    _calls.name_faults(_owner, {name: lambda codes: _one(codes, Overlapping)
+    _calls.name_faults(_owner, {name: lambda codes: _one(codes, YesNo)
                                 for name in ("overlap", "contains")})
 
 from ._core import *  # noqa: E402, F403
@@ -29,12 +29,12 @@ class QueryStatus(enum.IntEnum):
     ok = 0
     budget_exhausted = 1  # a limit stopped it: volume_min, volume_max contain the finished answer's
     # The row is all NaN; one pose raises instead:
-    invalid_input = 2  # a pose, a scale or a Field's number is invalid: ValueError
-    not_held = 3  # a solid lacks what the measure needs: Error
+    invalid_input = 2  # a pose, a scale or a Shape's number is invalid: ValueError
+    missing_data = 3  # a solid lacks what the measure needs: Error
     error_exceeded = 4  # finished, but the error is larger than relative_error
 
 
-class Overlapping(enum.IntEnum):
+class YesNo(enum.IntEnum):
     """Codes that overlap() and contains() return."""
 
     no = 0
@@ -42,32 +42,28 @@ class Overlapping(enum.IntEnum):
     unknown = 2
 
 
-class ImpactStatus(enum.IntEnum):
-    """Codes of `status` of a TimeOfImpact."""
+class ImpactKind(enum.IntEnum):
+    """Codes of `kind` of a TimeOfImpact; no_impact where the status is not ok."""
 
     no_impact = 0
     impact = 1
     unresolved = 2
     overlapping = 3
-    budget_exhausted = 4
-    invalid_input = 5
-    not_held = 6
 
 
 def _finish():
     """Answers and assets show what they are."""
     for kind in (Penetration, Separation, ContactPatches, TimeOfImpact, RayHits,  # noqa: F405
                  SurfacePoints):  # noqa: F405
-        kind._statuses = ImpactStatus if kind.__name__ == "TimeOfImpact" else QueryStatus
         kind.__repr__ = _shown.text_of
         kind.__len__, kind.__getitem__ = _shown.rows_of, _shown.row_of
         kind.__bool__ = lambda self: True  # whatever the number of rows
-        column = vars(kind).get("status")
-        if column is not None:
-            kind.status = property(
-                lambda self, column=column: _one(column.fget(self), self._statuses), None, None,
-                column.__doc__)
-    for kind in (MeshReport, MassProperties, Bounds, PairFit, Invariant, PartnerError,  # noqa: F405
+        for name, codes in ("status", QueryStatus), ("kind", ImpactKind):
+            if column := vars(kind).get(name):
+                setattr(kind, name, property(
+                    lambda self, column=column, codes=codes: _one(column.fget(self), codes), None,
+                    None, column.__doc__))
+    for kind in (MeshReport, MassProperties, Bounds, SizeMatch, Invariant, PartnerError,  # noqa: F405
                  TargetedAsset, Progress):  # noqa: F405
         kind.__repr__ = _shown.fields_of
     for kind in (Mesh, ClosedMesh):  # noqa: F405
@@ -83,5 +79,5 @@ _finish()
 
 __all__ = sorted(
     [name for name in vars(_core) if not name.startswith("_")]
-    + ["QueryStatus", "Overlapping", "ImpactStatus", "__version__", "Plot", "plot", "poses"]
+    + ["QueryStatus", "YesNo", "ImpactKind", "__version__", "Plot", "plot", "poses"]
 )

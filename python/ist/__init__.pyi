@@ -33,22 +33,19 @@ class QueryStatus(enum.IntEnum):
     ok = 0
     budget_exhausted = 1
     invalid_input = 2
-    not_held = 3
+    missing_data = 3
     error_exceeded = 4
 
-class Overlapping(enum.IntEnum):
+class YesNo(enum.IntEnum):
     no = 0
     yes = 1
     unknown = 2
 
-class ImpactStatus(enum.IntEnum):
+class ImpactKind(enum.IntEnum):
     no_impact = 0
     impact = 1
     unresolved = 2
     overlapping = 3
-    budget_exhausted = 4
-    invalid_input = 5
-    not_held = 6
 
 @final
 class Progress:
@@ -165,7 +162,7 @@ class Asset:
     def to_bytes(self) -> bytes: ...
     def info(self) -> dict[str, Any]: ...
     # (n, 3) vertices [u], (m, 3) triangles
-    def surface(self) -> tuple[NDArray[np.float64], NDArray[np.uint32]]: ...
+    def mesh(self) -> tuple[NDArray[np.float64], NDArray[np.uint32]]: ...
     def spheres(self, which: _SphereMeasure = "matched") -> NDArray[np.float64]: ...  # (n, 4) [u]
     def mass_properties(self, pose: ArrayLike | None = None, scale: float = 1.0) -> MassProperties: ...
     def bounds(self, pose: ArrayLike | None = None, scale: float = 1.0) -> Bounds: ...
@@ -176,15 +173,15 @@ class Asset:
     mesh_triangles: Final[int]  # 0: it holds no mesh
     mesh_error: Final[float]  # [u]
     mesh_state: Final[Literal["none", "own", "resolved", "polygonised", "unresolved"]]
-    counted_twice: Final[float]  # [u³]
+    self_overlap_volume: Final[float]  # [u³]
 
 def bake(
     mesh: ClosedMesh | _OpenMesh, *, max_spheres: int = 10000, target_coverage: float = 1.0,
     min_radius: float = 0.0, time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded",
-    seed: int = 0, threads: int = 0, device: _Device = "auto", surface: str = "all",
+    seed: int = 0, threads: int = 0, device: _Device = "auto", keep_mesh: bool = True,
     scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
-def bake_surface(
+def bake_mesh_only(
     mesh: ClosedMesh | _OpenMesh, *, scale: _Scale = 1.0,
     threads: int = 0, progress: Callable[[Progress], Any] | None = None,
 ) -> Asset: ...
@@ -192,44 +189,44 @@ def bake_to_error(
     mesh: ClosedMesh | _OpenMesh, relative_error: float = 0.01, at_overlap: float = 0.001, *,
     max_spheres: int = 0, target_coverage: float = 1.0, min_radius: float = 0.0,
     time_limit: float = 0.0, epsilon: float = 0.0, grid: _Grid = "banded", seed: int = 0,
-    threads: int = 0, device: _Device = "auto", surface: str = "all",
+    threads: int = 0, device: _Device = "auto", keep_mesh: bool = True,
     scale: _Scale = 1.0, progress: Callable[[Progress], Any] | None = None,
 ) -> TargetedAsset: ...
 def check(
     asset: Asset, mesh: ClosedMesh | _OpenMesh, *, scale: _Scale = 1.0, threads: int = 0,
 ) -> list[Invariant]: ...
 
-class Field: ...
+class Shape: ...
 
 @final
-class HalfSpaceField(Field):
+class HalfSpaceShape(Shape):
     def __init__(self, normal: ArrayLike = (0.0, 0.0, 1.0), offset: float = 0.0) -> None: ...
 
 @final
-class BoxField(Field):
+class BoxShape(Shape):
     def __init__(self, half_extents: ArrayLike) -> None: ...
 
 @final
-class BallField(Field):
+class BallShape(Shape):
     def __init__(self, radius: float) -> None: ...
 
 @final
-class CapsuleField(Field):
+class CapsuleShape(Shape):
     def __init__(self, radius: float, half_height: float) -> None: ...
 
 @final
-class CylinderField(Field):
+class CylinderShape(Shape):
     def __init__(self, radius: float, half_height: float) -> None: ...
 
 @final
-class HeightField(Field):
+class HeightFieldShape(Shape):
     def __init__(
         self, heights: ArrayLike, *, spacing: ArrayLike = (1.0, 1.0), lowest: float = -1e300,
         highest: float = 1e300,
     ) -> None: ...
 
 @final
-class DistanceGridField(Field):
+class DistanceGridShape(Shape):
     def __init__(
         self, distances: ArrayLike, *, origin: ArrayLike, spacing: float, error: float = 0.0
     ) -> None: ...
@@ -240,15 +237,15 @@ class SolidRows: ...
 @final
 class Solids:
     def __init__(
-        self, solids: Sequence[Asset | Field], *, device: Any = "cpu",
+        self, solids: Sequence[Asset | Shape], *, device: Any = "cpu",
     ) -> None: ...  # "cpu", "cuda", "cuda:1", a torch.device
     def __len__(self) -> int: ...
     def __getitem__(self, index: int | _Rows) -> SolidRows: ...  # or (n,) indices
     device: Final[str]
-    fields: Final[list[int]]
+    shapes: Final[list[int]]
     bytes: Final[int]  # of device memory
 
-_Solid = Asset | Field | SolidRows
+_Solid = Asset | Shape | SolidRows
 _Rows = Any  # ArrayLike; of solids on a GPU an array of any framework in its memory
 
 @final
@@ -277,7 +274,7 @@ class SceneStep:
     def __len__(self) -> int: ...  # pairs
     pairs: Final[NDArray[np.uint32]]  # (n, 2) numbers of the bodies that meet
     begins: Final[NDArray[np.bool_]]  # (n,) they did not meet in the step before
-    overlapping: Final[NDArray[np.uint32]]  # (n,) Overlapping, where the rule is 'overlap'
+    overlapping: Final[NDArray[np.uint32]]  # (n,) YesNo, where the rule is 'overlap'
     penetration: Final[Penetration]  # n rows
     separation: Final[Separation]  # n rows
     ended: Final[NDArray[np.uint32]]  # (m, 2)
@@ -289,7 +286,7 @@ class Scene:
     ) -> None: ...
     def __len__(self) -> int: ...
     def add(
-        self, solid: Asset | Field, pose: ArrayLike | None = None, *, scale: float = 1.0,
+        self, solid: Asset | Shape, pose: ArrayLike | None = None, *, scale: float = 1.0,
         number: int | None = None, moves: bool = True, group: int = 0, layers: int = 1,
         meets: int = 0xFFFFFFFF,
     ) -> int: ...
@@ -320,9 +317,9 @@ class Lenses:
     sphere_b: Final[NDArray[np.uint32]]  # (n,)
 
 @final
-class PairFit:
-    grain_a: Final[float]  # [u]
-    grain_b: Final[float]  # [u]
+class SizeMatch:
+    feature_size_a: Final[float]  # [u]
+    feature_size_b: Final[float]  # [u]
     ratio: Final[float]  # ≥ 1
     a_is_coarser: Final[bool]
     has_mesh: Final[bool]
@@ -348,7 +345,7 @@ def without_protrusion(
     whole: Penetration, a: Asset, b: Asset, poses: ArrayLike, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None,
 ) -> Penetration: ...
-def pair_fit(a: Asset, b: Asset, *, scale: float = 1.0, scale_a: float = 1.0) -> PairFit: ...
+def size_match(a: Asset, b: Asset, *, scale: float = 1.0, scale_a: float = 1.0) -> SizeMatch: ...
 
 @final
 class RayHits:
@@ -401,7 +398,7 @@ class ContactPatches:
     force: Final[NDArray[np.float64]]  # (n, m, 3) [u²]
     torque: Final[NDArray[np.float64]]  # (n, m, 3) [u³]
     point: Final[NDArray[np.float64]]  # (n, m, 3) [u] on the central axis of the wrench
-    twist: Final[NDArray[np.float64]]  # (n, m) [u³] about the normal
+    torsion: Final[NDArray[np.float64]]  # (n, m) [u³] about the normal
 
 @final
 class OverlapOutline:
@@ -419,7 +416,8 @@ class TimeOfImpact:
     point_a: Final[NDArray[np.float64]]  # (n, 3) [u]
     point_b: Final[NDArray[np.float64]]  # (n, 3) [u]
     normal: Final[NDArray[np.float64]]  # (n, 3) unit, from A to B
-    status: Final[_Count]  # (n,) ImpactStatus
+    kind: Final[_Count]  # (n,) ImpactKind
+    status: Final[_Count]  # (n,) QueryStatus
     node_visits: Final[_Count]  # (n,)
     surface_pairs: Final[_Count]  # (n,)
 
@@ -438,15 +436,15 @@ def separation(
     out: Any = None, stream: Any = None,
 ) -> Separation: ...  # of solids on a GPU gpu.Separation
 def raycast(
-    solid: Asset | Field, pose: ArrayLike | None, origins: ArrayLike, directions: ArrayLike, *,
-    longest: float = ..., scale: float = 1.0,
+    solid: Asset | Shape, pose: ArrayLike | None, origins: ArrayLike, directions: ArrayLike, *,
+    max_distance: float = ..., scale: float = 1.0,
 ) -> RayHits: ...
 def closest_point(
-    solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
+    solid: Asset | Shape, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
 ) -> SurfacePoints: ...
 def contains(
-    solid: Asset | Field, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
-) -> _Count: ...  # (n,) of Overlapping; one for one pose
+    solid: Asset | Shape, pose: ArrayLike | None, points: ArrayLike, *, scale: float = 1.0,
+) -> _Count: ...  # (n,) of YesNo; one for one pose
 def contact_patches(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: _Rows | None = None,
     poses_a: _Rows | None = None, scales_a: _Rows | None = None,
@@ -463,7 +461,7 @@ def overlap(
     a: _Solid, b: _Solid, poses: _Rows, *, scales: ArrayLike | None = None,
     poses_a: ArrayLike | None = None, scales_a: ArrayLike | None = None, margin: float = 0.0,
     threads: int = 0,
-) -> _Count: ...  # (n,) of Overlapping; one for one pose
+) -> _Count: ...  # (n,) of YesNo; one for one pose
 def time_of_impact(
     a: _Solid, b: _Solid, poses: ArrayLike, poses_to: ArrayLike, *,
     about: ArrayLike = (0.0, 0.0, 0.0), scales: ArrayLike | None = None,

@@ -107,7 +107,7 @@ def _part(solid, pose, scale):
         if solid.sphere_count:
             spheres = solid.spheres()
         if solid.mesh_triangles:
-            vertices, triangles = solid.surface()
+            vertices, triangles = solid.mesh()
     turn = scale * _rotation(pose[:4]).T
     return {"vertices": vertices @ turn + pose[4:], "triangles": triangles,
             "spheres": np.column_stack((spheres[:, :3] @ turn + pose[4:], scale * spheres[:, 3])),
@@ -123,7 +123,7 @@ def _overlaps(solids, poses, scales):
     first, second = np.triu_indices(len(assets), 1)
     a, b = assets[first], assets[second]
     touching = ist.overlap(held[first], held[second], poses[b], poses_a=poses[a], scales=scales[b],
-                           scales_a=scales[a]) != ist.Overlapping.no
+                           scales_a=scales[a]) != ist.YesNo.no
     for i, k in zip(a[touching], b[touching]):
         placed = {"poses_a": poses[i], "scales_a": scales[i], "scales": scales[k]}
         exact = solids[i].mesh_triangles and solids[k].mesh_triangles

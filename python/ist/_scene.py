@@ -28,24 +28,24 @@ class Scene:
             self.solids = ist.Solids(list(place), device=device)
             places = np.array([place[solid] for solid in solids], int)
         self.count = len(places)
-        is_field = np.isin(places, self.solids.fields)
-        self.pairs = self._all_pairs(is_field) if pairs is None else self._checked(pairs, is_field)
+        is_shape = np.isin(places, self.solids.shapes)
+        self.pairs = self._all_pairs(is_shape) if pairs is None else self._checked(pairs, is_shape)
         self.places = places.astype(np.int32)[self.pairs]
 
-    def _all_pairs(self, is_field):
-        """(2, n): each Asset with each later one, and each Field with each Asset."""
-        assets, fields = np.flatnonzero(~is_field), np.flatnonzero(is_field)
+    def _all_pairs(self, is_shape):
+        """(2, n): each Asset with each later one, and each Shape with each Asset."""
+        assets, fields = np.flatnonzero(~is_shape), np.flatnonzero(is_shape)
         first, second = np.triu_indices(len(assets), 1)
         return np.stack([np.append(np.repeat(fields, len(assets)), assets[first]),
                          np.append(np.tile(assets, len(fields)), assets[second])])
 
-    def _checked(self, pairs, is_field):
+    def _checked(self, pairs, is_shape):
         for i, (first, second) in enumerate(pairs.tolist()):
             if not (0 <= first < self.count and 0 <= second < self.count):
                 why = f"solids are numbered 0 to {self.count - 1}"
             elif first == second:
                 why = "a solid cannot be paired with itself"
-            elif is_field[first] and is_field[second]:
+            elif is_shape[first] and is_shape[second]:
                 why = "two Fields; one of them must be an Asset"
             else:
                 continue

@@ -11,8 +11,8 @@ def text_of(answer):
     columns = {key: getattr(answer, key) for key in vars(type(answer)) if not key.startswith("_")}
     status = np.asarray(answer.status)
     if rows := status.shape:
-        kinds = type(answer)._statuses
-        counts = ", ".join(f"{count:,} {kinds(code).name}"
+        from . import QueryStatus
+        counts = ", ".join(f"{count:,} {QueryStatus(code).name}"
                            for code, count in zip(*np.unique(status, return_counts=True)))
         return f"<ist.{name} of {' × '.join(map(str, rows))} rows: {counts or 'none'}>"
     return f"ist.{name}(" + ", ".join(f"{key}={_value(x)}" for key, x in columns.items()) + ")"

@@ -58,5 +58,5 @@ class ContactPatches:
     force: Final[_DeviceArray | None]  # (n, m, 3) [u²]
     torque: Final[_DeviceArray | None]  # (n, m, 3) [u³/rad]
     point: Final[_DeviceArray | None]  # (n, m, 3) [u] on the central axis of the wrench
-    twist: Final[_DeviceArray | None]  # (n, m) [u³] about the normal
+    torsion: Final[_DeviceArray | None]  # (n, m) [u³] about the normal
     status: Final[_DeviceArray | None]  # (n,) QueryStatus

@@ -16,7 +16,7 @@ from ist._scene import Gaps, Scene, Volumes, numbers
 __all__ = ["overlap", "separation"]
 
 
-def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.Array, *, pairs=None,
+def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: jax.Array, *, pairs=None,
             scales: "jax.Array | None" = None, **settings) -> jax.Array:
     """Overlap volumes of pairs of placed solids [u³], differentiable by their poses and scales.
 
@@ -24,7 +24,7 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.A
     poses: (k, 7), or (w, k, 7) for w scenes: qw, qx, qy, qz, tx [u], ty, tz. Quaternions may have any
         length but 0: q/|q| is used, and the gradient is that of V(q/|q|).
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
-        Field with each Asset.
+        Shape with each Asset.
     scales: (k,) or (w, k) > 0; None: 1. Their gradient is a difference of two queries: accurate to
         2e-4, at three times the cost.
     settings: measure, spheres_only, pair_budget, threads, … of ist.penetration.
@@ -36,7 +36,7 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.A
     return _differentiable(Volumes, solids, poses, pairs, scales, settings)
 
 
-def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: jax.Array, *, pairs=None,
+def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: jax.Array, *, pairs=None,
                scales: "jax.Array | None" = None, **settings) -> jax.Array:
     """Distances of pairs of placed solids [u], differentiable by their poses and scales.
 

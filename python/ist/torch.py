@@ -16,7 +16,7 @@ from ist._scene import Gaps, Scene, Volumes, numbers
 __all__ = ["overlap", "separation"]
 
 
-def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch.Tensor, *, pairs=None,
+def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: torch.Tensor, *, pairs=None,
             scales: "torch.Tensor | None" = None, **settings) -> torch.Tensor:
     """Overlap volumes of pairs of placed solids [u³], differentiable by their poses and scales.
 
@@ -27,7 +27,7 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
         that a step along it changes the rotation and hardly the length.
         On a GPU the volumes and gradients are computed there, and the host does not wait.
     pairs: (n, 2) numbers of solids, one of each an Asset; None: all pairs of Assets, and each
-        Field with each Asset.
+        Shape with each Asset.
     scales: (k,) or (w, k) > 0, where the poses are; None: 1. Their gradient is a difference of two
         queries, 0.05 % of the scale to either side: accurate to 2e-4, at three times the cost.
     settings: measure, spheres_only, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
@@ -41,13 +41,13 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch
     Sphere sums have a noise of 5e-9 of the volume: torch.autograd.gradcheck needs eps=1e-4,
     atol=5e-3, rtol=2e-3; with measure="exact" eps=1e-5, atol=1e-6, rtol=1e-5.
 
-    The last eight lists of solids and pairs stay on the GPU; later changes of a Field's arrays have no
+    The last eight lists of solids and pairs stay on the GPU; later changes of a Shape's arrays have no
     effect there. An ist.Solids is uploaded once.
     """
     return _differentiable(Volumes, solids, poses, pairs, scales, settings)
 
 
-def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Field]", poses: torch.Tensor, *, pairs=None,
+def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: torch.Tensor, *, pairs=None,
                scales: "torch.Tensor | None" = None, **settings) -> torch.Tensor:
     """Distances of pairs of placed solids [u], differentiable by their poses and scales.
 

@@ -210,7 +210,7 @@ class CollisionManager:
         asset = self._assets.get(key)
         if asset is None:
             closed = ist.close_mesh(ist.from_trimesh(mesh), name=str(name), repair=self._repair)
-            asset = self._assets[key] = ist.bake_surface(closed)
+            asset = self._assets[key] = ist.bake_mesh_only(closed)
         return _Object(name, mesh, asset, transform)
 
 

@@ -3,8 +3,8 @@
 // collision functions. A geom of type "sdf" with an instance of the plug-in then collides as the
 // solid of its asset; all other geoms collide as before. Rays meet the solid's mesh.
 
-#include <ist/ist.h>
-#include <ist/ist_bake.h>
+#include <ist/c.h>
+#include <ist/c_bake.h>
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -33,9 +33,9 @@ int slot = -1;
 mjfCollision before[mjNGEOMTYPES][mjNGEOMTYPES];  ///< MuJoCo's functions
 
 struct Tree {
-  ist_tree_t tree = {};
-  ist_tree_info_t info = {};
-  ~Tree() { ist_tree_release(&tree); }
+  ist_asset_t tree = {};
+  ist_asset_info_t info = {};
+  ~Tree() { ist_asset_release(&tree); }
   bool has_mesh() const { return info.mesh_triangles > 0; }
 };
 
@@ -49,7 +49,7 @@ std::shared_ptr<Tree> shared(const Key& key, Make make) {
   const auto tree = std::make_shared<Tree>();
   if (!make(tree->tree)) return nullptr;
   tree->info.size = sizeof tree->info;
-  ist_tree_get_info(&tree->tree, &tree->info);
+  ist_asset_get_info(&tree->tree, &tree->info);
   known[key] = tree;
   return tree;
 }
@@ -59,11 +59,11 @@ struct Triangles {
   std::vector<std::array<uint32_t, 3>> faces;
 
   /// Bakes the surface alone: exact queries need no spheres.
-  bool bake(ist_tree_t& tree, std::string& message) const {
+  bool bake(ist_asset_t& tree, std::string& message) const {
     ist_bake_settings_t settings = {};
     settings.size = sizeof settings;
     settings.threads = 1;
-    settings.surface_only = 1;
+    settings.mesh_only = 1;
     char text[512] = "";
     const ist_status_t status =
         ist_bake(vertices.data()->data(), vertices.size(), faces.data()->data(), faces.size(),
@@ -203,7 +203,7 @@ ist_placed_t place(const mjModel* m, const mjtNum* quat, const mjtNum* pos, int 
                    const Instance& solid) {
   ist_placed_t out = {};
   out.size = sizeof out;
-  out.tree = &solid.tree->tree;
+  out.asset = &solid.tree->tree;
   mjtNum q[4] = {quat[0], quat[1], quat[2], quat[3]}, t[3] = {pos[0], pos[1], pos[2]};
   out.scale = solid.scale > 0 ? solid.scale : 1;
   if (const int mesh = m->geom_dataid[geom]; mesh >= 0) {
@@ -224,13 +224,13 @@ ist_placed_t place(const mjModel* m, const mjData* d, int geom, const Instance& 
 }
 
 /// A geom without an asset, as a shape. False: there is none for it.
-bool shape_of(const mjModel* m, const mjData* d, int geom, ist_field_t& field,
+bool shape_of(const mjModel* m, const mjData* d, int geom, ist_shape_t& field,
               ist_placed_t& placed) {
   field = {};
   field.size = sizeof field;
   placed = {};
   placed.size = sizeof placed;
-  placed.field = &field;
+  placed.shape = &field;
   write_pose(placed.pose, d->geom_xquat + 4 * geom, d->geom_xpos + 3 * geom);
   const mjtNum* size = m->geom_size + 3 * geom;
   switch (m->geom_type[geom]) {
@@ -373,7 +373,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
   ist_contact_settings_t settings = {};
   settings.size = sizeof settings;
   ist_placed_t a;
-  ist_field_t field;
+  ist_shape_t field;
   if (first != nullptr) {
     const std::optional<uint32_t> measure = measure_of(*first, *second);
     if (!measure) {
@@ -404,7 +404,7 @@ int collide(const mjModel* m, mjData* d, mjPreContact* out, int g1, int g2, mjtN
     settings.measure = IST_EXACT;
     a = {};
     a.size = sizeof a;
-    a.tree = &shape.tree->tree;
+    a.asset = &shape.tree->tree;
     a.scale = scale_of(type, m->geom_size + 3 * g1);
     write_pose(a.pose, d->geom_xquat + 4 * g1, d->geom_xpos + 3 * g1);
   }
@@ -582,9 +582,9 @@ Triangles mesh_of_model(const mjModel* m, int mesh) {
 bool find_tree(const mjModel* m, const char* file, Instance& out) {
   ist_status_t status = IST_OK;
   if (file != nullptr && *file != 0) {
-    out.tree = shared(std::string(file), [&](ist_tree_t& tree) {
+    out.tree = shared(std::string(file), [&](ist_asset_t& tree) {
       errno = 0;
-      return (status = ist_tree_load(file, nullptr, &tree)) >= 0;
+      return (status = ist_asset_load(file, nullptr, &tree)) >= 0;
     });
     if (out.tree) return true;
     if (status != IST_CANNOT_READ || errno != ENOENT) {
@@ -603,7 +603,7 @@ bool find_tree(const mjModel* m, const char* file, Instance& out) {
                   triangles.vertices.size() * sizeof triangles.vertices[0]);
   key.append(reinterpret_cast<const char*>(triangles.faces.data()),
              triangles.faces.size() * sizeof triangles.faces[0]);
-  out.tree = shared(key, [&](ist_tree_t& tree) { return triangles.bake(tree, message); });
+  out.tree = shared(key, [&](ist_asset_t& tree) { return triangles.bake(tree, message); });
   out.scale = 1;
   const char* const name = m->names + m->name_meshadr[mesh];
   if (!out.tree) {
@@ -675,8 +675,8 @@ int init(const mjModel* m, mjData* d, int i) {
     Shape& shape = made->shapes[static_cast<size_t>(geom)];
     shape.key = shape_key(type, m->geom_size + 3 * geom);
     std::string message;
-    shape.tree =
-        shared(shape.key, [&](ist_tree_t& tree) { return mesh_of(shape.key).bake(tree, message); });
+    shape.tree = shared(shape.key,
+                        [&](ist_asset_t& tree) { return mesh_of(shape.key).bake(tree, message); });
     if (shape.tree) continue;
     mju_warning("ist.solid: the shape of geom %d cannot be baked: %s", geom, message.c_str());
     return -1;

@@ -7,8 +7,8 @@
 #include <string>
 
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/mass_properties.h>
+#include <ist/types.h>
 
 #include "arrays.h"
 #include "library/asset_summary.h"
@@ -64,15 +64,8 @@ py::object spheres_of(const Asset& asset, const std::string& which) {
   return rows.handed_out();
 }
 
-PlacedTree placed(const Asset& asset, const py::object& pose, double scale) {
+PlacedAsset placed(const Asset& asset, const py::object& pose, double scale) {
   return {asset.view(), take_pose(pose, scale), scale};
-}
-
-/// Whether the mesh is kept, as the command line takes it.
-bool keeps_mesh(const py::object& given) {
-  const std::optional<bool> keeps = parse_surface(text_of(given));
-  if (!keeps) throw Error("surface: '" + text_of(given) + "' is not " + kSurfaceMeaning);
-  return *keeps;
 }
 
 constexpr const char* kSettingsDoc = R"(
@@ -87,8 +80,7 @@ grid: 'banded', 'uniform', 'explicit', 'implicit' or 'hybrid'.
 seed: breaks ties.
 threads: 0: all cores. The result does not depend on it.
 device: 'auto', 'cpu' or 'cuda'. The result does not depend on it.
-surface: surface kept in the asset: 'all', the mesh, or 'none'. Simplify the mesh first for a smaller
-    one.
+keep_mesh: keep the mesh in the asset, all of it. Simplify the mesh first for a smaller one.
 scale: as for close_mesh(). [u] is the unit of the scaled mesh.
 progress: called with a Progress on this thread; False cancels: packing then keeps its spheres,
     other stages raise Error. An exception that it raises is passed on.
@@ -150,7 +142,7 @@ void add_bake(py::module_& module, const char* name, const char* doc, std::size_
       [bake, rounds](const py::object& mesh, Given... given, std::size_t max_spheres,
                      double target_coverage, double min_radius, double time_limit, double epsilon,
                      const std::string& grid, std::uint64_t seed, unsigned threads,
-                     const std::string& device, const py::object& surface, const py::object& scale,
+                     const std::string& device, bool keep_mesh, const py::object& scale,
                      const py::object& progress) {
         PackingSettings settings;
         settings.max_spheres = max_spheres;
@@ -162,7 +154,7 @@ void add_bake(py::module_& module, const char* name, const char* doc, std::size_
         settings.seed = seed;
         settings.threads = threads;
         settings.device = named(device, "device", kDevices);
-        settings.keep_mesh = keeps_mesh(surface);
+        settings.keep_mesh = keep_mesh;
         return offline(
             [=, closed = closed_of(mesh, scale)](const ProgressCallback& callback) {
               return bake(*closed, settings, callback, given...);
@@ -172,7 +164,7 @@ void add_bake(py::module_& module, const char* name, const char* doc, std::size_
       py::arg("mesh"), more..., py::kw_only(), py::arg("max_spheres") = usual_spheres,
       py::arg("target_coverage") = 1.0, py::arg("min_radius") = 0.0, py::arg("time_limit") = 0.0,
       py::arg("epsilon") = 0.0, py::arg("grid") = "banded", py::arg("seed") = 0,
-      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("surface") = "all",
+      py::arg("threads") = 0, py::arg("device") = "auto", py::arg("keep_mesh") = true,
       py::arg("scale") = 1.0, py::arg("progress") = py::none(),
       (std::string(doc) + kSettingsDoc).c_str());
 }
@@ -214,19 +206,20 @@ void add_bakes(py::module_& module) {
       py::arg("relative_error") = ErrorTarget().relative_error,
       py::arg("at_overlap") = ErrorTarget().at_overlap);
   module.def(
-      "bake_surface",
+      "bake_mesh_only",
       [](const py::object& given, const py::object& scale, unsigned threads,
          const py::object& progress) {
         return offline(
             [mesh = closed_of(given, scale), threads](const ProgressCallback& callback) {
-              return bake_surface(*mesh, threads, callback);
+              return bake_mesh_only(*mesh, threads, callback);
             },
             progress);
       },
       py::arg("mesh"), py::kw_only(), py::arg("scale") = 1.0, py::arg("threads") = 0,
       py::arg("progress") = py::none(),
-      "Bakes a surface-only asset: the mesh, mass and bounds, without spheres, for exact "
-      "queries.\n\nQueries that need spheres return QueryStatus.not_held. The settings are those "
+      "Bakes the mesh alone: it, mass and bounds, without spheres, for exact "
+      "queries.\n\nQueries that need spheres return QueryStatus.missing_data. The settings are "
+      "those "
       "of bake().\nRaises Error if parts of the mesh overlap and cannot be resolved.");
   module.def(
       "check",
@@ -287,13 +280,13 @@ void add_assets(py::module_& module) {
           "The output of `ist info --json` as a dict: docs/json.md.")
       .def("__repr__",
            [](const Asset& self) {
-             const TreeView& view = self.view();
+             const AssetView& view = self.view();
              return "<ist.Asset: " + std::to_string(view.sphere_count()) + " spheres, volume " +
                     text_of(py::float_(view.volume())) + " u³, mesh of " +
                     std::to_string(view.mesh_triangles()) + " triangles>";
            })
       .def("__str__", [](const Asset& self) { return describe_asset(self.view()); })
-      .def("surface", &surface_of,
+      .def("mesh", &kept_mesh_of,
            "The kept mesh: (n, 3) float64 vertices [u] in the mesh's own frame, and (m, 3) uint32 "
            "triangles, counter-clockwise from outside. Raises Error where none is kept.")
       .def("spheres", &spheres_of, py::arg("which") = "matched",
@@ -334,7 +327,8 @@ void add_assets(py::module_& module) {
           "mesh_state", [](const Asset& self) { return name_of(self.view().mesh_state()); },
           "'own', 'resolved', 'polygonised', 'none', or 'unresolved' (its parts overlap).")
       .def_prop_ro(
-          "counted_twice", [](const Asset& self) { return self.view().counted_twice(); },
+          "self_overlap_volume",
+          [](const Asset& self) { return self.view().self_overlap_volume(); },
           "[u³] volume that the input mesh counts more than once.");
   add_bakes(module);
 }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "arrays.h"
 #include "clash/report.h"
@@ -63,14 +63,14 @@ py::object clash(const py::object& given, const py::object& poses, const py::obj
     part.solid.pose = take_pose(poses.is_none() ? poses : py::object(poses[i]), part.solid.scale);
     try {
       if (type_name_of(mesh) == "Asset") {
-        part.solid.tree = tree_of(mesh, "meshes");
-        if (!part.solid.tree.has_mesh()) throw Error("the asset keeps no mesh");
+        part.solid.asset = tree_of(mesh, "meshes");
+        if (!part.solid.asset.has_mesh()) throw Error("the asset keeps no mesh");
       } else {
         baked.push_back(offline(
             [closed = closed_of(mesh, py::float_(1.0)), threads](const ProgressCallback& progress) {
-              return std::make_shared<const Asset>(bake_surface(*closed, threads, progress));
+              return std::make_shared<const Asset>(bake_mesh_only(*closed, threads, progress));
             }));
-        part.solid.tree = baked.back()->view();
+        part.solid.asset = baked.back()->view();
       }
     } catch (const Error& error) {
       report.faults.emplace_back(part.name, error.what());

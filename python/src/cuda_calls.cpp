@@ -3,7 +3,7 @@
 #include <cuda.h>
 #include <cudaTypedefs.h>
 #include <cuda_runtime_api.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <map>
 #include <mutex>

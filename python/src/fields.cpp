@@ -3,12 +3,12 @@
 #include <memory>
 #include <utility>
 
-#include <ist/error.h>
-#include <ist/field.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 
 #include "arrays.h"
 #include "module.h"
-#include "query/field/sound_fields.h"
+#include "query/shape/sound_shapes.h"
 #include "solids.h"
 
 namespace ist::python {
@@ -16,15 +16,15 @@ namespace {
 
 /// A class of Python a kind of field, so that users see which one they hold.
 template <class Kind>
-struct OwnedKind : OwnedField {
+struct OwnedKind : OwnedShape {
   OwnedKind(Kind kind, py::dict arguments, std::shared_ptr<const void> owner = nullptr)
-      : OwnedField{std::move(kind), std::move(arguments), std::move(owner)} {}
+      : OwnedShape{std::move(kind), std::move(arguments), std::move(owner)} {}
 };
 
 template <class Kind>
-py::class_<OwnedKind<Kind>, OwnedField> add_kind(py::module_& module, const char* name,
+py::class_<OwnedKind<Kind>, OwnedShape> add_kind(py::module_& module, const char* name,
                                                  const char* doc) {
-  return py::class_<OwnedKind<Kind>, OwnedField>(module, name, doc);
+  return py::class_<OwnedKind<Kind>, OwnedShape>(module, name, doc);
 }
 
 /// Of all but grids and assets, which are large.
@@ -74,70 +74,71 @@ std::uint32_t points(std::size_t count) { return static_cast<std::uint32_t>(coun
 
 Solid solid_of(const py::handle& object, const char* name) {
   if (py::isinstance<Asset>(object)) return py::cast<const Asset&>(object).view();
-  if (py::isinstance<OwnedField>(object)) return py::cast<const OwnedField&>(object).field;
+  if (py::isinstance<OwnedShape>(object)) return py::cast<const OwnedShape&>(object).shape;
   throw type_error(std::string(name) + ": a " + type_name_of(object) +
-                   "; wanted an Asset or a Field");
+                   "; wanted an Asset or a Shape");
 }
 
-TreeView tree_of(const py::handle& object, const char* name) {
+AssetView tree_of(const py::handle& object, const char* name) {
   const Solid solid = solid_of(object, name);
-  if (const TreeView* const tree = std::get_if<TreeView>(&solid)) return *tree;
-  throw type_error(std::string(name) + ": a Field; wanted an Asset");
+  if (const AssetView* const tree = std::get_if<AssetView>(&solid)) return *tree;
+  throw type_error(std::string(name) + ": a Shape; wanted an Asset");
 }
 
 void add_fields(py::module_& module) {
-  py::class_<OwnedField>(module, "Field",
+  py::class_<OwnedShape>(module, "Shape",
                          "A shape that needs no asset: one of the two solids of a query; the other "
-                         "is an Asset. Lengths are [u] in the field's own frame.")
+                         "is an Asset. Lengths are [u] in the shape's own frame.")
       .def("__repr__",
            [](const py::object& self) {
              return "ist." + type_name_of(self) + "(" +
-                    text_of_arguments(py::cast<const OwnedField&>(self).arguments) + ")";
+                    text_of_arguments(py::cast<const OwnedShape&>(self).arguments) + ")";
            })
       .def("__reduce__", [](const py::object& self) {
-        const py::dict& arguments = py::cast<const OwnedField&>(self).arguments;
+        const py::dict& arguments = py::cast<const OwnedShape&>(self).arguments;
         const py::object partial = py::module_::import_("functools").attr("partial");
         return py::make_tuple(partial(self.type(), **arguments), py::make_tuple());
       });
-  add_kind<HalfSpaceField>(module, "HalfSpaceField", "The solid normal · x ≤ offset. Exact.")
+  add_kind<HalfSpaceShape>(module, "HalfSpaceShape", "The solid normal · x ≤ offset. Exact.")
       .def(py::new_([](const py::object& normal, double offset) {
-             return sound(HalfSpaceField{take_vector(normal, "normal"), offset},
+             return sound(HalfSpaceShape{take_vector(normal, "normal"), offset},
                           "finite numbers and a normal of any length but 0",
                           {{"normal", normal}, {"offset", py::float_(offset)}});
            }),
            py::arg("normal") = py::make_tuple(0.0, 0.0, 1.0), py::arg("offset") = 0.0,
            "normal: (3,) outward, of any length but 0, by which the offset is divided too. "
            "offset: [u].");
-  add_kind<BoxField>(module, "BoxField", "A box around the origin. Exact.")
+  add_kind<BoxShape>(module, "BoxShape", "A box around the origin. Exact.")
       .def(py::new_([](const py::object& half_extents) {
-             return sound(BoxField{take_vector(half_extents, "half_extents")}, "(3,) > 0",
+             return sound(BoxShape{take_vector(half_extents, "half_extents")}, "(3,) > 0",
                           {{"half_extents", half_extents}});
            }),
            py::arg("half_extents"), "half_extents: (3,) [u] > 0.");
-  add_kind<BallField>(module, "BallField", "A ball around the origin. Exact.")
+  add_kind<BallShape>(module, "BallShape", "A ball around the origin. Exact.")
       .def(py::new_([](double radius) {
-             return sound(BallField{radius}, "> 0", {{"radius", py::float_(radius)}});
+             return sound(BallShape{radius}, "> 0", {{"radius", py::float_(radius)}});
            }),
            py::arg("radius"), "radius: [u] > 0.");
-  add_kind<CapsuleField>(module, "CapsuleField",
+  add_kind<CapsuleShape>(module, "CapsuleShape",
                          "All points within `radius` of the segment from −half_height to "
                          "+half_height on the z axis.")
       .def(py::new_([](double radius, double half_height) {
              return sound(
-                 CapsuleField{radius, half_height}, "a radius > 0 and a half_height ≥ 0",
+                 CapsuleShape{radius, half_height}, "a radius > 0 and a half_height ≥ 0",
                  {{"radius", py::float_(radius)}, {"half_height", py::float_(half_height)}});
            }),
            py::arg("radius"), py::arg("half_height"), "radius: [u] > 0. half_height: [u] ≥ 0.");
-  add_kind<CylinderField>(module, "CylinderField", "A cylinder about the z axis.")
+  add_kind<CylinderShape>(module, "CylinderShape", "A cylinder about the z axis.")
       .def(py::new_([](double radius, double half_height) {
              return sound(
-                 CylinderField{radius, half_height}, "both > 0",
+                 CylinderShape{radius, half_height}, "both > 0",
                  {{"radius", py::float_(radius)}, {"half_height", py::float_(half_height)}});
            }),
            py::arg("radius"), py::arg("half_height"), "radius, half_height: [u] > 0.");
-  add_kind<HeightField>(module, "HeightField",
-                        "Terrain: the solid under a grid of heights along z. It continues level "
-                        "beyond its border.")
+  add_kind<HeightFieldShape>(
+      module, "HeightFieldShape",
+      "Terrain: the solid under a grid of heights along z. It continues level "
+      "beyond its border.")
       .def(
           py::new_([](const py::object& heights, const py::object& spacing, double lowest,
                       double highest) {
@@ -146,12 +147,12 @@ void add_fields(py::module_& module) {
             const Doubles steps = take_doubles(spacing, "spacing", "(2,)");
             if (steps.ndim() != 1 || steps.shape(0) != 2) refuse_shape(steps, "spacing", "(2,)");
             check_grid(grid, "heights", lowest, highest);
-            return sound(HeightField{grid.data(),
-                                     points(grid.shape(1)),
-                                     points(grid.shape(0)),
-                                     {steps.data()[0], steps.data()[1]},
-                                     lowest,
-                                     highest},
+            return sound(HeightFieldShape{grid.data(),
+                                          points(grid.shape(1)),
+                                          points(grid.shape(0)),
+                                          {steps.data()[0], steps.data()[1]},
+                                          lowest,
+                                          highest},
                          "spacing > 0, lowest ≤ highest and at most 2**20 points along each axis",
                          {{"heights", heights},
                           {"spacing", spacing},
@@ -164,8 +165,8 @@ void add_fields(py::module_& module) {
           "heights: (rows along y, columns along x) [u]; a float32 array in C order is not "
           "copied.\nspacing: (2,) [u] > 0 along x and y; heights[0, 0] is at the origin.\n"
           "lowest, highest: [u] bounds on all heights, by which far objects are rejected quickly.");
-  add_kind<DistanceGridField>(module, "DistanceGridField",
-                              "Distances at the points of a grid, positive inside, interpolated "
+  add_kind<DistanceGridShape>(module, "DistanceGridShape",
+                              "Distances at the points of a grid, negative inside, interpolated "
                               "linearly. Points outside the grid are outside the solid.")
       .def(py::new_([](const py::object& distances, const py::object& origin, double spacing,
                        double error) {
@@ -173,7 +174,7 @@ void add_fields(py::module_& module) {
              if (grid.ndim() != 3) refuse_shape(grid, "distances", "(z, y, x)");
              check_grid(grid, "distances", -HUGE_VAL, HUGE_VAL);
              return sound(
-                 DistanceGridField{
+                 DistanceGridShape{
                      grid.data(),
                      {points(grid.shape(2)), points(grid.shape(1)), points(grid.shape(0))},
                      take_vector(origin, "origin"),

@@ -1,7 +1,7 @@
 #pragma once
 
-#include <ist/error.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include <cstddef>
 #include <deque>

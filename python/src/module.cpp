@@ -2,7 +2,7 @@
 
 #include "module.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <ist/version.h>
 
 #include "library/bake_revision.h"

@@ -1,5 +1,5 @@
 // In a build without CUDA: nothing is on a device, so that nobody comes further than to be told.
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "cuda_calls.h"
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include <ist/progress.h>
+#include <ist/types.h>
 
 #include "arrays.h"
 

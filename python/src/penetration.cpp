@@ -4,8 +4,8 @@
 #include <cmath>
 #include <memory>
 
-#include <ist/field.h>
-#include <ist/wrench.h>
+#include <ist/contact_law.h>
+#include <ist/shapes.h>
 
 #include "gpu_batch.h"
 
@@ -50,9 +50,7 @@ ScaleGradient scale_gradient(const Row& row, const Penetration& answer,
   gradient.b = (volume(row.b.scale + step) - volume(row.b.scale - step)) / (2 * step);
   const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(row.b.pose.t) -
                               Eigen::Map<const Eigen::Vector3d>(row.a.pose.t);
-  gradient.a =
-      (3 * answer.volume - row.b.scale * gradient.b - way.dot(answer.translation_gradient)) /
-      row.a.scale;
+  gradient.a = (3 * answer.volume - row.b.scale * gradient.b + way.dot(answer.force)) / row.a.scale;
   return gradient;
 }
 
@@ -81,7 +79,7 @@ std::shared_ptr<Penetrations> answer(const Rows& rows, const PenetrationSettings
 constexpr const char* kDoc =
     R"(Volume, wrench and centroid of the overlap, for one pose or many.
 
-a, b: Assets, or an Asset and a Field; for rows of different solids, solids[indices].
+a, b: Assets, or an Asset and a Shape; for rows of different solids, solids[indices].
 poses: of B, (7,) or (n, 7): qw, qx, qy, qz, tx [u], ty, tz, or matrices (4, 4) or (n, 4, 4).
     Quaternions of any length but 0 are normalised. A C-ordered float64 array of rows is not copied.
     ist.poses() makes rows of other conventions.
@@ -91,7 +89,7 @@ measure: 'matched' (the accurate spheres), 'inner' (certified lower bound of the
     'exact' (the true volume and its gradients: of two Assets that hold their mesh, which bake()
     keeps by default; max_visits is its only limit).
 spheres_only: 'matched' alone: spheres answer even where they are too coarse for the contact of two
-    Assets of unlike sizes, and may be wrong by any factor (pair_fit). False: there the meshes do, if
+    Assets of unlike sizes, and may be wrong by any factor (size_match). False: there the meshes do, if
     both hold theirs. On a GPU spheres always answer.
 pair_budget, max_visits: cost limits; 0: no limit. See <ist/query.h>.
 relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, of two Assets with
@@ -105,13 +103,13 @@ pair_id: your id of this pair of solids, 0: none. Calls with the same id, and th
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
-quaternion of length 0, a scale ≤ 0. not_held: a solid lacks what the measure needs, or both
-are Fields. For one pose ValueError or ist.Error is raised instead.
+quaternion of length 0, a scale ≤ 0. missing_data: a solid lacks what the measure needs, or both
+are Shapes. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there;
 unsupported arguments raise. A GPU takes the measures 'matched' and 'inner', and pair_budget.
-Two Assets are summed as with spheres_only=True. Volumes are within 1e-6 of the sum in double, and of an Asset and a Field within
+Two Assets are summed as with spheres_only=True. Volumes are within 1e-6 of the sum in double, and of an Asset and a Shape within
 1e-9 of the CPU's. The bits are the same in every run, whatever else is in the batch.
 Arrays are of any framework, in that device's memory and in C order: poses (n, 7) and scales (n,)
 float64, indices uint32 or int32. They are read by __dlpack__ or __cuda_array_interface__, never
@@ -161,7 +159,7 @@ void add_class(py::module_& module) {
   add_column(type, "status", &Penetrations::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Penetrations::node_visits, "(n,) uint32, node pairs opened.");
   add_column(type, "sphere_pairs", &Penetrations::sphere_pairs,
-             "(n,) uint32, lenses summed and spheres overlapped with a Field; with "
+             "(n,) uint32, lenses summed and spheres overlapped with a Shape; with "
              "measure='exact' intersecting triangles.");
   add_pickling(type);
 }
@@ -179,10 +177,7 @@ void Penetrations::write(std::size_t i, const Row& row, const Penetration& answe
   if (!touches) return;
   const Eigen::Vector3d origin_a(row.a.pose.t), origin_b(row.b.pose.t);
   const Wrenches push = wrenches(answer, row.b.pose, origin_a, origin_b);
-  force.write(i, push.on_b.force);
-  torque.write(i, push.on_b.torque);
-  write_pose_gradient(row.b.pose, answer.translation_gradient, answer.rotation_gradient,
-                      pose_gradient.row(i));
+  write_pose_gradient(row.b.pose, -answer.force, -answer.torque, pose_gradient.row(i));
   write_pose_gradient(row.a.pose, -push.on_a.force, -push.on_a.torque, pose_gradient_a.row(i));
 }
 

@@ -1,13 +1,13 @@
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <ist/lenses.h>
-#include <ist/pair_fit.h>
+#include <ist/mass_properties.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "penetration.h"
 #include "query/base/relative_pose.h"
@@ -28,8 +28,8 @@ std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const p
                                const py::object& pose_a, double scale, double scale_a,
                                const std::string& measure, unsigned detail_a, unsigned detail_b) {
   if (pose.is_none()) take_poses(pose, "pose", "(7,) or (4, 4)");
-  const PlacedTree first{tree_of(a, "a"), take_pose(pose_a, scale_a), scale_a};
-  const PlacedTree second{tree_of(b, "b"), take_pose(pose, scale), scale};
+  const PlacedAsset first{tree_of(a, "a"), take_pose(pose_a, scale_a), scale_a};
+  const PlacedAsset second{tree_of(b, "b"), take_pose(pose, scale), scale};
   const LensSettings settings{named(measure, "measure", kGpuMeasures), detail_a, detail_b};
   std::vector<OverlapLens> room(4096);
   OverlapLenses found;
@@ -41,8 +41,8 @@ std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const p
       found = overlap_lenses(first, second, settings, room);
     }
   }
-  if (found.status == QueryStatus::not_held)
-    throw Error("a, b: one is a surface alone, without spheres; bake it with bake()");
+  if (found.status == QueryStatus::missing_data)
+    throw Error("a, b: one is a mesh alone, without spheres; bake it with bake()");
   if (found.status == QueryStatus::invalid_input)
     throw value_error("pose, detail_a, detail_b: too far away, or an asset has no such detail");
   auto answers = std::make_unique<Lenses>(Lenses{{found.count}});
@@ -59,11 +59,9 @@ std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& r
     const Row row = rows.at(i);
     for (const Side* const side : {&row.a, &row.b})
       if (side->tree() == nullptr)
-        throw type_error(std::string(side == &row.a ? "a" : "b") + ": a Field; wanted an Asset");
+        throw type_error(std::string(side == &row.a ? "a" : "b") + ": a Shape; wanted an Asset");
     Penetration before;
     for_each_member([i](auto& value, const auto& column) { column.read(i, value); }, before, whole);
-    before.translation_gradient = -whole.force.vector(i);
-    before.rotation_gradient = -whole.torque.vector(i);
     answers->write(i, row,
                    without_protrusion(before, {*row.a.tree(), row.a.pose, row.a.scale},
                                       {*row.b.tree(), row.b.pose, row.b.scale}));
@@ -71,29 +69,30 @@ std::shared_ptr<Penetrations> corrected(const Penetrations& whole, const Rows& r
   return answers;
 }
 
-PairFit fit_of(const py::object& a, const py::object& b, double scale, double scale_a) {
+SizeMatch fit_of(const py::object& a, const py::object& b, double scale, double scale_a) {
   take_pose(py::none(), scale_a);
   take_pose(py::none(), scale);
-  return pair_fit(PlacedTree{tree_of(a, "a"), {}, scale_a}, PlacedTree{tree_of(b, "b"), {}, scale});
+  return size_match(PlacedAsset{tree_of(a, "a"), {}, scale_a},
+                    PlacedAsset{tree_of(b, "b"), {}, scale});
 }
 
 }  // namespace
 
-py::tuple surface_of(const Asset& asset) {
+py::tuple kept_mesh_of(const Asset& asset) {
   const std::span<const std::byte> bytes = asset.bytes();
-  ist_tree_t tree = {};
-  ist_surface_t surface = {};
+  ist_asset_t tree = {};
+  ist_mesh_t surface = {};
   surface.size = sizeof surface;
-  if (ist_tree_view(bytes.data(), bytes.size(), &tree) != IST_OK ||
-      ist_tree_get_surface(&tree, &surface) != IST_OK || surface.triangle_count == 0)
-    throw Error("the asset holds no mesh; bake it with surface='all'");
+  if (ist_asset_view(bytes.data(), bytes.size(), &tree) != IST_OK ||
+      ist_asset_get_mesh(&tree, &surface) != IST_OK || surface.triangle_count == 0)
+    throw Error("the asset holds no mesh; bake it with keep_mesh=True");
   const Column<double, 3> vertices({surface.vertex_count});
   const Column<std::uint32_t, 3> triangles({surface.triangle_count});
   surface.vertices = reinterpret_cast<double(*)[3]>(vertices.row(0));
   surface.triangles = reinterpret_cast<std::uint32_t(*)[3]>(triangles.row(0));
   surface.vertex_capacity = surface.vertex_count;
   surface.triangle_capacity = surface.triangle_count;
-  ist_tree_get_surface(&tree, &surface);
+  ist_asset_get_mesh(&tree, &surface);
   return py::make_tuple(vertices.handed_out(), triangles.handed_out());
 }
 
@@ -139,21 +138,22 @@ conserved.
 
 Returns a Penetration.)");
 
-  py::class_<PairFit>(module, "PairFit", "Whether the sizes of two assets suit each other.")
-      .def_ro("grain_a", &PairFit::grain_a,
+  py::class_<SizeMatch>(module, "SizeMatch", "Whether the sizes of two assets suit each other.")
+      .def_ro("feature_size_a", &SizeMatch::feature_size_a,
               "[u] mean radius of A's spheres over the share of the solid that they cover: finer "
               "features are not resolved.")
-      .def_ro("grain_b", &PairFit::grain_b, "[u] likewise.")
-      .def_ro("ratio", &PairFit::ratio, "≥ 1, the coarser grain over the finer.")
-      .def_ro("a_is_coarser", &PairFit::a_is_coarser, "Or both are equal.")
-      .def_ro("has_mesh", &PairFit::has_mesh, "Whether both assets hold their meshes.")
-      .def_ro("needs_mesh", &PairFit::needs_mesh,
+      .def_ro("feature_size_b", &SizeMatch::feature_size_b, "[u] likewise.")
+      .def_ro("ratio", &SizeMatch::ratio, "≥ 1, the coarser grain over the finer.")
+      .def_ro("a_is_coarser", &SizeMatch::a_is_coarser, "Or both are equal.")
+      .def_ro("has_mesh", &SizeMatch::has_mesh, "Whether both assets hold their meshes.")
+      .def_ro("needs_mesh", &SizeMatch::needs_mesh,
               "Whether volumes and forces by spheres alone are misleading.")
-      .def_prop_ro("fits", &PairFit::fits, "has_mesh, or not needs_mesh.");
-  module.def("pair_fit", &fit_of, py::arg("a"), py::arg("b"), py::kw_only(), py::arg("scale") = 1.0,
-             py::arg("scale_a") = 1.0,
-             "Whether the sizes of two Assets suit each other, whatever their poses: a PairFit.\n\n"
-             "scale, scale_a: of B and of A.");
+      .def_prop_ro("fits", &SizeMatch::fits, "has_mesh, or not needs_mesh.");
+  module.def(
+      "size_match", &fit_of, py::arg("a"), py::arg("b"), py::kw_only(), py::arg("scale") = 1.0,
+      py::arg("scale_a") = 1.0,
+      "Whether the sizes of two Assets suit each other, whatever their poses: a SizeMatch.\n\n"
+      "scale, scale_a: of B and of A.");
 }
 
 }  // namespace ist::python

@@ -13,7 +13,7 @@
 #include <thread>
 
 #include <ist/asset_layout.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "query/base/batch.h"
 #include "query/base/relative_pose.h"
@@ -95,7 +95,7 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
   rows.a_ = Choice(a, "a");
   rows.b_ = Choice(b, "b");
   const auto is_field = [](const Choice& side) {
-    return side.step == 0 && std::holds_alternative<Field>(side.among[0]);
+    return side.step == 0 && std::holds_alternative<ist::Shape>(side.among[0]);
   };
   if (is_field(rows.a_) && is_field(rows.b_))
     throw type_error("a, b: two Fields; one of them must be an Asset");
@@ -168,7 +168,7 @@ void Rows::sort_by_asset() {
   constexpr std::uint64_t kCache = 32u << 20;
   if (a_.step + b_.step == 0) return;
   const auto header = [](const Solid& solid) -> const AssetHeader* {
-    const TreeView* const tree = std::get_if<TreeView>(&solid);
+    const AssetView* const tree = std::get_if<AssetView>(&solid);
     return tree != nullptr ? &tree->header() : nullptr;
   };
   std::set<const AssetHeader*> assets;
@@ -212,7 +212,7 @@ std::string fault_of(const Row& row, const char* name) {
   const Side& asset = row.b.tree() != nullptr ? row.b : row.a;
   const Side& other = row.b.tree() != nullptr ? row.a : row.b;
   if (asset.tree() == nullptr) return {};
-  const PlacedTree placed{*asset.tree(), asset.pose, asset.scale};
+  const PlacedAsset placed{*asset.tree(), asset.pose, asset.scale};
   const bool near =
       other.tree() != nullptr
           ? relative_pose({*other.tree(), other.pose, other.scale}, placed).has_value()
@@ -226,21 +226,21 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked) {
   const Row row = rows.at(0);
   if (status == QueryStatus::invalid_input) {
     const std::string fault = fault_of(row);
-    throw value_error(fault.empty() ? "a, b: the Field has a number that is not finite" : fault);
+    throw value_error(fault.empty() ? "a, b: the Shape has a number that is not finite" : fault);
   }
-  if (status != QueryStatus::not_held) return;
+  if (status != QueryStatus::missing_data) return;
   for (const Side* const side : {&row.b, &row.a}) {
-    const TreeView* const tree = side->tree();
+    const AssetView* const tree = side->tree();
     const std::string name = side == &row.a ? "a" : "b";
     if (asked != Measure::exact) {
       if (tree != nullptr && tree->sphere_count() == 0)
         throw Error(name +
-                    ": is a surface alone, without spheres; use penetration() with "
+                    ": is a mesh alone, without spheres; use penetration() with "
                     "measure='exact', or bake it with bake()");
     } else if (tree == nullptr) {
-      throw Error(name + ": a Field has no mesh, which measure='exact' needs; pass an Asset");
+      throw Error(name + ": a Shape has no mesh, which measure='exact' needs; pass an Asset");
     } else if (!tree->has_mesh()) {
-      throw Error(name + ": has no mesh, which measure='exact' needs; bake it with surface='all'");
+      throw Error(name + ": has no mesh, which measure='exact' needs; bake it with keep_mesh=True");
     }
   }
 }

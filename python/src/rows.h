@@ -20,8 +20,8 @@ struct Side {
   Pose pose;
   double scale = 1;
 
-  /// Null: a field.
-  const TreeView* tree() const { return std::get_if<TreeView>(solid); }
+  /// Null: a shape.
+  const AssetView* tree() const { return std::get_if<AssetView>(solid); }
   PlacedSolid placed() const {
     return std::visit([&](const auto& what) { return PlacedSolid(what, pose, scale); }, *solid);
   }
@@ -37,7 +37,7 @@ class Rows {
  public:
   /// B at each pose beside A. Arguments of one row serve all rows.
   ///
-  /// `a`, `b`: an Asset, a Field, or SolidRows on the CPU. `poses`, `poses_a`: (7,), (n, 7), (4, 4)
+  /// `a`, `b`: an Asset, a Shape, or SolidRows on the CPU. `poses`, `poses_a`: (7,), (n, 7), (4, 4)
   /// or (n, 4, 4); poses_a None: at the origin. `scales`, `scales_a`: a number or (n,), None: 1.
   /// `name`: of `poses`.
   static Rows of_pair(const py::object& a, const py::object& b, const py::object& poses,
@@ -74,7 +74,7 @@ class Rows {
       return among[step == 0 ? 0 : static_cast<std::size_t>(indices.data()[i])];
     }
 
-    std::vector<Solid> own;  // of an Asset or a Field
+    std::vector<Solid> own;  // of an Asset or a Shape
     py::object owner;
     std::span<const Solid> among;  // these, or those of ist.Solids
     Integers indices;

@@ -1,6 +1,6 @@
-#include <ist/error.h>
 #include <ist/query_tbb.h>
 #include <ist/scene.h>
+#include <ist/types.h>
 
 #include <map>
 #include <memory>
@@ -145,7 +145,7 @@ std::size_t workers_of(unsigned threads) {
 std::unique_ptr<PyScene> replay(const py::bytes& record, const py::object& assets,
                                 unsigned threads) {
   const py::list given(assets);
-  std::vector<TreeView> trees;
+  std::vector<AssetView> trees;
   for (const py::handle asset : given) trees.push_back(tree_of(asset, "assets"));
   auto out = std::make_unique<PyScene>(
       Scene::replay({reinterpret_cast<const std::byte*>(record.c_str()), record.size()}, trees,
@@ -182,7 +182,7 @@ void add_scenes(py::module_& module) {
   add_column(type, "begins", &SceneAnswers::begins,
              "(n,) bool: they did not meet in the step before.");
   add_column(type, "overlapping", &SceneAnswers::overlapping,
-             "(n,) uint32, an Overlapping, of pairs whose rule is 'overlap'.");
+             "(n,) uint32, a YesNo, of pairs whose rule is 'overlap'.");
   add_inner(type, "penetration", &SceneAnswers::penetration,
             "Penetration of n rows; zero where the rule asks none.");
   add_inner(type, "separation", &SceneAnswers::separation,
@@ -212,10 +212,10 @@ void add_scenes(py::module_& module) {
       .def("add", add, py::arg("solid"), py::arg("pose") = py::none(), py::kw_only(),
            py::arg("scale") = 1.0, py::arg("number") = py::none(), py::arg("moves") = true,
            py::arg("group") = 0, py::arg("layers") = 1, py::arg("meets") = ~0u,
-           "Adds an Asset or a Field at a pose; None: at the origin. Returns its number: `number`, "
+           "Adds an Asset or a Shape at a pose; None: at the origin. Returns its number: `number`, "
            "or the first that is above all others. Two bodies that do not move are not asked, nor "
            "are two "
-           "Fields. "
+           "Shapes. "
            "group: selects the rule of a pair. layers, meets: bits; each of a pair must be on a "
            "layer that the other meets.")
       .def(

@@ -1,6 +1,5 @@
-#include <ist/field.h>
-#include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include <memory>
 #include <optional>
@@ -32,7 +31,7 @@ struct Patches {
   Column<std::uint64_t> id{patches};
   Column<double, 3> centroid{patches}, normal{patches}, force{patches}, torque{patches},
       point{patches};
-  Column<double> area{patches}, depth{patches}, volume{patches}, twist{patches};
+  Column<double> area{patches}, depth{patches}, volume{patches}, torsion{patches};
 
   explicit Patches(const Shape& of = {}, std::size_t each = 0)
       : rows(of), patches(with(of, each)) {}
@@ -88,8 +87,8 @@ std::unique_ptr<Outline> outline(const Rows& rows, std::size_t each,
   for_each_row(rows, 1, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
     const auto ask = [&]() -> OverlapOutline {
-      const TreeView *const a = row.a.tree(), *const b = row.b.tree();
-      if (a == nullptr || b == nullptr)  // a Field holds no mesh
+      const AssetView *const a = row.a.tree(), *const b = row.b.tree();
+      if (a == nullptr || b == nullptr)  // a Shape holds no mesh
         return {contact_patches(row.a.placed(), row.b.placed(), settings, workspace, patches), 0};
       return overlap_outline({*a, row.a.pose, row.a.scale}, {*b, row.b.pose, row.b.scale}, settings,
                              workspace, patches, segments);
@@ -119,8 +118,10 @@ py::object overlaps(const Rows& rows, double margin, unsigned threads) {
     refuse_unanswered(rows, QueryStatus::invalid_input);
   for_each_row(rows, threads, [&](std::size_t i, Workspace& workspace) {
     const Row row = rows.at(i);
-    answers.write(i, margin > 0 ? overlap(row.a.placed(), row.b.placed(), margin, workspace)
-                                : overlap(row.a.placed(), row.b.placed(), workspace));
+    const YesNoAnswer found = margin > 0
+                                  ? overlap(row.a.placed(), row.b.placed(), margin, workspace)
+                                  : overlap(row.a.placed(), row.b.placed(), workspace);
+    answers.write(i, found.answer);
   });
   return answers.handed_out();
 }
@@ -136,7 +137,7 @@ max_distance: [u] of solids that are certain to be farther apart the answer says
 pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps of
     one motion: between surfaces the nearest triangles are kept from step to step. Same answers.
 
-Solids on a GPU: of two Assets; a row of a Field is not_held, and max_distance raises. The CPU's default
+Solids on a GPU: of two Assets; a row of a Shape is missing_data, and max_distance raises. The CPU's default
 is another distance, that of the surfaces. On a GPU it is always that of the inner
 spheres, so inner_spheres=False raises: the minimum over all pairs in double. The CPU's may be larger by
 1e-6 of the solids' size, and among equally near pairs the two may differ. A stopped row's interval may
@@ -150,7 +151,7 @@ constexpr const char* kPatchesDoc =
 Arguments as for penetration(). The patches sum to the whole contact. max_patches:
 on the CPU any number from 1.
 
-Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Field is not_held. Beyond
+Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Shape is missing_data. Beyond
 count[i] a pair's patches are zero, or unchanged with `out`.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
@@ -170,7 +171,7 @@ Arguments as for penetration(). Costs a fraction of a penetration query.
 margin: [u] whether they come within this of each other: by their surfaces, if both Assets keep a mesh.
     0: whether inner spheres meet, or no covers do.
 
-Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown, also for invalid rows; a number for one
+Returns (n,) uint32, a YesNo: 0 no, 1 yes, 2 unknown, also for invalid rows; a number for one
 pose.)";
 
 void add_classes(py::module_& module) {
@@ -214,7 +215,7 @@ void add_classes(py::module_& module) {
   add_column(patch, "point", &Patches::point,
              "(n, m, 3) [u] world: the point of the wrench's central axis that is nearest to the "
              "centroid.");
-  add_column(patch, "twist", &Patches::twist,
+  add_column(patch, "torsion", &Patches::torsion,
              "(n, m) [u³] residual moment about the normal of a force at `point`.");
   add_pickling(patch);
 

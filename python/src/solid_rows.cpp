@@ -37,7 +37,7 @@ Solids::Solids(const py::sequence& solids, const std::string& device) {
     const std::string name = "solids[" + std::to_string(views.size()) + "]";
     views.push_back(solid_of(solid, name.c_str()));
     owners.push_back(py::borrow<py::object>(solid));
-    if (std::holds_alternative<Field>(views.back())) fields.push_back(views.size() - 1);
+    if (std::holds_alternative<ist::Shape>(views.back())) shapes.push_back(views.size() - 1);
   }
   count = views.size();
   if (number < 0) return;
@@ -87,7 +87,7 @@ void add_solid_rows(py::module_& module) {
             return std::make_unique<Solids>(solids, text_of(device));
           }),
           py::arg("solids"), py::kw_only(), py::arg("device") = "cpu",
-          "solids: an ist.Asset or ist.Field each. device: 'cpu', 'cuda', 'cuda:1', …, or a device "
+          "solids: an ist.Asset or ist.Shape each. device: 'cpu', 'cuda', 'cuda:1', …, or a device "
           "of PyTorch. A GPU gets a copy; batches "
           "of one Solids run there one after another, on any streams, because they share working "
           "memory. Keep it alive as long as captured graphs use it. Raises ist.Error if the device "
@@ -122,8 +122,8 @@ void add_solid_rows(py::module_& module) {
           py::arg("index"))
       .def_prop_ro("device", &Solids::device, "'cpu' or 'cuda:0', …")
       .def_prop_ro(
-          "fields", [](const Solids& self) { return self.fields; },
-          "Indices of those that are Fields.")
+          "shapes", [](const Solids& self) { return self.shapes; },
+          "Indices of those that are Shapes.")
       .def_prop_ro(
           "bytes",
           [](const Solids& self) {

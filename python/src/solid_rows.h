@@ -18,7 +18,7 @@ struct Solids {
   std::string device() const;
 
   std::size_t count;
-  std::vector<std::size_t> fields;  ///< which of them are Fields
+  std::vector<std::size_t> shapes;  ///< which of them are Shapes
   // On the CPU, with whoever owns what they view:
   std::vector<Solid> views;
   std::vector<py::object> owners;

@@ -1,10 +1,10 @@
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include <algorithm>
 #include <limits>
 #include <memory>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "penetration.h"
 
@@ -59,7 +59,7 @@ void ask_places(const PlacedSolid& placed, const Shape& shape, const char* place
     const std::size_t count = shape.empty() ? 1 : shape[0];
     for (std::size_t i = 0; i < count && held; ++i) {
       const QueryStatus status = ask(placed, i);
-      held = status != QueryStatus::not_held;
+      held = status != QueryStatus::missing_data;
       valid = status != QueryStatus::invalid_input;
     }
   }
@@ -67,21 +67,21 @@ void ask_places(const PlacedSolid& placed, const Shape& shape, const char* place
     throw value_error(std::string(places) + ": not finite, of length 0, or too far away");
   if (!held)
     throw Error(
-        "solid: has no mesh, or is a Field that no ray can be cast at; bake it with its mesh, or "
-        "use another Field");
+        "solid: has no mesh, or is a Shape that no ray can be cast at; bake it with its mesh, or "
+        "use another Shape");
 }
 
 constexpr const char* kRaycastDoc = R"(Where rays meet a solid's surface first.
 
-solid: an Asset that keeps its mesh, or a Field (half-space, ball, box, capsule, cylinder).
+solid: an Asset that keeps its mesh, or a Shape (half-space, ball, box, capsule, cylinder).
 pose: (7,), None: at the origin. origins, directions: (3,) or (n, 3) [u], world; directions of any
-length but 0. longest: [u] rays end there. A ray that starts inside meets the surface on its way out.
+length but 0. max_distance: [u] rays end there. A ray that starts inside meets the surface on its way out.
 
 Returns RayHits: arrays of one row a ray, or numbers and (3,) arrays for one ray.)";
 
 constexpr const char* kClosestPointDoc = R"(Signed distance, nearest point and gradient.
 
-solid, pose: as for raycast(); any Field. points: (3,) or (n, 3) [u], world.
+solid, pose: as for raycast(); any Shape. points: (3,) or (n, 3) [u], world.
 
 Returns SurfacePoints: arrays of one row a point, or numbers and (3,) arrays for one point.)";
 
@@ -89,7 +89,7 @@ constexpr const char* kContainsDoc = R"(Whether points are inside a solid.
 
 Arguments as for closest_point().
 
-Returns (n,) uint32, an Overlapping: 0 no, 1 yes, 2 unknown: invalid point; a number for one point.)";
+Returns (n,) uint32, a YesNo: 0 no, 1 yes, 2 unknown: invalid point; a number for one point.)";
 
 }  // namespace
 
@@ -99,7 +99,7 @@ void add_surfaces(py::module_& module) {
   add_column(hits, "point", &RayHits::point, "(n, 3) [u] world; zero without a hit.");
   add_column(hits, "normal", &RayHits::normal, "(n, 3) unit, outward, world.");
   add_column(hits, "triangle", &RayHits::triangle,
-             "(n,) uint32, of the kept mesh; 2**32 - 1: no hit, or a Field.");
+             "(n,) uint32, of the kept mesh; 2**32 - 1: no hit, or a Shape.");
   add_column(hits, "status", &RayHits::status, "(n,) uint32, a QueryStatus.");
   add_pickling(hits);
   py::class_<SurfacePoints> points(module, "SurfacePoints", "Nearest points of a surface.");
@@ -116,7 +116,7 @@ void add_surfaces(py::module_& module) {
   module.def(
       "raycast",
       [](const py::object& solid, const py::object& pose, const py::object& origins,
-         const py::object& directions, double longest, double scale) {
+         const py::object& directions, double max_distance, double scale) {
         const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places from(origins, "origins"), along(directions, "directions");
         if (!from.rows.empty() && !along.rows.empty() && from.count != along.count)
@@ -124,16 +124,16 @@ void add_surfaces(py::module_& module) {
                             std::to_string(from.count));
         const Shape& shape = from.rows.empty() ? along.rows : from.rows;
         auto answers = std::make_unique<RayHits>(RayHits{shape});
-        ask_places(placed, shape, "origins, directions, longest",
+        ask_places(placed, shape, "origins, directions, max_distance",
                    [&](const PlacedSolid& at, std::size_t i) {
-                     const RayHit hit = raycast(at, Ray{from.at(i), along.at(i), longest});
+                     const RayHit hit = raycast(at, Ray{from.at(i), along.at(i), max_distance});
                      write_row(*answers, i, hit);
                      return hit.status;
                    });
         return answers;
       },
       py::arg("solid"), py::arg("pose").none(), py::arg("origins"), py::arg("directions"),
-      py::kw_only(), py::arg("longest") = std::numeric_limits<double>::infinity(),
+      py::kw_only(), py::arg("max_distance") = std::numeric_limits<double>::infinity(),
       py::arg("scale") = 1.0, kRaycastDoc);
   module.def(
       "closest_point",
@@ -157,8 +157,8 @@ void add_surfaces(py::module_& module) {
         const Places places(points, "points");
         const Column<std::uint32_t> answers(places.rows);
         ask_places(placed, places.rows, "points", [&](const PlacedSolid& at, std::size_t i) {
-          const Containment found = contains(at, places.at(i));
-          *answers.row(i) = found.status != QueryStatus::ok ? 2 : found.inside ? 1 : 0;
+          const YesNoAnswer found = contains(at, places.at(i));
+          *answers.row(i) = static_cast<std::uint32_t>(found.answer);
           return found.status;
         });
         return answers.handed_out();

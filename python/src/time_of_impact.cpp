@@ -12,7 +12,7 @@ struct Impacts {
   Shape rows;
   Column<double> time{rows}, distance_min{rows}, distance_max{rows};
   Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
-  Column<std::uint32_t> status{rows}, node_visits{rows}, surface_pairs{rows};
+  Column<std::uint32_t> kind{rows}, status{rows}, node_visits{rows}, surface_pairs{rows};
 };
 
 constexpr const char* kDoc =
@@ -35,7 +35,7 @@ void add_time_of_impact(py::module_& module) {
   py::class_<Impacts> type(module, "TimeOfImpact", "Time up to which moving solids stay clear.");
   add_column(
       type, "time", &Impacts::time,
-      "(n,) [T] in [0, duration]. The solids do not touch before it, certified for every status.");
+      "(n,) [T] in [0, duration]. The solids do not touch before it, certified for every kind.");
   add_column(type, "distance_min", &Impacts::distance_min,
              "(n,) [u] the solids' distance at `time` is at least this, certified.");
   add_column(type, "distance_max", &Impacts::distance_max,
@@ -43,7 +43,8 @@ void add_time_of_impact(py::module_& module) {
   add_column(type, "point_a", &Impacts::point_a, "(n, 3) [u] of A at `time`, world.");
   add_column(type, "point_b", &Impacts::point_b, "(n, 3) [u] of B at `time`, world.");
   add_column(type, "normal", &Impacts::normal, "(n, 3) unit, from A to B, world.");
-  add_column(type, "status", &Impacts::status, "(n,) uint32, an ImpactStatus.");
+  add_column(type, "kind", &Impacts::kind, "(n,) uint32, an ImpactKind.");
+  add_column(type, "status", &Impacts::status, "(n,) uint32, a QueryStatus.");
   add_column(type, "node_visits", &Impacts::node_visits, "(n,) uint32.");
   add_column(type, "surface_pairs", &Impacts::surface_pairs, "(n,) uint32.");
   add_pickling(type);
@@ -77,16 +78,13 @@ void add_time_of_impact(py::module_& module) {
               time_of_impact(start.a.placed(), start.b.placed(), motions, settings, workspace));
         });
         if (from.shape().empty()) {
-          const auto status = ImpactStatus{*answers->status.row(0)};
-          const bool invalid = status == ImpactStatus::invalid_input;
-          if (invalid && fault_of(from.at(0)).empty()) {
+          const auto status = QueryStatus{*answers->status.row(0)};
+          if (status == QueryStatus::invalid_input && fault_of(from.at(0)).empty()) {
             const std::string fault = fault_of(to.at(0), "poses_to");
             throw value_error(fault.empty() ? "poses_to, about: a motion with NaN, or too far"
                                             : fault);
           }
-          refuse_unanswered(from, invalid                            ? QueryStatus::invalid_input
-                                  : status == ImpactStatus::not_held ? QueryStatus::not_held
-                                                                     : QueryStatus::ok);
+          refuse_unanswered(from, status);
         }
         return answers;
       },

@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <array>
@@ -35,13 +35,13 @@ void visit(const Solid& solid, const Eigen::Vector3d& centre, double half, int l
   const double distance = solid.signed_distance(centre);
   const double half_diagonal = half * 1.7320508075688774;
   if (std::abs(distance) >= half_diagonal) {
-    if (distance > 0)
+    if (distance < 0)
       for (int finer = level; finer <= levels.finest; ++finer)
         levels.volume[std::size_t(finer)] += cell;
     return;
   }
   // Exact for planes along the axes, right on average for all others.
-  levels.volume[std::size_t(level)] += cell * std::clamp(0.5 + distance / (2 * half), 0.0, 1.0);
+  levels.volume[std::size_t(level)] += cell * std::clamp(0.5 - distance / (2 * half), 0.0, 1.0);
   if (level == levels.finest) {
     ++levels.undecided;
     return;
@@ -108,7 +108,7 @@ class Ball final : public Solid {
     require_length(radius, "the radius of a ball");
   }
   double signed_distance(const Eigen::Vector3d& x) const override {
-    return radius_ - (x - centre_).norm();
+    return (x - centre_).norm() - radius_;
   }
   Eigen::AlignedBox3d bounds() const override {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_);
@@ -131,7 +131,7 @@ class Box final : public Solid {
   double signed_distance(const Eigen::Vector3d& x) const override {
     const Eigen::Vector3d beyond = (x - centre_).cwiseAbs() - half_extent_;
     const double deepest = beyond.maxCoeff();
-    return deepest <= 0 ? -deepest : -beyond.cwiseMax(0.0).norm();
+    return deepest <= 0 ? deepest : beyond.cwiseMax(0.0).norm();
   }
   Eigen::AlignedBox3d bounds() const override {
     return {centre_ - half_extent_, centre_ + half_extent_};
@@ -153,7 +153,7 @@ class Torus final : public Solid {
   }
   double signed_distance(const Eigen::Vector3d& x) const override {
     const Eigen::Vector3d p = x - centre_;
-    return minor_ - Eigen::Vector2d(p.head<2>().norm() - major_, p.z()).norm();
+    return Eigen::Vector2d(p.head<2>().norm() - major_, p.z()).norm() - minor_;
   }
   Eigen::AlignedBox3d bounds() const override {
     const Eigen::Vector3d reach(major_ + minor_, major_ + minor_, minor_);
@@ -179,8 +179,8 @@ class Combined final : public IntegratedSolid {
   }
   double signed_distance(const Eigen::Vector3d& x) const override {
     const double a = a_->signed_distance(x), b = b_->signed_distance(x);
-    if (combination_ == Combination::join) return std::max(a, b);
-    return std::min(a, combination_ == Combination::meet ? b : -b);
+    if (combination_ == Combination::join) return std::min(a, b);
+    return std::max(a, combination_ == Combination::meet ? b : -b);
   }
   Eigen::AlignedBox3d bounds() const override {
     if (combination_ == Combination::join) return a_->bounds().merged(b_->bounds());

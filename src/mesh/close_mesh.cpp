@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/edge_table.h"
@@ -227,7 +227,7 @@ void keep_facing(const Surface& surface, MeshReport& report) {
 }
 
 void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
-  const Judgement judged = judge(unrepaired, closed, kKept);
+  const RepairQuality judged = judge(unrepaired, closed, kKept);
   if (judged.confidence < kLeastConfidence)
     throw OpenMeshError(closed.name + ": repaired with a confidence below " +
                         shortest(kLeastConfidence) + " (" + describe(judged) +

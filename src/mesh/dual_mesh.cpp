@@ -1,6 +1,6 @@
 #include "mesh/dual_mesh.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Core>
@@ -102,14 +102,14 @@ class CellField {
       return x;
     };
     double low = -0.5, high = 0.5, at_low = value(at(low)), at_high = value(at(high));
-    const bool low_inside = at_low > 0;
+    const bool low_inside = at_low < 0;
     int last = 0;
     for (int pass = 0; pass < 24 && high - low > 0x1p-24; ++pass) {
       double t = (low * at_high - high * at_low) / (at_high - at_low);
       if (!(t > low && t < high)) t = 0.5 * (low + high);
       const double now = value(at(t));
       if (std::abs(now) < 0x1p-30) return at(t);
-      if ((now > 0) == low_inside) {
+      if ((now < 0) == low_inside) {
         low = t;
         at_low = now;
         if (last == 1) at_high *= 0.5;

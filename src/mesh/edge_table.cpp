@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/item_groups.h"
 

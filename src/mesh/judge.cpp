@@ -205,7 +205,7 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
 
 }  // namespace
 
-Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
+RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
   const std::unique_ptr<MeshSolid> surface = triangles_as_solid(soup);
   const MeshSolid solid(made);
   const TwoMeshes both(soup, made.mesh);
@@ -219,7 +219,7 @@ Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
       sample_volumes(surface->bounds(), winding, rest.has_value(), solid);
   VolumeSums all;
   for (const VolumeSums& block : blocks) all = all + block;
-  Judgement judged;
+  RepairQuality judged;
   if (all.all > 0) {
     judged.agreement = all.agreed / all.all;
     double squares = 0;
@@ -248,7 +248,7 @@ Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
   return judged;
 }
 
-std::string describe(const Judgement& judged) {
+std::string describe(const RepairQuality& judged) {
   char text[320];
   std::snprintf(text, sizeof text,
                 "confidence %.2f: solid and winding number agree on %.1f %% (± %.1f) of the "

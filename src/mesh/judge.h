@@ -13,11 +13,11 @@ constexpr double kLeastConfidence = 0.6;
 constexpr double kKept = 1e-4;
 
 /// Compares a closed mesh with the surface it was made of, whose triangles may face any way; see
-/// Judgement. `kept`: over the diagonal, what lies this near counts as kept. On the caller's TBB
-/// threads, the same for any number of them.
-Judgement judge(const TriangleMesh& soup, const ClosedMesh& made, double kept);
+/// RepairQuality. `kept`: over the diagonal, what lies this near counts as kept. On the caller's
+/// TBB threads, the same for any number of them.
+RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, double kept);
 
 /// The same in a sentence.
-std::string describe(const Judgement& judged);
+std::string describe(const RepairQuality& judged);
 
 }  // namespace ist

@@ -1,4 +1,4 @@
-#include <ist/level_set.h>
+#include <ist/solid.h>
 
 #include <tbb/parallel_for.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/dual_mesh.h"
 #include "mesh/level_set_surface.h"
@@ -64,7 +64,7 @@ std::vector<SurfaceCell> crossed_cells(const Lattice& lattice, std::int32_t k) {
       const CellValues v = lattice.values(i, j, k);
       SurfaceCell cell;
       for (std::size_t c = 0; c < 8; ++c)
-        if (v[c] > 0) cell.inside = static_cast<std::uint8_t>(cell.inside | 1u << c);
+        if (v[c] < 0) cell.inside = static_cast<std::uint8_t>(cell.inside | 1u << c);
       if (cell.inside == 0 || cell.inside == 255) continue;
       cell.at = {i, j, k};
       cell.key = morton_code(cell.at);
@@ -153,7 +153,7 @@ void require_usable(const DistanceGrid& grid, const std::string& name) {
     const float value = grid.values[i];
     if (!std::isfinite(value))
       throw Error(name + ": the value of " + point_text(i, grid) + " is not finite");
-    if (!(value > 0)) continue;
+    if (!(value < 0)) continue;
     any = true;
     const std::uint64_t at[3] = {i % grid.size[0], i / grid.size[0] % grid.size[1],
                                  i / grid.size[0] / grid.size[1]};

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <ist/level_set.h>
+#include <ist/solid.h>
 
 namespace ist {
 

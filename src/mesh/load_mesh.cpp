@@ -11,9 +11,9 @@
 #include <string>
 #include <utility>
 
-#include <ist/error.h>
-#include <ist/level_set.h>
 #include <ist/mesh.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/import/gltf_document.h"
 #include "mesh/import/polygon_mesh.h"

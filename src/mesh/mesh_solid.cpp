@@ -1,6 +1,6 @@
 #include "mesh/mesh_solid.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #define XXH_INLINE_ALL
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
@@ -127,7 +127,7 @@ MeshSolid::MeshSolid(const ResolvedMesh& resolved) : MeshSolid(resolved.mesh) {
 double MeshSolid::signed_distance(const Eigen::Vector3d& x) const {
   const Eigen::Vector3d unit = frame_.to_unit(x);
   const double distance = closest_point(unit).distance * frame_.scale();
-  return inside(unit) ? distance : -distance;
+  return inside(unit) ? -distance : distance;
 }
 
 double MeshSolid::volume() const {

@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/dual_mesh.h"
 #include "mesh/surface_cells.h"

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <ist/progress.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 namespace ist {
 

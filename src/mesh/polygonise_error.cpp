@@ -75,8 +75,8 @@ class TriangleError {
   double between_balls(const Vector3d& middle, double reach) const {
     double best = farthest();
     for (double s = 0.5 * edge_; s > 0.02 * edge_; s *= 0.25) {
-      const double outside = -solid_.signed_distance(middle + s * normal_);
-      const double inside = solid_.signed_distance(middle - s * normal_);
+      const double outside = solid_.signed_distance(middle + s * normal_);
+      const double inside = -solid_.signed_distance(middle - s * normal_);
       if (!(outside > reach && inside > reach)) continue;
       const double above = s - std::sqrt(outside * outside - reach * reach);
       const double below = s - std::sqrt(inside * inside - reach * reach);
@@ -89,7 +89,7 @@ class TriangleError {
   double to_change(const Vector3d& middle) const {
     const double here = solid_.signed_distance(middle);
     const auto changes = [&](const Vector3d& way) {
-      return (solid_.signed_distance(middle + way) > 0) != (here > 0);
+      return (solid_.signed_distance(middle + way) < 0) != (here < 0);
     };
     for (double s = std::max(kMargin * std::abs(here), 0x1p-20 * edge_); s < edge_; s *= 1.5) {
       if (changes(s * normal_) || changes(-s * normal_)) return s;

@@ -1,6 +1,6 @@
 #include "mesh/repair.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include <utility>
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "numerics/hashing.h"
 
@@ -139,7 +139,7 @@ std::vector<SurfaceCell> find_surface_cells(const Solid& solid, const CellGrid& 
       const double distance = solid.signed_distance(corner);
       if (std::isnan(distance))
         throw Error("solid: its signed distance is NaN at a point within its bounds");
-      if (distance > 0) cell.inside = static_cast<std::uint8_t>(cell.inside | 1 << i);
+      if (distance < 0) cell.inside = static_cast<std::uint8_t>(cell.inside | 1 << i);
     }
     find_loops(cell);
   });

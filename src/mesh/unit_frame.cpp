@@ -1,5 +1,5 @@
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 #include <cmath>
 
 namespace ist {

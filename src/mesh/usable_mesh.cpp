@@ -8,7 +8,7 @@
 #include <atomic>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/message_text.h"
 #include "mesh/weld.h"

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/edge_table.h"
 #include "mesh/judge.h"
@@ -75,16 +75,16 @@ class Wrap {
 
   std::size_t thin_count() const { return thin_count_; }
 
-  /// Away from holes the distance from the surface, positive inside; across a hole it passes 0
+  /// Away from holes the distance from the surface, negative inside; across a hole it passes 0
   /// where the winding number is ½. Where there are thin walls, at least what is left of a step's
   /// way to them. A step beyond the bounds the solid ends: triangles that face any way may wind
   /// about what lies outside.
   double value(const Eigen::Vector3d& x) const {
-    const double side = std::clamp(4 * (winding_.at(x) - 0.5), -1.0, 1.0);
+    const double side = std::clamp(4 * (0.5 - winding_.at(x)), -1.0, 1.0);
     const double most = kFarthest * step_;
     double value = std::clamp(side * distance(*surface_, x), -most, most);
-    if (walls_ && value < step_) value = std::max(value, step_ - distance(*walls_, x, most));
-    return std::min(value, std::max(-most, 1.5 * step_ - beyond_bounds(x)));
+    if (walls_ && value > -step_) value = std::min(value, distance(*walls_, x, most) - step_);
+    return std::max(value, std::min(most, beyond_bounds(x) - 1.5 * step_));
   }
 
   /// The value's sign throughout a ball, where it is known: ±1, or 0.
@@ -96,8 +96,8 @@ class Wrap {
     if (!(free > kFarthest * step_)) return 0;
     const double above = winding_.at(centre) - 0.5;
     if (!(std::abs(above) > 1.5 * radius / free)) return 0;
-    if (above < 0) return -1;
-    return beyond_bounds(centre) + radius < -0.5 * step_ ? 1 : 0;
+    if (above < 0) return 1;
+    return beyond_bounds(centre) + radius < -0.5 * step_ ? -1 : 0;
   }
 
  private:

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 namespace ist {
 namespace {
@@ -107,7 +107,8 @@ void append_mesh(TriangleMesh& mesh, const TriangleMesh& more) {
   mesh.notes.insert(mesh.notes.end(), more.notes.begin(), more.notes.end());
 }
 
-ShapeMesh mesh_of(const PlacedShape& placed, const PackagePaths& paths, const std::string& file) {
+ShapeMesh mesh_of(const PlacedLinkShape& placed, const PackagePaths& paths,
+                  const std::string& file) {
   ShapeMesh out;
   try {
     if (const auto* mesh = std::get_if<LinkMesh>(&placed.shape)) {
@@ -131,10 +132,10 @@ ShapeMesh mesh_of(const PlacedShape& placed, const PackagePaths& paths, const st
   return out;
 }
 
-LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths& paths,
+LinkGeometry geometry_of(std::span<const PlacedLinkShape> shapes, const PackagePaths& paths,
                          const std::string& file) {
   LinkGeometry out;
-  for (const PlacedShape& placed : shapes) {
+  for (const PlacedLinkShape& placed : shapes) {
     if (const auto* ball = std::get_if<LinkBall>(&placed.shape)) {
       out.spheres.push_back({placed.translation, ball->radius});
       continue;

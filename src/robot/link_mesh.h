@@ -20,7 +20,7 @@ struct ShapeMesh {
   TriangleMesh mesh;
   double slack = 0;
 };
-ShapeMesh mesh_of(const PlacedShape& shape, const PackagePaths& paths, const std::string& file);
+ShapeMesh mesh_of(const PlacedLinkShape& shape, const PackagePaths& paths, const std::string& file);
 
 /// A polyhedron around a capsule, or a sphere whose axis is a point, at most 0.5 % wider.
 ShapeMesh capsule_mesh(const CoverCapsule& capsule);
@@ -34,7 +34,7 @@ struct LinkGeometry {
   std::vector<CoverSphere> spheres;  ///< [u], link frame
   double slack = 0;                  ///< [u] the mesh reaches no further beyond the shapes
 };
-LinkGeometry geometry_of(std::span<const PlacedShape> shapes, const PackagePaths& paths,
+LinkGeometry geometry_of(std::span<const PlacedLinkShape> shapes, const PackagePaths& paths,
                          const std::string& file);
 
 }  // namespace ist

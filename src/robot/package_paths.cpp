@@ -5,7 +5,7 @@
 #include <system_error>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/import/source_file.h"
 

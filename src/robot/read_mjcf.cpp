@@ -11,7 +11,7 @@
 #include <set>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
@@ -172,7 +172,7 @@ class MjcfReader {
     const Attributes a = with_defaults(node, "");
     const std::string file = value(a, "file");
     const std::string name = value(a, "name", fs::path(file).stem().string());
-    PlacedShape& shape = meshes_by_name_[name];
+    PlacedLinkShape& shape = meshes_by_name_[name];
     if (file.empty()) {
       shape.shape = LinkFault{node.where + ": has no file; write its vertices into one"};
       return;
@@ -340,7 +340,7 @@ class MjcfReader {
     const bool visual = value(a, "contype", "1") == "0" && value(a, "conaffinity", "1") == "0";
     const std::string type = value(a, "type", a.contains("mesh") ? "mesh" : "sphere");
     if (type == "plane" || type == "hfield") return;
-    PlacedShape placed;
+    PlacedLinkShape placed;
     try {
       placed = shape_of(node, a, type);
     } catch (const Error& error) {
@@ -350,8 +350,8 @@ class MjcfReader {
     (visual ? to.visual : to.collision).push_back(std::move(placed));
   }
 
-  PlacedShape shape_of(const Node& node, const Attributes& a, const std::string& type) const {
-    PlacedShape placed;
+  PlacedLinkShape shape_of(const Node& node, const Attributes& a, const std::string& type) const {
+    PlacedLinkShape placed;
     Eigen::Isometry3d at = pose(node, a);
     std::vector<double> size = numbers(node, "size", value(a, "size"));
     if (type == "mesh") {
@@ -438,7 +438,7 @@ class MjcfReader {
   bool degrees_ = true, auto_limits_ = true;
   std::string meshes_, order_ = "xyz";
   std::map<std::string, Class> defaults_;
-  std::map<std::string, PlacedShape> meshes_by_name_;
+  std::map<std::string, PlacedLinkShape> meshes_by_name_;
   std::map<std::string, std::size_t> bodies_;
 };
 

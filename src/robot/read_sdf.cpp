@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
@@ -155,7 +155,7 @@ class SdfReader {
       if (shape == kNoTag) xml_.fail(e, "has no <geometry> with a shape. Add one");
       const std::string_view kind = xml_[shape].name;
       if (kind == "empty") continue;
-      PlacedShape placed;
+      PlacedLinkShape placed;
       const auto& bytes = robot_.file.bytes;
       placed.line = 1 + static_cast<std::size_t>(std::count(
                             bytes.begin(),
@@ -175,7 +175,7 @@ class SdfReader {
     }
   }
 
-  Shape shape_of(std::uint32_t e) const {
+  LinkShape shape_of(std::uint32_t e) const {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
       LinkMesh mesh;

@@ -8,7 +8,7 @@
 #include <tuple>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/import/text_scanner.h"
 #include "mesh/import/xml_document.h"
@@ -101,8 +101,8 @@ class RobotReader {
             vector(origin, "xyz", Vector3d::Zero())};
   }
 
-  PlacedShape read_placed(std::uint32_t element) const {
-    PlacedShape placed;
+  PlacedLinkShape read_placed(std::uint32_t element) const {
+    PlacedLinkShape placed;
     const auto& bytes = robot_.file.bytes;
     placed.line = 1 + static_cast<std::size_t>(std::count(
                           bytes.begin(),
@@ -115,7 +115,7 @@ class RobotReader {
     return placed;
   }
 
-  Shape read_shape(std::uint32_t e) const {
+  LinkShape read_shape(std::uint32_t e) const {
     const std::string_view kind = xml_[e].name;
     if (kind == "mesh") {
       LinkMesh mesh;

@@ -37,11 +37,11 @@ struct LinkCapsule {
 struct LinkFault {
   std::string what;  ///< with file and line
 };
-using Shape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkFault>;
+using LinkShape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkFault>;
 
 /// A shape of a link: x_link = rotation · x + translation.
-struct PlacedShape {
-  Shape shape;
+struct PlacedLinkShape {
+  LinkShape shape;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [u]
   std::size_t line = 0;                                   ///< of the file, for messages
@@ -52,12 +52,12 @@ enum class LinkShapes { collision, visual };
 
 struct RobotLink {
   std::string name;
-  std::vector<PlacedShape> collision, visual;
+  std::vector<PlacedLinkShape> collision, visual;
   /// Bytes of the file: the link's element, and each <collision> in it, first and behind the last.
   std::size_t begin = 0, end = 0;
   std::vector<std::pair<std::size_t, std::size_t>> collision_bytes;
 
-  const std::vector<PlacedShape>& shapes(LinkShapes which) const {
+  const std::vector<PlacedLinkShape>& shapes(LinkShapes which) const {
     return which == LinkShapes::collision ? collision : visual;
   }
 };

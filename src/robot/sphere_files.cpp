@@ -168,7 +168,7 @@ std::string urdf_with_spheres(const RobotModel& robot, std::span<const LinkSpher
                                     [&](const LinkSpheres& one) { return one.link == link.name; });
     const bool replaced = found != links.end();
     for (const auto* const shapes : {&link.collision, &link.visual})
-      for (const PlacedShape& placed : *shapes) {
+      for (const PlacedLinkShape& placed : *shapes) {
         const auto* const mesh = std::get_if<LinkMesh>(&placed.shape);
         if (!moved || mesh == nullptr || (replaced && shapes == &link.collision) ||
             mesh->file.find("://") != std::string::npos || fs::path(mesh->file).is_absolute())

@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "samples/shapes.h"
 

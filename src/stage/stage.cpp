@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 namespace ist {
 

@@ -4,8 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include <ist/progress.h>
-#include <ist/stop_reason.h>
+#include <ist/types.h>
 
 namespace ist {
 

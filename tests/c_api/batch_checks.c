@@ -123,13 +123,13 @@ int batches_answer(scene_t* s) {
   ist_penetration_t answers[PAIRS], one = {.size = sizeof one};
   ist_workspace_t workspaces[3] = {0};
   ist_parallel_t parallel = {.size = sizeof parallel, .run = backwards};
-  ist_field_t field = {.size = sizeof field, .kind = IST_BALL};
+  ist_shape_t field = {.size = sizeof field, .kind = IST_BALL};
   ist_placed_t ball = {.size = sizeof ball};
   const size_t size = sizeof answers[0];
   size_t ran = 0, i;
   parallel.pool = &ran;
   field.as.ball.radius = 0.4;
-  ball.field = &field;
+  ball.shape = &field;
   ball.pose = s->a.pose;
   for (i = 0; i < 3; ++i) CHECK(ist_workspace_make(4096, NULL, &workspaces[i]) == IST_OK);
   for (i = 0; i < PAIRS; ++i) {

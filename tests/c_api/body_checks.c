@@ -10,26 +10,26 @@ int bodies_are_told(scene_t* s) {
   ist_wrenches_t wrenches = {.size = sizeof wrenches}, of_patches = {.size = sizeof of_patches};
   ist_contact_patch_t room[4];
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
-  ist_twist_t towards = {.velocity = {1, 0, 0}};
+  ist_motion_t towards = {.velocity = {1, 0, 0}};
   ist_placed_t wrong = s->b;
-  const ist_tree_t empty = {0};
+  const ist_asset_t empty = {0};
   const double origin[3] = {0, 0, 0};
   double rate = 1, by_patches = 0, part, sum = 0;
   size_t i;
   int k;
 
-  CHECK(ist_tree_get_mass_properties(&s->tree_b, &mass) == IST_OK && mass.volume > 0);
-  CHECK(ist_tree_get_bounds(&s->tree_b, &bounds) == IST_OK);
+  CHECK(ist_asset_get_mass_properties(&s->tree_b, &mass) == IST_OK && mass.volume > 0);
+  CHECK(ist_asset_get_bounds(&s->tree_b, &bounds) == IST_OK);
   CHECK(ist_placed_mass_properties(&s->b, &placed_mass) == IST_OK);
   CHECK(ist_placed_bounds(&s->b, &placed_bounds) == IST_OK);
   CHECK(placed_mass.volume == mass.volume && placed_bounds.radius == bounds.radius);
   CHECK(fabs(placed_mass.centre_of_mass[0] - mass.centre_of_mass[0] - s->b.pose.t[0]) <= 1e-12);
-  CHECK(ist_tree_get_mass_properties(NULL, &mass) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_mass_properties(NULL, &mass) == IST_NULL_POINTER);
   CHECK(is_empty(&mass, sizeof mass, IST_NULL_POINTER));
-  CHECK(ist_tree_get_mass_properties(&empty, &mass) == IST_NO_HANDLE);
-  CHECK(ist_tree_get_mass_properties(&s->tree_b, NULL) == IST_NULL_POINTER);
-  CHECK(ist_tree_get_bounds(NULL, &bounds) == IST_NULL_POINTER);
-  CHECK(ist_tree_get_bounds(&s->tree_b, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_mass_properties(&empty, &mass) == IST_NO_HANDLE);
+  CHECK(ist_asset_get_mass_properties(&s->tree_b, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_bounds(NULL, &bounds) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_bounds(&s->tree_b, NULL) == IST_NULL_POINTER);
   CHECK(ist_placed_mass_properties(NULL, &mass) == IST_NULL_POINTER);
   CHECK(ist_placed_mass_properties(&s->b, NULL) == IST_NULL_POINTER);
   CHECK(ist_placed_bounds(NULL, &bounds) == IST_NULL_POINTER);
@@ -41,7 +41,7 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_placed_bounds(&wrong, &bounds) == IST_INVALID_INPUT);
   CHECK(is_refused(&bounds, sizeof bounds, IST_INVALID_INPUT));
   mass.size = bounds.size = 0;
-  CHECK(ist_tree_get_mass_properties(&s->tree_b, &mass) == IST_WRONG_SIZE);
+  CHECK(ist_asset_get_mass_properties(&s->tree_b, &mass) == IST_WRONG_SIZE);
   CHECK(ist_placed_bounds(&s->b, &bounds) == IST_WRONG_SIZE);
 
   patches.patches = room;
@@ -49,14 +49,14 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_contact_patches(&s->a, &s->b, NULL, &s->workspace, &patches, &contact) == IST_OK);
   CHECK(ist_wrenches(&contact, &s->b.pose, origin, origin, &wrenches) == IST_OK);
   for (k = 0; k < 3; ++k) {
-    CHECK(wrenches.on_b.force[k] == -contact.translation_gradient[k]);
+    CHECK(wrenches.on_b.force[k] == contact.force[k]);
     CHECK(wrenches.on_a.torque[k] == -wrenches.on_b.torque[k]);
     sum += fabs(wrenches.on_b.force[k]);
   }
-  CHECK(ist_volume_rate(&contact, &s->b.pose, NULL, &towards, &rate) == IST_OK);
-  CHECK(rate == contact.translation_gradient[0]);
+  CHECK(ist_volume_rate(&contact, &s->a, &s->b, NULL, &towards, &rate) == IST_OK);
+  CHECK(rate == -contact.force[0]);
   for (i = 0; i < patches.count; ++i) {
-    CHECK(ist_patch_volume_rate(&room[i], &s->b.pose, NULL, &towards, &part) == IST_OK);
+    CHECK(ist_patch_volume_rate(&room[i], &s->a, &s->b, NULL, &towards, &part) == IST_OK);
     by_patches += part;
     CHECK(ist_patch_wrenches(&room[i], &s->b.pose, origin, origin, &of_patches) == IST_OK);
     CHECK(of_patches.on_b.force[0] == room[i].force[0]);
@@ -69,14 +69,14 @@ int bodies_are_told(scene_t* s) {
   CHECK(ist_wrenches(&contact, &s->b.pose, origin, NULL, &wrenches) == IST_NULL_POINTER);
   CHECK(ist_wrenches(&contact, &s->b.pose, origin, origin, NULL) == IST_NULL_POINTER);
   CHECK(ist_patch_wrenches(NULL, &s->b.pose, origin, origin, &wrenches) == IST_NULL_POINTER);
-  CHECK(ist_volume_rate(NULL, &s->b.pose, NULL, NULL, &rate) == IST_NULL_POINTER && rate == 0);
-  CHECK(ist_volume_rate(&contact, NULL, NULL, NULL, &rate) == IST_NULL_POINTER);
-  CHECK(ist_volume_rate(&contact, &s->b.pose, NULL, NULL, NULL) == IST_NULL_POINTER);
-  CHECK(ist_patch_volume_rate(NULL, &s->b.pose, NULL, NULL, &rate) == IST_NULL_POINTER);
+  CHECK(ist_volume_rate(NULL, &s->a, &s->b, NULL, NULL, &rate) == IST_NULL_POINTER && rate == 0);
+  CHECK(ist_volume_rate(&contact, &s->a, NULL, NULL, NULL, &rate) == IST_NULL_POINTER);
+  CHECK(ist_volume_rate(&contact, &s->a, &s->b, NULL, NULL, NULL) == IST_NULL_POINTER);
+  CHECK(ist_patch_volume_rate(NULL, &s->a, &s->b, NULL, NULL, &rate) == IST_NULL_POINTER);
   wrenches.size = 0;
   CHECK(ist_wrenches(&contact, &s->b.pose, origin, origin, &wrenches) == IST_WRONG_SIZE);
   contact.size = 0;
-  CHECK(ist_volume_rate(&contact, &s->b.pose, NULL, NULL, &rate) == IST_WRONG_SIZE);
+  CHECK(ist_volume_rate(&contact, &s->a, &s->b, NULL, NULL, &rate) == IST_WRONG_SIZE);
   return 0;
 }
 
@@ -86,8 +86,8 @@ int impacts_are_found(scene_t* s) {
   ist_motion_t motion;
   ist_impact_t impact = {.size = sizeof impact}, other = {.size = sizeof other};
   ist_impact_settings_t settings = {.size = sizeof settings, .duration = 1};
-  ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
-  ist_placed_t floor = {.size = sizeof floor, .field = &field, .pose = here};
+  ist_shape_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
+  ist_placed_t floor = {.size = sizeof floor, .shape = &field, .pose = here};
   ist_placed_t b = s->b;
   ist_workspace_t none = {0};
   field.as.half_space.normal[2] = 1;

@@ -34,16 +34,16 @@ static void give_back(void* context, void* memory, size_t bytes, size_t alignmen
 static int memory_is_the_callers(const char* path) {
   counted_t counted = {0};
   ist_allocator_t allocator = {.size = sizeof allocator, .allocate = take, .release = give_back};
-  ist_tree_t tree = {0};
+  ist_asset_t tree = {0};
   ist_workspace_t workspace = {0};
   size_t left, needed;
   allocator.context = &counted;
   counted.blocks_left = 1000;
-  CHECK(ist_tree_load(path, &allocator, &tree) == IST_OK);
+  CHECK(ist_asset_load(path, &allocator, &tree) == IST_OK);
   CHECK(counted.blocks == 1);
   CHECK(ist_workspace_make(1000, &allocator, &workspace) == IST_OK);
   CHECK(counted.blocks > 1);
-  CHECK(ist_tree_release(&tree) == IST_OK);
+  CHECK(ist_asset_release(&tree) == IST_OK);
   CHECK(ist_workspace_release(&workspace) == IST_OK);
   CHECK(counted.taken == counted.given_back && !counted.misaligned);
 
@@ -55,19 +55,19 @@ static int memory_is_the_callers(const char* path) {
     CHECK(ist_workspace_release(&workspace) == IST_NO_HANDLE);
   }
   counted.blocks_left = 0;
-  CHECK(ist_tree_load(path, &allocator, &tree) == IST_NO_MEMORY);
-  CHECK(ist_tree_release(&tree) == IST_NO_HANDLE);
+  CHECK(ist_asset_load(path, &allocator, &tree) == IST_NO_MEMORY);
+  CHECK(ist_asset_release(&tree) == IST_NO_HANDLE);
   CHECK(ist_workspace_make(SIZE_MAX, NULL, &workspace) == IST_NO_MEMORY);
   counted.blocks_left = 1000;
   CHECK(ist_workspace_make(SIZE_MAX / 16, &allocator, &workspace) == IST_NO_MEMORY);
   CHECK(counted.taken == counted.given_back);
 
   allocator.release = NULL;
-  CHECK(ist_tree_load(path, &allocator, &tree) == IST_NULL_POINTER);
+  CHECK(ist_asset_load(path, &allocator, &tree) == IST_NULL_POINTER);
   CHECK(ist_workspace_make(0, &allocator, &workspace) == IST_NULL_POINTER);
   allocator.release = give_back;
   allocator.size = 0;
-  CHECK(ist_tree_load(path, &allocator, &tree) == IST_WRONG_SIZE);
+  CHECK(ist_asset_load(path, &allocator, &tree) == IST_WRONG_SIZE);
   CHECK(ist_workspace_make(0, &allocator, &workspace) == IST_WRONG_SIZE);
   return 0;
 }
@@ -75,9 +75,9 @@ static int memory_is_the_callers(const char* path) {
 /* --- Trees ------------------------------------------------------------------------------------ */
 
 static int trees_are_checked(const char* path) {
-  ist_tree_t tree = {0}, copy;
-  const ist_tree_t none = {0};
-  ist_tree_info_t info = {.size = sizeof info};
+  ist_asset_t tree = {0}, copy;
+  const ist_asset_t none = {0};
+  ist_asset_info_t info = {.size = sizeof info};
   ist_predicted_errors_t errors = {.size = sizeof errors};
   char* block;
   char* bytes;
@@ -90,53 +90,53 @@ static int trees_are_checked(const char* path) {
   size = fread(bytes, 1, (1 << 24) - 64, file);
   fclose(file);
 
-  CHECK(ist_tree_view(bytes, size, &tree) == IST_OK);
-  CHECK(ist_tree_get_info(&tree, &info) == IST_OK);
+  CHECK(ist_asset_view(bytes, size, &tree) == IST_OK);
+  CHECK(ist_asset_get_info(&tree, &info) == IST_OK);
   CHECK(info.spheres > 0 && info.volume > 0 && info.coverage >= 0 && info.coverage <= 1);
   CHECK(info.mesh_triangles == 0 || info.mesh_state == IST_MESH_OWN);
-  CHECK(ist_tree_get_predicted_errors(&tree, &errors) == IST_OK && errors.size == sizeof errors);
+  CHECK(ist_asset_get_predicted_errors(&tree, &errors) == IST_OK && errors.size == sizeof errors);
   CHECK(errors.poses == 0 && errors.target_met == 0 && errors.classes[0].median == 0);
-  CHECK(ist_tree_get_predicted_errors(NULL, &errors) == IST_NULL_POINTER && errors.poses == 0);
-  CHECK(ist_tree_get_predicted_errors(&none, &errors) == IST_NO_HANDLE);
-  CHECK(ist_tree_get_predicted_errors(&tree, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_predicted_errors(NULL, &errors) == IST_NULL_POINTER && errors.poses == 0);
+  CHECK(ist_asset_get_predicted_errors(&none, &errors) == IST_NO_HANDLE);
+  CHECK(ist_asset_get_predicted_errors(&tree, NULL) == IST_NULL_POINTER);
   errors.size = 8;
-  CHECK(ist_tree_get_predicted_errors(&tree, &errors) == IST_WRONG_SIZE);
+  CHECK(ist_asset_get_predicted_errors(&tree, &errors) == IST_WRONG_SIZE);
   copy = tree; /* it owns nothing */
-  CHECK(ist_tree_release(&copy) == IST_OK && ist_tree_release(&copy) == IST_NO_HANDLE);
-  CHECK(ist_tree_get_info(&copy, &info) == IST_NO_HANDLE && info.spheres == 0);
-  CHECK(ist_tree_get_info(&tree, &info) == IST_OK);
-  CHECK(ist_tree_get_info(NULL, &info) == IST_NULL_POINTER);
-  CHECK(ist_tree_get_info(&tree, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_release(&copy) == IST_OK && ist_asset_release(&copy) == IST_NO_HANDLE);
+  CHECK(ist_asset_get_info(&copy, &info) == IST_NO_HANDLE && info.spheres == 0);
+  CHECK(ist_asset_get_info(&tree, &info) == IST_OK);
+  CHECK(ist_asset_get_info(NULL, &info) == IST_NULL_POINTER);
+  CHECK(ist_asset_get_info(&tree, NULL) == IST_NULL_POINTER);
   info.size = 1;
-  CHECK(ist_tree_get_info(&tree, &info) == IST_WRONG_SIZE);
+  CHECK(ist_asset_get_info(&tree, &info) == IST_WRONG_SIZE);
   memset(&copy, 0xab, sizeof copy); /* never made */
   info.size = sizeof info;
-  CHECK(ist_tree_get_info(&copy, &info) == IST_NO_HANDLE);
-  CHECK(ist_tree_release(&copy) == IST_NO_HANDLE);
+  CHECK(ist_asset_get_info(&copy, &info) == IST_NO_HANDLE);
+  CHECK(ist_asset_release(&copy) == IST_NO_HANDLE);
 
-  CHECK(ist_tree_view(NULL, size, &tree) == IST_NULL_POINTER);
-  CHECK(ist_tree_release(&tree) == IST_NO_HANDLE); /* a failure leaves it empty */
-  CHECK(ist_tree_view(bytes, size, NULL) == IST_NULL_POINTER);
-  CHECK(ist_tree_view(bytes + 1, size - 1, &tree) == IST_MISALIGNED);
-  CHECK(ist_tree_view(bytes, 4, &tree) == IST_TOO_SHORT);
-  CHECK(ist_tree_view(bytes, 0, &tree) == IST_TOO_SHORT);
-  CHECK(ist_tree_view(bytes, size - 1, &tree) == IST_TOO_SHORT);
-  CHECK(ist_tree_view(bytes, size + 1, &tree) == IST_CORRUPT_LAYOUT);
+  CHECK(ist_asset_view(NULL, size, &tree) == IST_NULL_POINTER);
+  CHECK(ist_asset_release(&tree) == IST_NO_HANDLE); /* a failure leaves it empty */
+  CHECK(ist_asset_view(bytes, size, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_view(bytes + 1, size - 1, &tree) == IST_MISALIGNED);
+  CHECK(ist_asset_view(bytes, 4, &tree) == IST_TOO_SHORT);
+  CHECK(ist_asset_view(bytes, 0, &tree) == IST_TOO_SHORT);
+  CHECK(ist_asset_view(bytes, size - 1, &tree) == IST_TOO_SHORT);
+  CHECK(ist_asset_view(bytes, size + 1, &tree) == IST_CORRUPT_LAYOUT);
   bytes[size / 2] = (char)(bytes[size / 2] ^ 1);
-  CHECK(ist_tree_view(bytes, size, &tree) == IST_CORRUPT_HASH);
+  CHECK(ist_asset_view(bytes, size, &tree) == IST_CORRUPT_HASH);
   bytes[8] = (char)(bytes[8] ^ 64);
-  CHECK(ist_tree_view(bytes, size, &tree) == IST_OTHER_FORMAT);
+  CHECK(ist_asset_view(bytes, size, &tree) == IST_OTHER_FORMAT);
   bytes[0] = 'X';
-  CHECK(ist_tree_view(bytes, size, &tree) == IST_NOT_AN_ASSET);
-  CHECK(ist_tree_release(NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_view(bytes, size, &tree) == IST_NOT_AN_ASSET);
+  CHECK(ist_asset_release(NULL) == IST_NULL_POINTER);
   free(block);
 
-  CHECK(ist_tree_load(NULL, NULL, &tree) == IST_NULL_POINTER);
-  CHECK(ist_tree_load(path, NULL, NULL) == IST_NULL_POINTER);
-  CHECK(ist_tree_load("/nowhere/at/all.ist", NULL, &tree) == IST_CANNOT_READ);
-  CHECK(ist_tree_load("/", NULL, &tree) == IST_CANNOT_READ);
-  CHECK(ist_tree_load("/dev/null", NULL, &tree) < 0);
-  CHECK(ist_tree_release(&tree) == IST_NO_HANDLE);
+  CHECK(ist_asset_load(NULL, NULL, &tree) == IST_NULL_POINTER);
+  CHECK(ist_asset_load(path, NULL, NULL) == IST_NULL_POINTER);
+  CHECK(ist_asset_load("/nowhere/at/all.ist", NULL, &tree) == IST_CANNOT_READ);
+  CHECK(ist_asset_load("/", NULL, &tree) == IST_CANNOT_READ);
+  CHECK(ist_asset_load("/dev/null", NULL, &tree) < 0);
+  CHECK(ist_asset_release(&tree) == IST_NO_HANDLE);
   return 0;
 }
 
@@ -145,12 +145,12 @@ static int trees_are_checked(const char* path) {
 static int make_scene(scene_t* scene, const char* path_a, const char* path_b) {
   const ist_pose_t identity = IST_POSE_IDENTITY;
   memset(scene, 0, sizeof *scene);
-  CHECK(ist_tree_load(path_a, NULL, &scene->tree_a) == IST_OK);
-  CHECK(ist_tree_load(path_b, NULL, &scene->tree_b) == IST_OK);
+  CHECK(ist_asset_load(path_a, NULL, &scene->tree_a) == IST_OK);
+  CHECK(ist_asset_load(path_b, NULL, &scene->tree_b) == IST_OK);
   CHECK(ist_workspace_make(1 << 16, NULL, &scene->workspace) == IST_OK);
   scene->a.size = scene->b.size = sizeof scene->a;
-  scene->a.tree = &scene->tree_a;
-  scene->b.tree = &scene->tree_b;
+  scene->a.asset = &scene->tree_a;
+  scene->b.asset = &scene->tree_b;
   scene->a.pose = scene->b.pose = identity;
   scene->b.pose.t[0] = 0.25;
   return 0;
@@ -176,15 +176,15 @@ static int capacities_are_told(const scene_t* s) {
 
 static int released_handles_are_known(scene_t* s) {
   ist_penetration_t answer = {.size = sizeof answer};
-  CHECK(ist_tree_release(&s->tree_b) == IST_OK);
+  CHECK(ist_asset_release(&s->tree_b) == IST_OK);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
-  CHECK(ist_tree_release(&s->tree_b) == IST_NO_HANDLE);
+  CHECK(ist_asset_release(&s->tree_b) == IST_NO_HANDLE);
   CHECK(ist_workspace_release(&s->workspace) == IST_OK);
   CHECK(ist_penetration(&s->a, &s->a, NULL, &s->workspace, &answer) == IST_NO_HANDLE);
   CHECK(ist_workspace_release(&s->workspace) == IST_NO_HANDLE);
   CHECK(ist_workspace_release(NULL) == IST_NULL_POINTER);
   CHECK(ist_workspace_make(0, NULL, NULL) == IST_NULL_POINTER);
-  CHECK(ist_tree_release(&s->tree_a) == IST_OK);
+  CHECK(ist_asset_release(&s->tree_a) == IST_OK);
   return 0;
 }
 

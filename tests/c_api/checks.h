@@ -9,7 +9,7 @@ extern "C" {
  * the first thing that is not as the header says on stderr. */
 int c_api_checks(const char* path_a, const char* path_b);
 
-/* The same for ist/ist_bake.h and contact laws. */
+/* The same for ist/c_bake.h and contact laws. */
 int c_bake_checks(void);
 
 #ifdef __cplusplus

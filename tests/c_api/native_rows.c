@@ -4,7 +4,7 @@
  * native_rows A.ist B.ist poses.csv > answers        or        … --time PASSES > µs, as JSON */
 #define _POSIX_C_SOURCE 199309L  // clock_gettime
 
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -19,7 +19,7 @@ typedef struct row {
 
 static row_t rows[kMostRows];
 static int row_count;
-static ist_tree_t tree_a, tree_b;
+static ist_asset_t tree_a, tree_b;
 static ist_workspace_t workspace;
 
 static void stop(const char* what) {
@@ -107,7 +107,7 @@ static void budget(int i, int print) {
   ask_penetration(i, print, IST_MATCHED, 0, 200, 300);
 }
 
-static void ask_field(int i, int print, const ist_field_t* field) {
+static void ask_field(int i, int print, const ist_shape_t* field) {
   const ist_placed_t a = {sizeof a, NULL, field, IST_POSE_IDENTITY, 1};
   const ist_placed_t b = placed_b(i);
   ist_penetration_t answer = {.size = sizeof answer};
@@ -116,16 +116,16 @@ static void ask_field(int i, int print, const ist_field_t* field) {
 }
 
 static void half_space(int i, int print) {
-  const ist_field_t field = {
+  const ist_shape_t field = {
       .size = sizeof field, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
   ask_field(i, print, &field);
 }
 static void box(int i, int print) {
-  const ist_field_t field = {.size = sizeof field, .kind = IST_BOX, .as.box = {{0.25, 0.5, 0.125}}};
+  const ist_shape_t field = {.size = sizeof field, .kind = IST_BOX, .as.box = {{0.25, 0.5, 0.125}}};
   ask_field(i, print, &field);
 }
 static void capsule(int i, int print) {
-  const ist_field_t field = {
+  const ist_shape_t field = {
       .size = sizeof field, .kind = IST_CAPSULE, .as.capsule = {0.25, 0.375}};
   ask_field(i, print, &field);
 }
@@ -195,10 +195,10 @@ static void patches_without_protrusion(int i, int print) {
 
 static void fit(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  ist_pair_fit_t found = {.size = sizeof found};
-  ist_get_pair_fit(&a, &b, &found);
+  ist_size_match_t found = {.size = sizeof found};
+  ist_get_size_match(&a, &b, &found);
   if (!print) return;
-  print_doubles(&found.grain_a, 3);
+  print_doubles(&found.feature_size_a, 3);
   printf(" %u %u %u %u", found.a_is_coarser, found.has_mesh, found.needs_mesh, found.fits);
 }
 
@@ -246,7 +246,7 @@ static void impact(int i, int print) {
 
 static void batches(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  const ist_field_t half_space = {
+  const ist_shape_t half_space = {
       .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
   const ist_placed_t ground = {sizeof ground, NULL, &half_space, IST_POSE_IDENTITY, 1};
   const ist_pair_t pairs[2] = {{&a, &b}, {&b, &a}};
@@ -287,13 +287,13 @@ static void rays(int i, int print) {
 /* Points about B's origin, against it and a half-space. */
 static void points(int i, int print) {
   const ist_placed_t b = placed_b(i);
-  const ist_field_t half_space = {
+  const ist_shape_t half_space = {
       .size = sizeof half_space, .kind = IST_HALF_SPACE, .as.half_space = {{0, 0.6, 0.8}, 0.0625}};
   const ist_placed_t ground = {sizeof ground, NULL, &half_space, IST_POSE_IDENTITY, 1};
   const double* const t = rows[i].pose.t;
   const double asked[9] = {t[0], t[1], t[2], t[0] + 0.25, t[1], t[2], t[0], t[1] + 0.0625, t[2]};
   ist_surface_point_t feet[6];
-  ist_overlapping_t inside[6];
+  ist_yes_no_t inside[6];
   int k;
   ist_closest_point(&b, asked, 3, feet, sizeof feet[0]);
   ist_closest_point(&ground, asked, 3, feet + 3, sizeof feet[0]);
@@ -307,7 +307,7 @@ static void points(int i, int print) {
 
 static void overlapping(int i, int print) {
   const ist_placed_t a = placed_a(), b = placed_b(i);
-  ist_overlapping_t answer;
+  ist_yes_no_t answer;
   ist_overlap(&a, &b, &workspace, &answer);
   if (print) printf(" %d", answer);
 }
@@ -384,8 +384,8 @@ static void time_queries(int passes) {
 int main(int argc, char** argv) {
   int i, q;
   if (argc != 4 && argc != 6) stop("native_rows A.ist B.ist poses.csv [--time PASSES]");
-  if (ist_tree_load(argv[1], NULL, &tree_a) != IST_OK) stop(argv[1]);
-  if (ist_tree_load(argv[2], NULL, &tree_b) != IST_OK) stop(argv[2]);
+  if (ist_asset_load(argv[1], NULL, &tree_a) != IST_OK) stop(argv[1]);
+  if (ist_asset_load(argv[2], NULL, &tree_b) != IST_OK) stop(argv[2]);
   if (ist_workspace_make(0, NULL, &workspace) != IST_OK) stop("no memory");
   if (read_rows(argv[3]) == 0) stop(argv[3]);
   if (argc == 6) {

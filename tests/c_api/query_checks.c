@@ -7,10 +7,10 @@ int penetrations_answer(scene_t* s) {
   ist_penetration_t whole = {.size = sizeof whole}, other = {.size = sizeof other};
   ist_penetration_settings_t settings = {.size = sizeof settings};
   ist_placed_t wrong;
-  const ist_tree_t empty = {0};
+  const ist_asset_t empty = {0};
   ist_workspace_t none = {0};
-  ist_tree_info_t info = {.size = sizeof info};
-  ist_field_t field = {.size = sizeof field, .kind = IST_BALL};
+  ist_asset_info_t info = {.size = sizeof info};
+  ist_shape_t field = {.size = sizeof field, .kind = IST_BALL};
   ist_placed_t floor = {.size = sizeof floor};
   ist_status_t status;
   int meshes;
@@ -34,7 +34,7 @@ int penetrations_answer(scene_t* s) {
   CHECK(ist_penetration(&s->a, &s->b, NULL, NULL, &other) == IST_NULL_POINTER);
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, NULL) == IST_NULL_POINTER);
   wrong = s->a;
-  wrong.tree = NULL;
+  wrong.asset = NULL;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_NULL_POINTER);
 
   /* Each size wrong. */
@@ -51,7 +51,7 @@ int penetrations_answer(scene_t* s) {
 
   /* Handles that are none. */
   wrong = s->a;
-  wrong.tree = &empty;
+  wrong.asset = &empty;
   CHECK(ist_penetration(&wrong, &s->b, NULL, &s->workspace, &other) == IST_NO_HANDLE);
   CHECK(is_refused(&other, sizeof other, IST_NO_HANDLE));
   CHECK(ist_penetration(&s->a, &wrong, NULL, &s->workspace, &other) == IST_NO_HANDLE);
@@ -60,13 +60,13 @@ int penetrations_answer(scene_t* s) {
   /* The meshes of two, where both hold one; a field has none. */
   settings.max_visits = 0;
   settings.measure = IST_EXACT;
-  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
+  CHECK(ist_asset_get_info(&s->tree_a, &info) == IST_OK);
   meshes = info.mesh_triangles > 0;
-  CHECK(ist_tree_get_info(&s->tree_b, &info) == IST_OK);
+  CHECK(ist_asset_get_info(&s->tree_b, &info) == IST_OK);
   meshes += info.mesh_triangles > 0;
   status = ist_penetration(&s->a, &s->b, &settings, &s->workspace, &other);
-  CHECK(status == other.status && status == (meshes == 2 ? IST_OK : IST_NOT_HELD));
-  CHECK(meshes == 2 || (isnan(other.volume) && isnan(other.rotation_gradient[2])));
+  CHECK(status == other.status && status == (meshes == 2 ? IST_OK : IST_MISSING_DATA));
+  CHECK(meshes == 2 || (isnan(other.volume) && isnan(other.torque[2])));
   if (meshes == 2) { /* Steps of one motion, here of none: the second opens no node. */
     settings.pair_id = 7;
     CHECK(ist_penetration(&s->a, &s->b, &settings, &s->workspace, &whole) == IST_OK);
@@ -76,11 +76,11 @@ int penetrations_answer(scene_t* s) {
     CHECK(whole.node_visits == 0 && other.node_visits > 0);
     settings.pair_id = 0;
   }
-  floor.field = &field;
+  floor.shape = &field;
   floor.pose = s->a.pose;
   field.as.ball.radius = 1;
-  CHECK(ist_penetration(&floor, &s->b, &settings, &s->workspace, &other) == IST_NOT_HELD);
-  CHECK(isnan(other.volume) && other.status == IST_NOT_HELD);
+  CHECK(ist_penetration(&floor, &s->b, &settings, &s->workspace, &other) == IST_MISSING_DATA);
+  CHECK(isnan(other.volume) && other.status == IST_MISSING_DATA);
 
   /* Numbers that are none. */
   settings.measure = 3;
@@ -152,7 +152,7 @@ int separations_answer(scene_t* s) {
   CHECK(ist_penetration(&s->a, &s->b, NULL, &s->workspace, &lone) == IST_OK);
   CHECK(memcmp(&lone, &penetration, sizeof lone) == 0);
   {
-    ist_overlapping_t within = IST_OVERLAP_UNKNOWN;
+    ist_yes_no_t within = IST_UNKNOWN;
     const double distance = gap.distance;
     settings.max_distance = 0.9 * distance;
     settings.pair_id = 5;
@@ -165,11 +165,11 @@ int separations_answer(scene_t* s) {
     settings.max_distance = 0;
     settings.pair_id = 0;
     CHECK(ist_overlap_within(&s->a, &s->b, 2 * distance, &s->workspace, &within) == IST_OK);
-    CHECK(within == IST_OVERLAP_YES);
+    CHECK(within == IST_YES);
     CHECK(ist_overlap_within(&s->a, &s->b, 0.5 * distance, &s->workspace, &within) == IST_OK);
-    CHECK(within == IST_OVERLAP_NO);
+    CHECK(within == IST_NO);
     CHECK(ist_overlap_within(&s->a, &s->b, -1, &s->workspace, &within) == IST_INVALID_INPUT);
-    CHECK(within == IST_OVERLAP_UNKNOWN);
+    CHECK(within == IST_UNKNOWN);
     CHECK(ist_overlap_within(&s->a, NULL, 1, &s->workspace, &within) == IST_NULL_POINTER);
   }
   settings.max_visits = 1;
@@ -202,23 +202,23 @@ int separations_answer(scene_t* s) {
 }
 
 int overlaps_answer(scene_t* s) {
-  ist_overlapping_t answer = 77;
-  ist_pair_fit_t fit = {.size = sizeof fit};
-  ist_field_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
-  ist_placed_t floor = {.size = sizeof floor, .field = &field, .pose = s->a.pose};
+  ist_yes_no_t answer = 77;
+  ist_size_match_t fit = {.size = sizeof fit};
+  ist_shape_t field = {.size = sizeof field, .kind = IST_HALF_SPACE};
+  ist_placed_t floor = {.size = sizeof floor, .shape = &field, .pose = s->a.pose};
   ist_placed_t far_away = s->b;
   ist_workspace_t none = {0};
   field.as.half_space.normal[0] = 1;
   far_away.pose.t[0] = 20;
-  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, &answer) == IST_OK && answer == IST_OVERLAP_YES);
+  CHECK(ist_overlap(&s->a, &s->b, &s->workspace, &answer) == IST_OK && answer == IST_YES);
   CHECK(ist_overlap(&s->a, &far_away, &s->workspace, &answer) == IST_OK);
-  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(answer == IST_NO);
   CHECK(ist_overlap(&floor, &s->b, &s->workspace, &answer) == IST_OK);
-  CHECK(answer == IST_OVERLAP_YES);
+  CHECK(answer == IST_YES);
   CHECK(ist_overlap(&floor, &far_away, &s->workspace, &answer) == IST_OK);
-  CHECK(answer == IST_OVERLAP_NO);
+  CHECK(answer == IST_NO);
   CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
-  CHECK(answer == IST_OVERLAP_UNKNOWN);
+  CHECK(answer == IST_UNKNOWN);
   CHECK(ist_overlap(&s->a, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
   CHECK(ist_overlap(&s->a, &s->b, NULL, &answer) == IST_NULL_POINTER);
   CHECK(ist_overlap(&s->a, &s->b, &none, &answer) == IST_NO_HANDLE);
@@ -226,13 +226,13 @@ int overlaps_answer(scene_t* s) {
   CHECK(ist_overlap(NULL, &s->b, &s->workspace, &answer) == IST_NULL_POINTER);
   CHECK(ist_overlap(&floor, &s->b, &s->workspace, NULL) == IST_NULL_POINTER);
 
-  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_OK && fit.ratio >= 1 && fit.grain_a > 0);
-  CHECK(ist_get_pair_fit(NULL, &s->b, &fit) == IST_NULL_POINTER);
+  CHECK(ist_get_size_match(&s->a, &s->b, &fit) == IST_OK && fit.ratio >= 1 && fit.feature_size_a > 0);
+  CHECK(ist_get_size_match(NULL, &s->b, &fit) == IST_NULL_POINTER);
   CHECK(is_empty(&fit, sizeof fit, IST_NULL_POINTER));
-  CHECK(ist_get_pair_fit(&s->a, NULL, &fit) == IST_NULL_POINTER);
-  CHECK(ist_get_pair_fit(&s->a, &s->b, NULL) == IST_NULL_POINTER);
+  CHECK(ist_get_size_match(&s->a, NULL, &fit) == IST_NULL_POINTER);
+  CHECK(ist_get_size_match(&s->a, &s->b, NULL) == IST_NULL_POINTER);
   fit.size = 0;
-  CHECK(ist_get_pair_fit(&s->a, &s->b, &fit) == IST_WRONG_SIZE);
+  CHECK(ist_get_size_match(&s->a, &s->b, &fit) == IST_WRONG_SIZE);
   return 0;
 }
 
@@ -306,17 +306,17 @@ int outlines_answer(scene_t* s) {
   ist_outline_t outline = {.size = sizeof outline, .segment_size = sizeof segments[0]};
   ist_penetration_t whole = {.size = sizeof whole};
   ist_contact_settings_t settings = {.size = sizeof settings};
-  ist_tree_info_t info = {.size = sizeof info};
+  ist_asset_info_t info = {.size = sizeof info};
   ist_placed_t wrong;
   ist_status_t wanted = IST_OK;
   patches.patches = room;
   patches.capacity = 4;
   outline.segments = segments;
   outline.capacity = 4;
-  CHECK(ist_tree_get_info(&s->tree_a, &info) == IST_OK);
-  if (info.mesh_triangles == 0) wanted = IST_NOT_HELD;
-  CHECK(ist_tree_get_info(&s->tree_b, &info) == IST_OK);
-  if (info.mesh_triangles == 0) wanted = IST_NOT_HELD;
+  CHECK(ist_asset_get_info(&s->tree_a, &info) == IST_OK);
+  if (info.mesh_triangles == 0) wanted = IST_MISSING_DATA;
+  CHECK(ist_asset_get_info(&s->tree_b, &info) == IST_OK);
+  if (info.mesh_triangles == 0) wanted = IST_MISSING_DATA;
   outline.total = outline.count = patches.count = 9;
   CHECK(ist_overlap_outline(&s->a, &s->b, NULL, &s->workspace, &patches, &outline, &whole) ==
         wanted);
@@ -363,16 +363,16 @@ int outlines_answer(scene_t* s) {
 /* --- Fields ----------------------------------------------------------------------------------- */
 
 /* The half-space z ≤ offset, as a function. */
-static void sample(const void* context, const double x[3], ist_field_sample_t* answer) {
-  answer->distance = *(const double*)context - x[2];
-  answer->gradient[2] = -1;
+static void sample(const void* context, const double x[3], ist_shape_sample_t* answer) {
+  answer->distance = x[2] - *(const double*)context;
+  answer->gradient[2] = 1;
 }
 
 int fields_answer(scene_t* s) {
-  static float numbers[125];
+  static float heights[125], distances[125];
   static const double offset = 0.1;
   const ist_pose_t identity = IST_POSE_IDENTITY;
-  ist_field_t field = {.size = sizeof field};
+  ist_shape_t field = {.size = sizeof field};
   ist_placed_t a = {.size = sizeof a};
   ist_penetration_t answer = {.size = sizeof answer}, again = {.size = sizeof again};
   ist_separation_t gap = {.size = sizeof gap};
@@ -380,11 +380,11 @@ int fields_answer(scene_t* s) {
   ist_contact_patches_t patches = {.size = sizeof patches, .patch_size = sizeof room[0]};
   double by_plane = 0;
   int kind, i;
-  a.field = &field;
+  a.shape = &field;
   a.pose = identity;
   patches.patches = room;
   patches.capacity = 4;
-  for (i = 0; i < 125; ++i) numbers[i] = 0.1f;
+  for (i = 0; i < 125; ++i) distances[i] = -(heights[i] = 0.1f);
   for (kind = IST_HALF_SPACE; kind <= IST_FUNCTION; ++kind) {
     memset(&field.as, 0, sizeof field.as);
     field.kind = kind;
@@ -398,11 +398,11 @@ int fields_answer(scene_t* s) {
     } else if (kind == IST_CAPSULE || kind == IST_CYLINDER) {
       field.as.capsule.radius = field.as.capsule.half_height = 0.4;
     } else if (kind == IST_HEIGHTS) {
-      field.as.heights.heights = numbers;
+      field.as.heights.heights = heights;
       field.as.heights.columns = field.as.heights.rows = 5;
       field.as.heights.spacing[0] = field.as.heights.spacing[1] = 0.3;
     } else if (kind == IST_DISTANCE_GRID) {
-      field.as.distance_grid.distances = numbers;
+      field.as.distance_grid.distances = distances;
       for (i = 0; i < 3; ++i) field.as.distance_grid.points[i] = 5;
       for (i = 0; i < 3; ++i) field.as.distance_grid.origin[i] = -1;
       field.as.distance_grid.spacing = 0.5;
@@ -446,7 +446,7 @@ int fields_answer(scene_t* s) {
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   field.size = 8;
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
-  a.field = NULL;
+  a.shape = NULL;
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_NULL_POINTER);
   a.size = 8;
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_WRONG_SIZE);
@@ -459,16 +459,16 @@ int fields_answer(scene_t* s) {
   field.size = sizeof field;
   field.kind = IST_BALL;
   field.as.ball.radius = 0.4;
-  a.field = &field;
+  a.shape = &field;
   a.size = sizeof a;
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_OK);
   CHECK(ist_penetration(&s->b, &a, NULL, &s->workspace, &again) == IST_OK);
   CHECK(answer.volume == again.volume);
-  for (i = 0; i < 3; ++i) CHECK(answer.translation_gradient[i] == -again.translation_gradient[i]);
-  CHECK(ist_penetration(&a, &a, NULL, &s->workspace, &answer) == IST_NOT_HELD);
-  CHECK(ist_without_protrusion(&again, &s->b, &a, &answer) == IST_NOT_HELD);
-  CHECK(is_refused(&answer, sizeof answer, IST_NOT_HELD));
-  a.tree = &s->tree_a;
+  for (i = 0; i < 3; ++i) CHECK(answer.force[i] == -again.force[i]);
+  CHECK(ist_penetration(&a, &a, NULL, &s->workspace, &answer) == IST_MISSING_DATA);
+  CHECK(ist_without_protrusion(&again, &s->b, &a, &answer) == IST_MISSING_DATA);
+  CHECK(is_refused(&answer, sizeof answer, IST_MISSING_DATA));
+  a.asset = &s->tree_a;
   CHECK(ist_penetration(&a, &s->b, NULL, &s->workspace, &answer) == IST_INVALID_INPUT);
   return 0;
 }

@@ -1,7 +1,7 @@
 #ifndef IST_TESTS_C_API_SCENE_H
 #define IST_TESTS_C_API_SCENE_H
 
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -45,7 +45,7 @@ static inline int is_refused(const void* answer, size_t size, ist_status_t statu
 
 /* Two trees that overlap. */
 typedef struct scene {
-  ist_tree_t tree_a, tree_b;
+  ist_asset_t tree_a, tree_b;
   ist_placed_t a, b;
   ist_workspace_t workspace;
 } scene_t;

@@ -1,5 +1,5 @@
 /* Scenes, right and wrong. */
-#include <ist/ist_scene.h>
+#include <ist/c_scene.h>
 #include <math.h>
 
 #include "scene.h"
@@ -32,7 +32,7 @@ static int bodies_are_added(scene_t* s, ist_scene_t* scene) {
   body.group = 8;
   CHECK(ist_scene_add(scene, &body) == IST_INVALID_INPUT);
   body.group = 1;
-  unknown.tree = NULL;
+  unknown.asset = NULL;
   body.solid = &unknown;
   CHECK(ist_scene_add(scene, &body) == IST_NULL_POINTER);
   body.solid = NULL;
@@ -160,7 +160,7 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   uint32_t number = 77, numbers[4];
   ist_ray_hit_t hit, alone;
   size_t count = 5;
-  CHECK(ist_raycast(&s->a, &ray, 1, &alone, sizeof alone) >= IST_NOT_HELD);
+  CHECK(ist_raycast(&s->a, &ray, 1, &alone, sizeof alone) >= IST_MISSING_DATA);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, sizeof hit) == IST_OK);
   if (alone.status == IST_OK) CHECK(number == 4 && hit.distance == alone.distance);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, 3) == IST_WRONG_SIZE);

@@ -183,9 +183,9 @@ TEST_F(ClashFiles, PartsThatAreNoSolidsAreReportedAndTheRestIsAnswered) {
 }
 
 TEST_F(ClashFiles, CopiesInOnePlaceAndAssets) {
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "cube.ist", "--surface-only"}).exit_code, 0);
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "cube.ist", "--mesh-only"}).exit_code, 0);
   ASSERT_EQ(
-      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--keep-mesh", "no"}).exit_code,
       0);
   write("copies.toml",
         "[[part]]\nname = \"one\"\nmesh = \"cube.obj\"\n"

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/pose_eigen.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +59,7 @@ TEST(ClashPairs, MatedPartsTouchAndAMillionthOverlaps) {
     SCOPED_TRACE(row.name + " moved by " + std::to_string(row.moved));
     const std::vector<ClashPart> parts = {part(row.mesh_a, {}), part(row.mesh_b, row.pose)};
     const std::vector<Clash> found = clashes(parts);
-    const double smaller = std::min(parts[0].solid.tree.volume(), parts[1].solid.tree.volume());
+    const double smaller = std::min(parts[0].solid.asset.volume(), parts[1].solid.asset.volume());
     if (row.volume > 0) {
       ASSERT_EQ(found.size(), 1u);
       ++overlapping;
@@ -223,9 +223,10 @@ TEST(ClashPairs, AllPairsAreThoseOfSingleQueries) {
 
 TEST(ClashPairs, AnInvalidPoseIsRefusedByName) {
   const Asset cube = testing::surface(make_sample("cube"));
-  for (const PlacedTree& wrong : {PlacedTree{cube.view(), {{1, 0, 0, 0}, {std::nan(""), 0, 0}}, 1},
-                                  PlacedTree{cube.view(), {{0, 0, 0, 0}, {}}, 1},
-                                  PlacedTree{cube.view(), {}, 0}, PlacedTree{TreeView{}, {}, 1}}) {
+  for (const PlacedAsset& wrong :
+       {PlacedAsset{cube.view(), {{1, 0, 0, 0}, {std::nan(""), 0, 0}}, 1},
+        PlacedAsset{cube.view(), {{0, 0, 0, 0}, {}}, 1}, PlacedAsset{cube.view(), {}, 0},
+        PlacedAsset{AssetView{}, {}, 1}}) {
     try {
       clashes({{"fine", {cube.view(), {}, 1}}, {"wrong", wrong}});
       FAIL();

@@ -56,13 +56,14 @@ TEST_F(BakeCommand, TheSurfaceIsToldOfOrLeftOut) {
     return nlohmann::json::parse(ist(more).out);
   };
   EXPECT_EQ(told({}).at("kept_mesh").at("triangles"), 12);
-  const nlohmann::json none = told({"--surface", "none"});
+  const nlohmann::json none = told({"--keep-mesh", "no"});
   EXPECT_EQ(none.at("kept_mesh").at("bytes"), 0);
   EXPECT_TRUE(none.at("kept_mesh").at("error").is_null());
   EXPECT_EQ(none.at("kept_mesh").at("state"), "none");
   EXPECT_LT(none.at("bytes"), told({}).at("bytes"));
   for (const char* wrong : {"0", "0.5", "25%", "some", ""})
-    EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--surface", wrong}).exit_code, 2) << wrong;
+    EXPECT_EQ(ist({"bake", "cube.obj", "-o", "new.ist", "--keep-mesh", wrong}).exit_code, 2)
+        << wrong;
 }
 
 TEST_F(BakeCommand, KeepsTheMesh) {
@@ -72,33 +73,33 @@ TEST_F(BakeCommand, KeepsTheMesh) {
   EXPECT_EQ(mesh.at("state"), "own");
   EXPECT_EQ(mesh.at("triangles"), 12);
   EXPECT_EQ(mesh.at("error"), 0);
-  EXPECT_EQ(mesh.at("counted_twice"), 0);
+  EXPECT_EQ(mesh.at("self_overlap_volume"), 0);
   EXPECT_NE(ist({"info", "new.ist"}).out.find("mesh         12 triangles, all of the mesh,"),
             std::string::npos);
   EXPECT_EQ(ist({"check", "new.ist", "--mesh", "cube.obj"}).exit_code, 0);
 }
 
 TEST_F(BakeCommand, ASurfaceAlone) {
-  const Outcome baked = ist({"bake", "cube.obj", "-o", "new.ist", "--surface-only", "--json"});
+  const Outcome baked = ist({"bake", "cube.obj", "-o", "new.ist", "--mesh-only", "--json"});
   const nlohmann::json json = nlohmann::json::parse(baked.out);
   EXPECT_EQ(json.at("spheres"), 0);
   EXPECT_EQ(json.at("kept_mesh").at("triangles"), 12);
   EXPECT_NEAR(json.at("volume"), 1, 1e-12);
   EXPECT_EQ(ist({"check", "new.ist", "--mesh", "cube.obj"}).exit_code, 0);
-  EXPECT_NE(ist({"info", "new.ist"}).out.find("none: a surface alone"), std::string::npos);
+  EXPECT_NE(ist({"info", "new.ist"}).out.find("none: a mesh alone"), std::string::npos);
   const Outcome asked = ist({"query", "new.ist", "new.ist", "--pose", "1,0,0,0,0,0,0"});
   EXPECT_EQ(asked.exit_code, 1);
   EXPECT_NE(asked.err.find("new.ist: has no spheres"), std::string::npos) << asked.err;
   EXPECT_EQ(ist({"export", "new.ist", "-o", "-"}).exit_code, 1);
   const auto refused = [&](const std::vector<std::string>& more, const std::string& message) {
-    std::vector<std::string> all = {"bake", "cube.obj", "-o", "no.ist", "--surface-only"};
+    std::vector<std::string> all = {"bake", "cube.obj", "-o", "no.ist", "--mesh-only"};
     all.insert(all.end(), more.begin(), more.end());
     const Outcome outcome = ist(all);
     EXPECT_EQ(outcome.exit_code, 2);
     EXPECT_NE(outcome.err.find(message), std::string::npos) << outcome.err;
   };
-  refused({"--spheres", "5"}, "--spheres: has no effect with --surface-only");
-  refused({"--surface", "none"}, "--surface-only: contradicts --surface none");
+  refused({"--spheres", "5"}, "--spheres: has no effect with --mesh-only");
+  refused({"--keep-mesh", "no"}, "--mesh-only: contradicts --keep-mesh no");
 }
 
 TEST_F(BakeCommand, SpheresTooCoarseForThinPartsAreToldOf) {
@@ -131,7 +132,7 @@ TEST_F(BakeCommand, PartsOfALinkThatTouchAreToldOf) {
   write("r.urdf",
         "<robot name='r'><link name='a'><collision><geometry><mesh filename='boxes.obj'/>"
         "</geometry></collision></link></robot>");
-  const Outcome outcome = ist({"bake", "r.urdf", "-o", "out", "--surface-only", "--json"});
+  const Outcome outcome = ist({"bake", "r.urdf", "-o", "out", "--mesh-only", "--json"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const std::string text = "link a: parts of the mesh touch";
   EXPECT_NE(outcome.err.find("r.urdf: " + text), std::string::npos) << outcome.err;

@@ -1,13 +1,13 @@
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "cli/program.h"
 
-// ist query with a solid that has no asset, and --surface.
+// ist query with a solid that has no asset, and assets without a mesh.
 
 namespace {
 
@@ -45,7 +45,7 @@ constexpr const char* kAtOrigin = "1,0,0,0,0,0,0";
 TEST_F(FieldQuery, ACubeInTheFloorHasItsExactVolume) {
   const nlohmann::json answer = asked("plane:0,0,1,0", "cube.ist", "1,0,0,0,0,0,0.2");
   EXPECT_NEAR(answer["volume"].get<double>(), 0.3, 0.005);  // 100 spheres
-  EXPECT_NEAR(answer["dVdtz"].get<double>(), -1, 0.05);
+  EXPECT_NEAR(answer["force_z"].get<double>(), 1, 0.05);
   EXPECT_NEAR(answer["cz"].get<double>(), -0.15, 0.005);
   EXPECT_EQ(answer["distance"], 0);
   EXPECT_EQ(answer["status"], "ok");
@@ -158,7 +158,7 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
 
 /// Once, and only where meshes could have answered.
 TEST_F(FieldQuery, WarnsOfSpheresThatDoNotFit) {
-  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--surface", "none"})
+  ASSERT_EQ(ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "100", "--keep-mesh", "no"})
                 .exit_code,
             0);
   const std::vector<std::string> asked = {"query", "bare.ist", "cube.ist", "--pose", kAtOrigin};

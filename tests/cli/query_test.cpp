@@ -11,7 +11,8 @@ using ist::testing::numbers_of;
 using ist::testing::Outcome;
 
 constexpr const char* kHeader =
-    "id,volume,volume_min,volume_max,cx,cy,cz,dVdtx,dVdty,dVdtz,dVdrx,dVdry,dVdrz,distance,"
+    "id,volume,volume_min,volume_max,cx,cy,cz,force_x,force_y,force_z,torque_x,torque_y,torque_z,"
+    "distance,"
     "distance_min,distance_max,status,node_visits,sphere_pairs,time_us,touching,contact_area,"
     "contact_nx,contact_ny,contact_nz";
 
@@ -22,7 +23,7 @@ enum Column {
   volume_min,
   volume_max,
   cx,
-  dVdtx = 7,
+  force_x = 7,
   distance = 13,
   distance_min,
   distance_max,
@@ -71,7 +72,7 @@ TEST_F(QueryCommand, HalfACubeOverlapsHalfACube) {
   EXPECT_LE(r[volume_min], r[volume]);
   EXPECT_GE(r[volume_max], r[volume]);
   EXPECT_NEAR(r[cx], 0.25, 0.05);
-  EXPECT_LT(r[dVdtx], -0.5);  // pushing B further along +x lets go of volume
+  EXPECT_GT(r[force_x], 0.5);  // B is pushed along +x, where it lets go of volume
   EXPECT_GT(r[sphere_pairs], 0);
   EXPECT_GT(r[time_us], 0);
 }
@@ -178,7 +179,7 @@ TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
 
   // Without a mesh nothing is exact enough, and that is said.
   ASSERT_EQ(
-      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--keep-mesh", "no"}).exit_code,
       0);
   const auto all = rows({"bare.ist", "cube.ist", "--csv", "--pose", pose, "--error", "0.5%"});
   ASSERT_EQ(all.size(), 1u);
@@ -228,7 +229,7 @@ class ExactQueryCommand : public QueryCommand {
     QueryCommand::SetUp();
     for (const std::string name : {"bolt", "nut"}) {
       ASSERT_EQ(ist({"sample", name, "-o", name + ".obj"}).exit_code, 0);
-      const Outcome baked = ist({"bake", name + ".obj", "-o", name + ".ist", "--surface-only"});
+      const Outcome baked = ist({"bake", name + ".obj", "-o", name + ".ist", "--mesh-only"});
       ASSERT_EQ(baked.exit_code, 0) << baked.err;
     }
   }
@@ -247,7 +248,7 @@ TEST_F(ExactQueryCommand, TellsTheTrueVolumeOfSurfacesAlone) {
   EXPECT_LE(r[volume_min], kTruth + 1e-13);  // to the digits that the truth is written with
   EXPECT_GE(r[volume_max], kTruth - 1e-13);
   EXPECT_LT(r[volume_max] - r[volume_min], 1e-9 * kTruth);
-  EXPECT_NEAR(r[dVdtx + 2], 71.734, 1e-3);
+  EXPECT_NEAR(r[force_x + 2], -71.734, 1e-3);
   EXPECT_EQ(r[distance], 0);
   EXPECT_GT(r[time_us], 0);
 
@@ -299,7 +300,7 @@ TEST_F(ExactQueryCommand, TellsTheDistanceOfSurfaces) {
   EXPECT_NE(apart.out.find("volume     0 u³"), std::string::npos) << apart.out;
   const std::vector<double> r = row("1,0,0,0,0.5,0,0", {"--measure", "exact"});
   EXPECT_NEAR(r[volume], 0.5, 1e-12);
-  EXPECT_NEAR(r[dVdtx], -1, 1e-12);
+  EXPECT_NEAR(r[force_x], 1, 1e-12);
 }
 
 TEST_F(ExactQueryCommand, ALimitLeavesBoundsThatHold) {
@@ -319,11 +320,11 @@ TEST_F(ExactQueryCommand, ALimitLeavesBoundsThatHold) {
 
 TEST_F(ExactQueryCommand, SaysWhatIsNotHeld) {
   ASSERT_EQ(
-      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--surface", "none"}).exit_code,
+      ist({"bake", "cube.obj", "-o", "bare.ist", "--spheres", "50", "--keep-mesh", "no"}).exit_code,
       0);
   expect_exit(
       1, {"cube.ist", "bare.ist", "--pose", "1,0,0,0,0,0,0", "--measure", "exact"},
-      "bare.ist: has no mesh, which --measure exact needs; bake it again with --surface all");
+      "bare.ist: has no mesh, which --measure exact needs; bake it again with --keep-mesh yes");
   for (const char* measure : {"matched", "inner"})
     expect_exit(1, {"cube.ist", "nut.ist", "--pose", "1,0,0,0,0,0,0", "--measure", measure},
                 "nut.ist: has no spheres, which --measure " + std::string(measure) +

@@ -84,7 +84,7 @@ TEST_F(Reference, BashCompletesCommandsOptionsAndValues) {
   EXPECT_EQ(offered({"ist", "completion", "z"}), std::vector<std::string>{"zsh"});
   EXPECT_EQ(offered({"ist", "bake", "--grid", "e"}), std::vector<std::string>{"explicit"});
   EXPECT_EQ(offered({"ist", "bake", "--up-axis", ""}), (std::vector<std::string>{"X", "Y", "Z"}));
-  EXPECT_EQ(offered({"ist", "bake", "--surface", ""}), (std::vector<std::string>{"all", "none"}));
+  EXPECT_EQ(offered({"ist", "bake", "--keep-mesh", ""}), (std::vector<std::string>{"yes", "no"}));
   EXPECT_EQ(offered({"ist", "sample", "hollow"}), std::vector<std::string>{"hollow_sphere"});
   // An option of a group of options.
   EXPECT_EQ(offered({"ist", "query", "--poses"}), std::vector<std::string>{"--poses"});

@@ -12,7 +12,7 @@
 
 // Bytes are refused as an asset, or answer queries with finite numbers. An input whose first byte
 // is even is taken as it comes; an odd one is a list of changes to a sound asset, one of spheres or
-// (3 more than a multiple of 4) a surface alone, whose hash is then set right, so that the checks
+// (3 more than a multiple of 4) a mesh alone, whose hash is then set right, so that the checks
 // behind it are reached.
 
 namespace {
@@ -21,7 +21,7 @@ using namespace ist;
 using testing::AlignedBytes;
 
 /// All that a query may follow.
-void walk(const TreeView& view) {
+void walk(const AssetView& view) {
   const AssetHeader& asset = view.header();
   const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
   double sum = 0;
@@ -43,7 +43,7 @@ void walk(const TreeView& view) {
   if (!std::isfinite(sum)) std::abort();
 }
 
-void use(const TreeView& view, const TreeView& sound) {
+void use(const AssetView& view, const AssetView& sound) {
   if (view.has_mesh()) walk(view);
   static Workspace workspace(1u << 14);
   Pose pose;
@@ -56,11 +56,11 @@ void use(const TreeView& view, const TreeView& sound) {
     const auto [penetration, separation] =
         query({view, {}, 1}, {sound, pose, 1}, ist::testing::for_both(settings), workspace);
     if (view.sphere_count() == 0) {
-      if (penetration.status != QueryStatus::not_held) std::abort();
+      if (penetration.status != QueryStatus::missing_data) std::abort();
       continue;
     }
     if (!(penetration.volume >= 0) || !std::isfinite(penetration.volume_max)) std::abort();
-    if (!penetration.translation_gradient.allFinite()) std::abort();
+    if (!penetration.force.allFinite()) std::abort();
     // An asset that lies may lie about distances, too, but not without end.
     if (!(separation.distance_min >= 0) || !std::isfinite(separation.distance_max)) std::abort();
     if (!std::isfinite(separation.distance_min)) std::abort();
@@ -71,21 +71,21 @@ void use(const TreeView& view, const TreeView& sound) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const AlignedBytes original(testing::small_asset(40, 1));
-  static const TreeView sound = [] {
-    TreeView view;
-    if (TreeView::from_bytes(original.span(), view) != AssetStatus::ok) std::abort();
+  static const AssetView sound = [] {
+    AssetView view;
+    if (AssetView::from_bytes(original.span(), view) != AssetStatus::ok) std::abort();
     return view;
   }();
   if (size < 1) return 0;
   std::span<const std::byte> input(reinterpret_cast<const std::byte*>(data + 1), size - 1);
   if (data[0] % 2 == 0) {
     const AlignedBytes block(input);
-    TreeView view;
-    if (TreeView::from_bytes(block.span(), view) == AssetStatus::ok) use(view, sound);
+    AssetView view;
+    if (AssetView::from_bytes(block.span(), view) == AssetStatus::ok) use(view, sound);
     return 0;
   }
   static const Asset alone =
-      bake_surface(close_mesh(testing::torus_mesh(1, 0.4, 8, 5), "torus"), 1);
+      bake_mesh_only(close_mesh(testing::torus_mesh(1, 0.4, 8, 5), "torus"), 1);
   AlignedBytes block(data[0] % 4 == 3 ? alone.bytes() : original.span());
   for (; input.size() >= 6; input = input.subspan(6)) {  // where (2 bytes), what (4)
     std::uint16_t at = 0;
@@ -93,7 +93,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::memcpy(&block[at % (block.span().size() - 3)], input.data() + 2, 4);
   }
   block.seal();
-  TreeView view;
-  if (TreeView::from_bytes(block.span(), view) == AssetStatus::ok) use(view, sound);
+  AssetView view;
+  if (AssetView::from_bytes(block.span(), view) == AssetStatus::ok) use(view, sound);
   return 0;
 }

@@ -63,7 +63,7 @@ void look_at(const Penetration& answer) {
   require(answer.volume >= 0);
   require(answer.volume_min <= answer.volume);
   require(answer.volume <= answer.volume_max);
-  require(!answer.translation_gradient.hasNaN() && !answer.rotation_gradient.hasNaN());
+  require(!answer.force.hasNaN() && !answer.torque.hasNaN());
   require(!answer.centroid.hasNaN());
 }
 
@@ -75,12 +75,12 @@ bool same_bits(const Penetration& a, const Penetration& b) {
 }
 
 /// The same poses and scales of two meshes.
-void ask_exact(PlacedTree a, PlacedTree b, bool copies, std::uint32_t max_visits,
+void ask_exact(PlacedAsset a, PlacedAsset b, bool copies, std::uint32_t max_visits,
                Workspace& workspace) {
-  static const Asset ball = bake_surface(close_mesh(testing::icosphere_mesh(2), "ball"));
-  static const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
-  a.tree = ball.view();
-  b.tree = (copies ? ball : cube).view();
+  static const Asset ball = bake_mesh_only(close_mesh(testing::icosphere_mesh(2), "ball"));
+  static const Asset cube = bake_mesh_only(close_mesh(testing::cube_mesh(), "cube"));
+  a.asset = ball.view();
+  b.asset = (copies ? ball : cube).view();
   PenetrationSettings settings{.measure = Measure::exact};
   settings.max_visits = max_visits;
   const Penetration answer = penetration(a, b, settings, workspace);
@@ -88,7 +88,7 @@ void ask_exact(PlacedTree a, PlacedTree b, bool copies, std::uint32_t max_visits
     require(answer.volume_min == 0 && answer.volume_max > 0);
     return;
   }
-  require(answer.status != QueryStatus::not_held);
+  require(answer.status != QueryStatus::missing_data);
   look_at(answer);
   require(same_bits(answer, penetration(a, b, settings, workspace)));
 }
@@ -108,10 +108,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((flags & 2) != 0) settings.max_visits = input.next<std::uint8_t>();
   if ((flags & 4) != 0) settings.relative_error = input.next<double>();
   Workspace& workspace = (flags & 16) != 0 ? small : large;
-  PlacedTree placed_a{a.view(), next_pose(input), 1}, placed_b{b.view(), next_pose(input), 1};
+  PlacedAsset placed_a{a.view(), next_pose(input), 1}, placed_b{b.view(), next_pose(input), 1};
   if ((flags & 32) != 0) placed_b.scale = input.next<double>();
   if ((flags & 64) != 0) placed_a.scale = input.next<float>();
-  if ((flags & 128) != 0) placed_b.tree = a.view();
+  if ((flags & 128) != 0) placed_b.asset = a.view();
   settings.pair_budget = input.next<std::uint16_t>();
   if (input.next<std::uint8_t>() % 2 == 1)
     ask_exact(placed_a, placed_b, (flags & 128) != 0, settings.max_visits, workspace);

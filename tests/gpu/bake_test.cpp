@@ -1,5 +1,5 @@
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <cstring>
 #include <string>

@@ -1,7 +1,7 @@
 #include "cuda/banded/banded_pack.h"
 
-#include <ist/error.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 
 #include <chrono>
 #include <cstring>

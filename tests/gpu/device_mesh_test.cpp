@@ -1,7 +1,7 @@
 #include "cuda/device_mesh.h"
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>

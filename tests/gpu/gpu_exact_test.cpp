@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <ist/gpu_query.h>
 
 #include "support/device_batch.h"

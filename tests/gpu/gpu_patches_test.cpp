@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cuda_runtime_api.h>
-#include <ist/error.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include <cmath>
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cuda_runtime_api.h>
-#include <ist/error.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include "cuda/check.h"
 #include "support/detailed_pairs.h"
@@ -48,8 +48,8 @@ struct MixedScene {
 
   explicit MixedScene(std::size_t count) {
     for (const auto& [name, field] : fields())
-      if (!std::holds_alternative<FunctionField>(field)) solids.emplace_back(field);
-    solids.emplace_back(Field(BallField{-1}));
+      if (!std::holds_alternative<FunctionShape>(field)) solids.emplace_back(field);
+    solids.emplace_back(Shape(BallShape{-1}));
     RandomPairs random(15);
     pairs = random.pairs(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -115,9 +115,10 @@ TEST_F(GpuQueryTest, LargePairsAmongTrianglesHaveTheSameBitsHoweverManyThereAre)
   std::vector<BatchPair> some;
   for (BatchPair pair : scene.pairs) {
     const auto* const field =
-        pair.a < scene.solids.size() ? std::get_if<Field>(&scene.solids[pair.a]) : nullptr;
+        pair.a < scene.solids.size() ? std::get_if<Shape>(&scene.solids[pair.a]) : nullptr;
     if (field == nullptr || pair.b >= batch_assets().size() ||
-        !(std::holds_alternative<HeightField>(*field) || std::holds_alternative<BoxField>(*field)))
+        !(std::holds_alternative<HeightFieldShape>(*field) ||
+          std::holds_alternative<BoxShape>(*field)))
       continue;
     pair.pose_b = pair.pose_a;
     pair.scale_b = 2 * pair.scale_a;
@@ -283,12 +284,12 @@ TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
   EXPECT_THROW(penetration_batch(solids, batch.pairs(), {Measure::matched}, workspace,
                                  batch.answers(), nullptr),
                Error);
-  const GpuSolid none = TreeView{};
+  const GpuSolid none = AssetView{};
   EXPECT_THROW(penetration_batch(solids, GpuPairs{}, {Measure::exact}, workspace, {}, nullptr),
                Error);
   EXPECT_THROW(GpuSolids({&none, 1}), Error);
   EXPECT_THROW(GpuWorkspace(std::size_t{1} << 40), Error);
-  const GpuSolid function = Field(FunctionField{});
+  const GpuSolid function = Shape(FunctionShape{});
   EXPECT_THROW(GpuSolids({&function, 1}), Error);
   EXPECT_EQ(GpuSolids({}).size(), 0u);
   const DeviceBatch empty({});

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cuda_runtime_api.h>
-#include <ist/error.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include <cmath>
 
@@ -53,12 +53,12 @@ TEST_F(GpuSeparationTest, AgreesWithSeparationOnTheOraclesRows) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   constexpr std::size_t kSpheres = 4000;
   std::vector<BatchPair> pairs;
-  std::vector<std::pair<PlacedTree, PlacedTree>> of_cpu;
+  std::vector<std::pair<PlacedAsset, PlacedAsset>> of_cpu;
   for (const OracleRow& row : read_oracle_rows("eledino")) {
     of_cpu.push_back(placed(row, kSpheres));
     pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
   }
-  const GpuSolids solids(std::vector<GpuSolid>{of_cpu[0].first.tree, of_cpu[0].second.tree});
+  const GpuSolids solids(std::vector<GpuSolid>{of_cpu[0].first.asset, of_cpu[0].second.asset});
   const std::vector<Separation> answers = on_device(solids, pairs);
   Workspace workspace;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

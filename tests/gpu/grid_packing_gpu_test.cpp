@@ -1,4 +1,4 @@
-#include <ist/medial.h>
+#include <ist/bake.h>
 
 #include <thread>
 

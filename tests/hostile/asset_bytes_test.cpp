@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <cmath>
 #include <cstring>
@@ -80,17 +80,17 @@ TEST(AssetBytes, SaysWhatIsWrong) {
   std::vector<std::byte> shifted(bytes.size() + 1);
   std::copy(bytes.begin(), bytes.end(), shifted.begin() + 1);
   const AlignedBytes block(shifted);
-  TreeView view;
-  EXPECT_EQ(TreeView::from_bytes(block.span().subspan(1), view), AssetStatus::misaligned);
+  AssetView view;
+  EXPECT_EQ(AssetView::from_bytes(block.span().subspan(1), view), AssetStatus::misaligned);
   EXPECT_THROW(Asset(std::span(bytes).first(100), "cut.ist"), Error);
 }
 
 /// What a query does with accepted bytes must be finite in time and stay inside them; the values
 /// may be any.
-void use(const AlignedBytes& bytes, const TreeView& sound) {
+void use(const AlignedBytes& bytes, const AssetView& sound) {
   static Workspace workspace(1u << 16);
-  TreeView view;
-  ASSERT_EQ(TreeView::from_bytes(bytes.span(), view), AssetStatus::ok);
+  AssetView view;
+  ASSERT_EQ(AssetView::from_bytes(bytes.span(), view), AssetStatus::ok);
   Pose pose;
   pose.t[0] = 0.2;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
@@ -101,8 +101,8 @@ void use(const AlignedBytes& bytes, const TreeView& sound) {
           query({sound, {}, 1}, {view, pose, 1}, testing::for_both(settings), workspace)}) {
       EXPECT_GE(penetration.volume, 0);
       EXPECT_TRUE(std::isfinite(penetration.volume_max));
-      EXPECT_TRUE(penetration.translation_gradient.allFinite());
-      EXPECT_TRUE(penetration.rotation_gradient.allFinite());
+      EXPECT_TRUE(penetration.force.allFinite());
+      EXPECT_TRUE(penetration.torque.allFinite());
       EXPECT_GE(separation.distance, 0);
       EXPECT_LE(separation.distance_min, separation.distance_max);
     }
@@ -114,8 +114,8 @@ void use(const AlignedBytes& bytes, const TreeView& sound) {
 TEST(AssetBytes, HostileFieldsAreRefusedOrHarmless) {
   const auto bytes = small_asset(40);
   const AlignedBytes original(bytes);
-  TreeView sound;
-  ASSERT_EQ(TreeView::from_bytes(original.span(), sound), AssetStatus::ok);
+  AssetView sound;
+  ASSERT_EQ(AssetView::from_bytes(original.span(), sound), AssetStatus::ok);
   std::mt19937_64 bits(5);
   const std::uint64_t values[] = {0,
                                   1,
@@ -166,8 +166,8 @@ TEST(AssetBytes, HostileFieldsAreRefusedOrHarmless) {
 TEST(AssetBytes, EveryHostileWordIsRefusedOrHarmless) {
   const auto bytes = small_asset(18);
   const AlignedBytes original(bytes);
-  TreeView sound;
-  ASSERT_EQ(TreeView::from_bytes(original.span(), sound), AssetStatus::ok);
+  AssetView sound;
+  ASSERT_EQ(AssetView::from_bytes(original.span(), sound), AssetStatus::ok);
   // Integers at their ends, floats: NaN, ±inf, −1, 1e30, the mark of an empty lane, a denormal, −0.
   const std::uint32_t values[] = {0u,          1u,          0xffffffffu, 0x7fffffffu,
                                   0x7fc00000u, 0x7f800000u, 0xff800000u, 0xbf800000u,

@@ -15,19 +15,19 @@ namespace {
 
 using testing::AlignedBytes;
 
-Asset alone(TriangleMesh mesh) { return bake_surface(close_mesh(std::move(mesh), "mesh")); }
+Asset alone(TriangleMesh mesh) { return bake_mesh_only(close_mesh(std::move(mesh), "mesh")); }
 
 /// Reads all that a query may: the address sanitizer sees what lies outside.
 void walk_mesh(const AlignedBytes& bytes) {
-  TreeView view;
-  ASSERT_EQ(TreeView::from_bytes(bytes.span(), view), AssetStatus::ok);
+  AssetView view;
+  ASSERT_EQ(AssetView::from_bytes(bytes.span(), view), AssetStatus::ok);
   ASSERT_TRUE(view.has_mesh());
   const AssetHeader& asset = view.header();
   const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
   const auto* const vertices = at<double>(asset, mesh.vertices);
   const auto* const blocks = at<MeshBlock>(asset, mesh.level[0].blocks);
   const auto* const neighbours = at<std::uint32_t>(asset, mesh.neighbours);
-  double sum = view.mesh_error() + view.counted_twice();
+  double sum = view.mesh_error() + view.self_overlap_volume();
   std::uint64_t triangles = 0;
   for (std::uint32_t b = 0; b < mesh.level[0].count; ++b) {
     const MeshBlock& block = blocks[b];
@@ -113,7 +113,7 @@ TEST(MeshBytes, EveryOffsetCountAndIndexIsLookedAt) {
     refused(header.mesh + offsetof(MeshHeader, error), value);
     refused(header.mesh + offsetof(MeshHeader, rounding), value);
   }
-  refused(offsetof(AssetHeader, counted_twice), -1.0);
+  refused(offsetof(AssetHeader, self_overlap_volume), -1.0);
   for (const MeshState state : {MeshState::none, MeshState::unresolved, MeshState(5)})
     refused(offsetof(AssetHeader, mesh_state), static_cast<std::uint32_t>(state));
   refused(block, mesh.vertex_count);

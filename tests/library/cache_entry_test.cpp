@@ -51,7 +51,7 @@ TEST_F(CacheKeys, FollowEverySetting) {
   const CacheKey plain = key(mesh);
   for (const Setting& setting : all_settings()) {
     BakeSettings other;
-    const std::string value = setting.name == "surface"            ? "none"
+    const std::string value = setting.name == "keep-mesh"          ? "no"
                               : setting.name == "world-up"         ? "Y"
                               : setting.kind == SettingKind::whole ? "7"
                               : setting.kind == SettingKind::real  ? "0.25"

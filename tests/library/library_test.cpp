@@ -213,18 +213,18 @@ TEST_F(Library, TargetsAndWarningsAreInTheSummary) {
 
 TEST_F(Library, AnAssetThatIsNotWhatIsDemandedFails) {
   write("demands.toml",
-        "[defaults]\nspheres = 40\nrequire-surface = true\n"
+        "[defaults]\nspheres = 40\nrequire-mesh = true\n"
         "[[asset]]\nmesh = \"meshes/cube.obj\"\n"
-        "[[asset]]\nname = 'bare'\nmesh = \"meshes/cube.obj\"\nsurface = \"none\"\n"
-        "[[asset]]\nname = 'bare_may_be'\nmesh = \"meshes/cube.obj\"\nsurface = \"none\"\n"
-        "require-surface = false\n"
+        "[[asset]]\nname = 'bare'\nmesh = \"meshes/cube.obj\"\nkeep-mesh = \"no\"\n"
+        "[[asset]]\nname = 'bare_may_be'\nmesh = \"meshes/cube.obj\"\nkeep-mesh = \"no\"\n"
+        "require-mesh = false\n"
         "[[asset]]\nname = 'full'\nmesh = \"meshes/cube.obj\"\nmin-coverage = \"99.9%\"\n");
   const Outcome outcome = bake("out", {"--json"}, {}, "demands.toml");
   ASSERT_EQ(outcome.exit_code, 1) << outcome.err;
   const nlohmann::json assets = nlohmann::json::parse(outcome.out).at("assets");
   ASSERT_EQ(assets.size(), 4u);
   const auto message = [&](int i) { return assets[i].at("message").dump(); };
-  EXPECT_NE(message(0).find("require-surface: the asset holds no surface"), std::string::npos);
+  EXPECT_NE(message(0).find("require-mesh: the asset keeps no mesh"), std::string::npos);
   EXPECT_EQ(assets[1].at("mesh_state"), "none");
   EXPECT_EQ(assets[1].at("status"), "baked");
   EXPECT_EQ(assets[2].at("mesh_state"), "own");

@@ -186,12 +186,12 @@ TEST_F(Mistakes, ButDefaultsMayBeOfNoUseToSome) {
   write("fine.toml", R"([defaults]
 at-overlap = "1%"
 world-up = "Y"
-surface = "all"
+keep-mesh = "yes"
 spheres = 20
 
 [[asset]]
 mesh = "meshes/cube.obj"
-surface = "none"
+keep-mesh = "no"
 name = "{stem}-of-many"
 
 [[asset]]

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "library/input_mesh.h"
 #include "library/settings/numbers.h"

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include <algorithm>
 #include <cmath>
@@ -37,13 +37,13 @@ TEST(AlignedFlats, AFieldsFaceDoesNotPushSideways) {
   for (const double depth : {0.0, 0.002, 0.01, 0.05}) {
     for (int i = 0; i < 20; ++i) {
       const double x = uniform(random), y = uniform(random), yaw = 3 * uniform(random);
-      for (const Field& field : {Field(HalfSpaceField{}), Field(BoxField{{3, 3, 0.25}})}) {
-        const double top = std::holds_alternative<BoxField>(field) ? 0.25 : 0;
+      for (const Shape& field : {Shape(HalfSpaceShape{}), Shape(BoxShape{{3, 3, 0.25}})}) {
+        const double top = std::holds_alternative<BoxShape>(field) ? 0.25 : 0;
         const Penetration p =
-            penetration(PlacedField{field, {}},
+            penetration(PlacedShape{field, {}},
                         {cube().view(), turned(x, y, top + 0.5 - depth, yaw)}, {}, workspace);
-        EXPECT_GT(-p.translation_gradient.z(), 0.3);
-        EXPECT_LE(p.translation_gradient.head<2>().norm(), -0.003 * p.translation_gradient.z());
+        EXPECT_GT(p.force.z(), 0.3);
+        EXPECT_LE(p.force.head<2>().norm(), 0.003 * p.force.z());
       }
     }
   }
@@ -63,7 +63,7 @@ TEST(AlignedFlats, CubesOnCubesPushSidewaysAsTheExactGradientDoes) {
           {cube().view(), {}}, {cube().view(), turned(x, y, 1 - depth, 0)}, settings, workspace);
       const Eigen::Vector2d exact(std::copysign((1 - std::abs(y)) * depth, x),
                                   std::copysign((1 - std::abs(x)) * depth, y));
-      const Vector3d push = -p.translation_gradient;
+      const Vector3d push = p.force;
       shares.push_back((push.head<2>() - exact).norm() / push.z());
     }
     std::sort(shares.begin(), shares.end());

@@ -67,7 +67,7 @@ TEST(BoxOverlap, VolumesGradientsAndTheLowerBound) {
     const OrientedBox box_a{Eigen::Vector3d::Zero(), kHalfA, Eigen::Matrix3d::Identity()};
     const double exact = overlap_volume(box_a, moved(kHalfB, pose));
     if (exact < 1e-3 * smaller) continue;
-    const PlacedTree placed_a{a.view(), Pose{}}, placed_b{b.view(), to_pose(pose)};
+    const PlacedAsset placed_a{a.view(), Pose{}}, placed_b{b.view(), to_pose(pose)};
     const Penetration matched = penetration(placed_a, placed_b, {}, workspace);
     ASSERT_EQ(matched.status, QueryStatus::ok);
     (exact > 0.1 * smaller ? deep : shallow).push_back(std::abs(matched.volume / exact - 1));
@@ -87,8 +87,7 @@ TEST(BoxOverlap, VolumesGradientsAndTheLowerBound) {
                      overlap_volume(box_a, moved(kHalfB, behind))) /
                     (2 * kStep);
     }
-    if (exact < 0.5 * smaller)
-      force.push_back((matched.translation_gradient - gradient).norm() / gradient.norm());
+    if (exact < 0.5 * smaller) force.push_back((matched.force + gradient).norm() / gradient.norm());
   }
   EXPECT_LE(median(deep), 0.001);
   EXPECT_LE(median(shallow), 0.005);

@@ -31,16 +31,16 @@ const Asset& surface_of(const std::filesystem::path& path) {
 }
 
 /// A row's solids as it places them.
-std::pair<PlacedTree, PlacedTree> placed(const OracleRow& row) {
+std::pair<PlacedAsset, PlacedAsset> placed(const OracleRow& row) {
   return {
-      PlacedTree{surface_of(testing::oracle_mesh_path(row.mesh_a)).view(), {}, 1},
-      PlacedTree{surface_of(testing::oracle_mesh_path(row.mesh_b)).view(), row.pose, row.scale_b}};
+      PlacedAsset{surface_of(testing::oracle_mesh_path(row.mesh_a)).view(), {}, 1},
+      PlacedAsset{surface_of(testing::oracle_mesh_path(row.mesh_b)).view(), row.pose, row.scale_b}};
 }
 
 class ExactOracle : public ::testing::Test {
  protected:
   /// Volume, interval and the query's own checks. `precision` of the truth, relative.
-  Penetration compare(const PlacedTree& a, const PlacedTree& b, double truth, double precision) {
+  Penetration compare(const PlacedAsset& a, const PlacedAsset& b, double truth, double precision) {
     const Penetration found = testing::exactly(a, b, workspace_);
     EXPECT_EQ(found.status, QueryStatus::ok);
     EXPECT_NEAR(found.volume, truth, std::max(1e-9, precision) * truth);
@@ -79,8 +79,8 @@ class ExactOracle : public ::testing::Test {
 
 /// The oracle's gradients and centroids have as many digits as their file, of numbers of size 1.
 void expect_rest(const Penetration& found, const OracleRow& row) {
-  EXPECT_LE((found.translation_gradient - row.translation_gradient).norm(), 2e-9);
-  EXPECT_LE((found.rotation_gradient - row.rotation_gradient).norm(), 2e-9);
+  EXPECT_LE((found.force - row.force).norm(), 2e-9);
+  EXPECT_LE((found.torque - row.torque).norm(), 2e-9);
   if (row.volume > 0) {
     EXPECT_LE((found.centroid - row.centroid).norm(), 2e-9);
   }
@@ -126,8 +126,8 @@ std::vector<OracleRow> rows_of(const std::string& poses, const std::string& trut
     row.scale_b = pose("scale_b");
     row.volume = truth("volume");
     row.centroid = {truth("cx"), truth("cy"), truth("cz")};
-    row.translation_gradient = {truth("dVdtx"), truth("dVdty"), truth("dVdtz")};
-    row.rotation_gradient = {truth("dVdrx"), truth("dVdry"), truth("dVdrz")};
+    row.force = -Eigen::Vector3d(truth("dVdtx"), truth("dVdty"), truth("dVdtz"));
+    row.torque = -Eigen::Vector3d(truth("dVdrx"), truth("dVdry"), truth("dVdrz"));
     rows.push_back(row);
   }
   return rows;
@@ -164,14 +164,13 @@ TEST_P(ExactOracleOfSmall, EveryRow) {
   IST_NEEDS_SHARED("oracle/small/" + name + ".csv");
   for (const OracleRow& row : rows_of("small/" + name + ".csv", "small/truth_" + name + ".csv")) {
     SCOPED_TRACE(row.pose_class + ' ' + std::to_string(row.id));
-    const PlacedTree a{surface_of(mesh_path(row.mesh_a)).view(), {}, 1};
-    const PlacedTree b{surface_of(mesh_path(row.mesh_b)).view(), row.pose, row.scale_b};
+    const PlacedAsset a{surface_of(mesh_path(row.mesh_a)).view(), {}, 1};
+    const PlacedAsset b{surface_of(mesh_path(row.mesh_b)).view(), row.pose, row.scale_b};
     const Penetration found = compare(a, b, row.volume, precision);
     // By differences of volumes.
-    const double force = row.translation_gradient.norm(), torque = row.rotation_gradient.norm();
-    EXPECT_LE((found.translation_gradient - row.translation_gradient).norm(), 1e-3 * force);
-    EXPECT_LE((found.rotation_gradient - row.rotation_gradient).norm(),
-              1e-3 * (torque + force * row.scale_b));
+    const double force = row.force.norm(), torque = row.torque.norm();
+    EXPECT_LE((found.force - row.force).norm(), 1e-3 * force);
+    EXPECT_LE((found.torque - row.torque).norm(), 1e-3 * (torque + force * row.scale_b));
   }
   EXPECT_GE(rows_, 20);
 }
@@ -188,9 +187,10 @@ TEST_F(ExactOracle, EveryPairOfSolidsThatMeetThemselves) {
   IST_NEEDS_SHARED("oracle/wild/poses_wild.csv");
   for (const OracleRow& row : rows_of("wild/poses_wild.csv", "wild/truth_wild.csv")) {
     SCOPED_TRACE(row.mesh_a + ' ' + row.mesh_b);
-    const PlacedTree a{surface_of(testing::shared_path("meshes/wild/" + row.mesh_a)).view(), {}, 1};
-    const PlacedTree b{surface_of(testing::shared_path("meshes/wild/" + row.mesh_b)).view(),
-                       row.pose, row.scale_b};
+    const PlacedAsset a{
+        surface_of(testing::shared_path("meshes/wild/" + row.mesh_a)).view(), {}, 1};
+    const PlacedAsset b{surface_of(testing::shared_path("meshes/wild/" + row.mesh_b)).view(),
+                        row.pose, row.scale_b};
     const auto is_dae = [](const std::string& name) { return name.find(".dae") != name.npos; };
     // The oracle has vertices of these files that are 1e-8 off the files' own.
     compare(a, b, row.volume, is_dae(row.mesh_a) || is_dae(row.mesh_b) ? 1e-6 : 1e-9);

@@ -23,7 +23,7 @@ TEST(GpuPatchesOracle, AreThoseOfTheCpu) {
     for (const OracleRow& row : rows) pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
     const auto [first, second] = placed(rows.front(), kSpheres);
     const std::vector<PatchedPair> answers =
-        HostPatches({first.tree, second.tree}).run(pairs, Measure::matched, kMost);
+        HostPatches({first.asset, second.asset}).run(pairs, Measure::matched, kMost);
     double worst = 0, worst_force = 0;
     std::size_t found = 0, in_touch = 0, other = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {

@@ -17,13 +17,13 @@ TEST(GpuSeparationOracle, IntervalsHoldTheSolidsDistance) {
     std::vector<BatchPair> pairs;
     for (const OracleRow& row : rows) pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
     const auto [first, second] = placed(rows.front(), kSpheres);
-    HostSeparations batch({first.tree, second.tree});
+    HostSeparations batch({first.asset, second.asset});
     const std::vector<Separation> answers = batch.run(pairs);
     double worst = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto [a, b] = placed(rows[i], kSpheres);
-      ASSERT_EQ(&a.tree.header(), &first.tree.header());
-      ASSERT_EQ(&b.tree.header(), &second.tree.header());
+      ASSERT_EQ(&a.asset.header(), &first.asset.header());
+      ASSERT_EQ(&b.asset.header(), &second.asset.header());
       const Separation cpu = separation(a, b, {.inner_spheres = true}, workspace);
       const Separation& gpu = answers[i];
       const double exact = rows[i].solid_distance();

@@ -1,5 +1,5 @@
 #include <gtest/gtest.h>
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include "support/oracle_assets.h"
 #include "support/oracle_rows.h"
@@ -15,10 +15,9 @@ TEST(OverlapOracle, IsNeverWrong) {
     int unknown = 0, rows = 0;
     for (const testing::OracleRow& row : testing::read_oracle_rows(key)) {
       const auto [a, b] = testing::placed(row, 2000);
-      const Overlapping answer = overlap(a, b, workspace);
-      EXPECT_NE(answer, row.volume > 0 ? Overlapping::no : Overlapping::yes)
-          << key << " " << row.id;
-      unknown += answer == Overlapping::unknown;
+      const YesNo answer = overlap(a, b, workspace).answer;
+      EXPECT_NE(answer, row.volume > 0 ? YesNo::no : YesNo::yes) << key << " " << row.id;
+      unknown += answer == YesNo::unknown;
       ++rows;
     }
     EXPECT_LE(unknown, rows / 20) << key;

@@ -56,8 +56,7 @@ TEST(VolumeOracle, VolumesAndForcesByClass) {
     const std::string name = overlap_class(row);
     EXPECT_GT(answer.volume, 0) << "row " << row.id << ' ' << name;
     errors[name].push_back(std::abs(answer.volume / row.volume - 1));
-    angles[name].push_back(
-        name == "contain" ? 0 : angle(answer.translation_gradient, row.translation_gradient));
+    angles[name].push_back(name == "contain" ? 0 : angle(answer.force, row.force));
     // The inner spheres are a certified lower bound.
     PenetrationSettings inner;
     inner.measure = Measure::inner;
@@ -86,10 +85,9 @@ TEST(VolumeOracle, FloatKeepsTheDoubleSum) {
     EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
     EXPECT_LE(answer.volume_min, sum.volume);
     EXPECT_GE(answer.volume_max, sum.volume);
-    EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
-              1e-4 * sum.translation_gradient.norm() + 1e-7 * sum.force_scale);
-    EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(),
-              1e-4 * sum.rotation_gradient.norm() + 1e-6 * sum.force_scale);
+    EXPECT_LE((answer.force - sum.force).norm(), 1e-4 * sum.force.norm() + 1e-7 * sum.force_scale);
+    EXPECT_LE((answer.torque - sum.torque).norm(),
+              1e-4 * sum.torque.norm() + 1e-6 * sum.force_scale);
   }
 }
 

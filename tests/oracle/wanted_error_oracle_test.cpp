@@ -32,7 +32,7 @@ std::vector<OracleRow> small_rows(const std::string& key) {
                 {pose("tx"), pose("ty"), pose("tz")}};
     row.scale_b = pose("scale_b");
     row.volume = truth("volume");
-    row.translation_gradient = {truth("dVdtx"), truth("dVdty"), truth("dVdtz")};
+    row.force = -Eigen::Vector3d(truth("dVdtx"), truth("dVdty"), truth("dVdtz"));
     rows.push_back(row);
   }
   return rows;
@@ -64,9 +64,7 @@ std::map<std::string, Found> ask(const std::vector<OracleRow>& rows, std::size_t
                                                : "0.01–0.1 %";
     by_class[name].error.push_back(std::abs(answer.volume / row.volume - 1) / wanted);
     by_class[name].angle.push_back(
-        name == "contain"
-            ? 0
-            : testing::degrees_between(answer.translation_gradient, row.translation_gradient));
+        name == "contain" ? 0 : testing::degrees_between(answer.force, row.force));
   }
   return by_class;
 }
@@ -130,7 +128,7 @@ TEST(WantedErrorOracle, MatedSolidsErrByLess) {
   double off = 0;
   for (const OracleRow& row : mated_rows()) {
     const auto [a, b] = placed(row, 1'000);
-    const double solid = std::min(a.tree.volume(), b.tree.volume());
+    const double solid = std::min(a.asset.volume(), b.asset.volume());
     for (const double wanted : {0.005, 0.01, 0.1}) {
       SCOPED_TRACE(row.pose_class + ", " + std::to_string(wanted));
       const Penetration answer = penetration(a, b, {.relative_error = wanted}, workspace);

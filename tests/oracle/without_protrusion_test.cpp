@@ -30,8 +30,8 @@ class FlatFaces : public ::testing::Test {
   };
   /// `gap` [u]; B is turned about the faces' normal and shifted along them.
   Answers at(double gap, double turn = 0.3) {
-    const PlacedTree a{cube().view(), {}, 1};
-    const PlacedTree b{
+    const PlacedAsset a{cube().view(), {}, 1};
+    const PlacedAsset b{
         cube().view(),
         {{std::cos(turn), std::sin(turn), 0, 0}, {side_ + gap, 0.1 * side_, -0.05 * side_}},
         1};
@@ -54,7 +54,7 @@ TEST_F(FlatFaces, DeeperContactsAreLeftAlone) {
   for (double depth = 0.4; depth < 10; depth *= 1.3) {
     const Answers answers = at(-depth * radius_);
     EXPECT_EQ(answers.sharp.volume, answers.raw.volume);
-    EXPECT_EQ(answers.sharp.translation_gradient, answers.raw.translation_gradient);
+    EXPECT_EQ(answers.sharp.force, answers.raw.force);
   }
 }
 
@@ -69,14 +69,13 @@ TEST_F(FlatFaces, VolumeAndForceGrowSmoothlyWithTheDepth) {
     EXPECT_GE(now.volume, before.volume - 1e-5 * radius_ * side_ * side_);
     EXPECT_LE(now.volume_min, now.volume);
     EXPECT_GE(now.volume_max, now.volume);
-    work += step * -(now.translation_gradient.x() + before.translation_gradient.x()) / 2;
-    largest_step =
-        std::max(largest_step, (now.translation_gradient - before.translation_gradient).norm());
+    work += step * (now.force.x() + before.force.x()) / 2;
+    largest_step = std::max(largest_step, (now.force - before.force).norm());
     before = now;
   }
   EXPECT_NEAR(work, before.volume, 0.15 * before.volume);
   // From none to all of the force in a fifth of a radius: 90 steps. A jump would be all of it.
-  EXPECT_LT(largest_step, 0.1 * before.translation_gradient.norm());
+  EXPECT_LT(largest_step, 0.1 * before.force.norm());
 }
 
 /// Patches of a face lose what the whole loses, and where faces lean against each other those that
@@ -84,8 +83,8 @@ TEST_F(FlatFaces, VolumeAndForceGrowSmoothlyWithTheDepth) {
 TEST_F(FlatFaces, PatchesLoseIt) {
   ContactSettings settings;
   settings.spheres_only = true;
-  const PlacedTree a{cube().view(), {}, 1};
-  const auto asked = [&](const PlacedTree& b, ContactSettings how) {
+  const PlacedAsset a{cube().view(), {}, 1};
+  const auto asked = [&](const PlacedAsset& b, ContactSettings how) {
     std::vector<ContactPatch> patches(16);
     patches.resize(contact_patches(a, b, how, workspace_, patches).count);
     std::vector<ContactPatch> sharp = patches;
@@ -97,7 +96,7 @@ TEST_F(FlatFaces, PatchesLoseIt) {
     for (const ContactPatch& patch : patches) sum += patch.volume;
     return sum;
   };
-  PlacedTree b = a;
+  PlacedAsset b = a;
   b.pose = {{std::cos(0.3), std::sin(0.3), 0, 0}, {0, 0.1 * side_, -0.05 * side_}};  // as at()
   const double layer = radius_ * side_ * side_;
   for (double gap = -1; gap < 0.3; gap += 0.05) {

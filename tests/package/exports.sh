@@ -32,7 +32,7 @@ for library; do
   fi
   case $library in
     *ist_query*) wanted='ist::penetration( ist::separation( ist::query( ist::contact_patches(
-      ist::TreeView::from_bytes( ist::Workspace::Workspace( ist::version() ist::Asset::load( ist_penetration' ;;
+      ist::AssetView::from_bytes( ist::Workspace::Workspace( ist::version() ist::Asset::load( ist_penetration' ;;
     *) wanted='ist::bake( ist::check( ist::load_mesh( ist::pack( ist::Asset::save(' ;;
   esac
   for name in $wanted; do

@@ -47,15 +47,15 @@ class CoincidentInstances : public ::testing::Test {
   const double radius_ = std::ldexp(tree_.mean_radius, 1);  ///< [u]
   Workspace workspace_;
 
-  PlacedTree still() const { return {asset_.view(), {}, 1}; }
-  PlacedTree placed(const Pose& pose, double scale = 1) const {
+  PlacedAsset still() const { return {asset_.view(), {}, 1}; }
+  PlacedAsset placed(const Pose& pose, double scale = 1) const {
     return {asset_.view(), pose, scale};
   }
-  CoincidenceWeight weight(const PlacedTree& b) const {
+  CoincidenceWeight weight(const PlacedAsset& b) const {
     return coincidence_weight(tree_.root, tree_.mean_radius, relative_pose(still(), b)->a_from_b);
   }
   /// What is answered, over all pairs of spheres in double.
-  double reference(const PlacedTree& b) const {
+  double reference(const PlacedAsset& b) const {
     const double w = weight(b).weight;
     return (1 - w) * reference_sum(still(), b, Measure::matched, 0, 0).volume +
            w / 2 * reference_sum(still(), b, Measure::matched, 0, 1).volume +
@@ -69,7 +69,7 @@ TEST_F(CoincidentInstances, TheWeightFollowsTheMeanSquareDisplacement) {
   int between = 0;
   for (int i = 0; i < 60; ++i) {
     const double size = 0.04 * i * radius_;
-    const PlacedTree b =
+    const PlacedAsset b =
         placed(small_pose(size * Vector3d(0.5, 0.1 * (i % 7), -0.4), size * Vector3d(0.4, -1, 0.8)),
                i % 3 == 0 ? 1 + 0.5 * size : 1);
     // The mean over the root ball, by points of a lattice.
@@ -97,7 +97,7 @@ TEST_F(CoincidentInstances, AnswerTheBlendedSumAndItsGradient) {
   const double h = 1e-6;
   for (int i = 0; i < 12; ++i) {
     const double size = 0.11 * i * radius_;
-    const PlacedTree b =
+    const PlacedAsset b =
         placed(small_pose(size * Vector3d(0.5, 0.4 - 0.1 * i, -0.4), size * Vector3d(0.5, -0.6, 1)),
                i % 2 == 0 ? 1 : 1 + 0.3 * size);
     const Penetration answer = penetration(still(), b, {}, workspace_);
@@ -106,9 +106,9 @@ TEST_F(CoincidentInstances, AnswerTheBlendedSumAndItsGradient) {
     EXPECT_LE(answer.volume_min, sum * (1 + 1e-12));
     EXPECT_GE(answer.volume_max, sum * (1 - 1e-12));
     if (i == 0) {  // by symmetry
-      EXPECT_LE(answer.translation_gradient.norm(),
+      EXPECT_LE(answer.force.norm(),
                 1e-6 * reference_sum(still(), b, Measure::matched, 0, 1).force_scale);
-      EXPECT_LE(answer.rotation_gradient.norm(),
+      EXPECT_LE(answer.torque.norm(),
                 1e-6 * reference_sum(still(), b, Measure::matched, 0, 1).force_scale);
       continue;
     }
@@ -122,8 +122,8 @@ TEST_F(CoincidentInstances, AnswerTheBlendedSumAndItsGradient) {
       torque[k] = (at(none, step) - at(none, -step)) / (2 * h);
     }
     const double scale = reference_sum(still(), b, Measure::matched).force_scale;
-    EXPECT_LE((answer.translation_gradient - force).norm(), 1e-5 * scale) << i;
-    EXPECT_LE((answer.rotation_gradient - torque).norm(), 3e-5 * scale) << i;
+    EXPECT_LE((answer.force + force).norm(), 1e-5 * scale) << i;
+    EXPECT_LE((answer.torque + torque).norm(), 3e-5 * scale) << i;
   }
 }
 
@@ -141,8 +141,8 @@ TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
             penetration(still(), placed(small_pose(way * direction, {0, 0, 0.01})),
                         {.pair_budget = budget}, workspace_);
         const std::array changes = {std::abs(now.volume - before.volume),
-                                    (now.translation_gradient - before.translation_gradient).norm(),
-                                    (now.rotation_gradient - before.rotation_gradient).norm()};
+                                    (now.force - before.force).norm(),
+                                    (now.torque - before.torque).norm()};
         for (std::size_t k = 0; i > 0 && k < 3; ++k) largest[k] = std::max(largest[k], changes[k]);
         before = now;
       }
@@ -156,7 +156,7 @@ TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
 TEST_F(CoincidentInstances, LimitsHold) {
   int stopped = 0;
   for (int i = 0; i < 200; ++i) {
-    const PlacedTree b = placed(small_pose(0.01 * i * radius_ * Vector3d(1, 1, 0), {0, 0, 0}));
+    const PlacedAsset b = placed(small_pose(0.01 * i * radius_ * Vector3d(1, 1, 0), {0, 0, 0}));
     PenetrationSettings settings;
     if (i % 2 == 1) settings.pair_budget = 2'000;
     const Penetration finished = penetration(still(), b, settings, workspace_);
@@ -174,7 +174,7 @@ TEST(CoincidentInstancesOfASolid, ACopyOnItselfReadsItsVolume) {
   for (const char* const name : {"cube", "gear"}) {
     const Asset asset = bake(close_mesh(make_sample(name), name), {.max_spheres = 4'000});
     const double volume = asset.view().volume();
-    const PlacedTree one{asset.view(), {}, 1};
+    const PlacedAsset one{asset.view(), {}, 1};
     Workspace workspace;
     EXPECT_NEAR(penetration(one, one, {}, workspace).volume, volume, 0.025 * volume) << name;
     // What it is to avert.

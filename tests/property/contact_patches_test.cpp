@@ -17,15 +17,15 @@ using testing::make_random_asset;
 using testing::random_pose;
 
 /// Every promise about the patches of one query.
-void expect_patches(const PlacedTree& a, const PlacedTree& b, const PenetrationSettings& settings,
+void expect_patches(const PlacedAsset& a, const PlacedAsset& b, const PenetrationSettings& settings,
                     std::size_t most, Workspace& workspace) {
   const Penetration whole = penetration(a, b, settings, workspace);
   std::vector<ContactPatch> patches(most);
   const ContactPatches found = contact_patches(a, b, settings, workspace, patches);
   EXPECT_EQ(found.penetration.volume, whole.volume);
   EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
-  EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);
-  EXPECT_EQ(found.penetration.rotation_gradient, whole.rotation_gradient);
+  EXPECT_EQ(found.penetration.force, whole.force);
+  EXPECT_EQ(found.penetration.torque, whole.torque);
   EXPECT_EQ(found.penetration.status, whole.status);
   ASSERT_LE(found.count, most);
   EXPECT_EQ(found.count > 0, most > 0 && whole.volume > 0);
@@ -58,8 +58,8 @@ void expect_patches(const PlacedTree& a, const PlacedTree& b, const PenetrationS
   }
   EXPECT_EQ(ids.size(), patches.size()) << "ids of one query differ";
   EXPECT_NEAR(volume, whole.volume, 1e-14 * whole.volume);
-  EXPECT_LE((force + whole.translation_gradient).norm(), 1e-14 * force_scale);
-  EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-14 * torque_scale);
+  EXPECT_LE((force - whole.force).norm(), 1e-14 * force_scale);
+  EXPECT_LE((torque - whole.torque).norm(), 1e-14 * torque_scale);
   if (whole.status == QueryStatus::ok) {
     EXPECT_LE(moment.norm(), 1e-6 * whole.volume);
   }
@@ -75,8 +75,8 @@ TEST(ContactPatchesTest, SumToTheWhole) {
       PenetrationSettings settings;
       settings.measure = i % 2 == 0 ? Measure::matched : Measure::inner;
       if (i % 4 == 1) settings.max_visits = 1 + 3 * static_cast<std::uint32_t>(i);
-      const PlacedTree pa{a.view(), random_pose(random, 0.1 * i), 1.0};
-      const PlacedTree pb{b.view(), random_pose(random, 0.2 * i), i % 3 == 0 ? 0.01 : 3.0};
+      const PlacedAsset pa{a.view(), random_pose(random, 0.1 * i), 1.0};
+      const PlacedAsset pb{b.view(), random_pose(random, 0.2 * i), i % 3 == 0 ? 0.01 : 3.0};
       for (const std::size_t most : {1u, 2u, 5u, 64u}) {
         SCOPED_TRACE(::testing::Message() << n << " spheres, pose " << i << ", " << most);
         expect_patches(pa, pb, settings, most, i % 5 == 4 ? small : workspace);
@@ -90,8 +90,8 @@ TEST(ContactPatchesTest, SumOfGrazingSpheresIsTakenAgainInDouble) {
   // One lens so thin that float is not enough: the patches have to be those of the second sum.
   Workspace workspace;
   const Asset one = make_random_asset({1, 1, {}, 0}, 13);
-  const PlacedTree pa{one.view(), {}, 1.0};
-  PlacedTree pb = pa;
+  const PlacedAsset pa{one.view(), {}, 1.0};
+  PlacedAsset pb = pa;
   const double r = testing::world_spheres(pa, Measure::matched)[0].r;
   pb.pose.t[0] = 2 * r * (1 - 1e-6);
   expect_patches(pa, pb, {}, 4, workspace);
@@ -99,7 +99,7 @@ TEST(ContactPatchesTest, SumOfGrazingSpheresIsTakenAgainInDouble) {
   ContactPatch patch;
   ASSERT_EQ(contact_patches(pa, pb, {}, workspace, {&patch, 1}).count, 1u);
   EXPECT_NEAR(patch.volume, sum.volume, 1e-5 * sum.volume);
-  EXPECT_NEAR(patch.area, sum.translation_gradient.norm(), 1e-5 * patch.area);
+  EXPECT_NEAR(patch.area, sum.force.norm(), 1e-5 * patch.area);
   // Two equal balls: V = A·δ/2 to first order, for overlap δ.
   EXPECT_NEAR(patch.depth, 0.5 * 2e-6 * r, 1e-4 * 2e-6 * r);
 }
@@ -126,7 +126,7 @@ TEST(ContactPatchesTest, TellSeparateContactsApart) {
         {uniform(random) + (i < 208 ? 2 : -2), uniform(random), uniform(random), 0.1f});
   const Asset bell = make_asset(clumps);
   const Asset ball = make_asset({{0, 0, 0, 2}});
-  const PlacedTree pa{ball.view(), {}, 1.0}, pb{bell.view(), {}, 1.0};
+  const PlacedAsset pa{ball.view(), {}, 1.0}, pb{bell.view(), {}, 1.0};
   Workspace workspace;
   std::vector<ContactPatch> patches(2);
   ASSERT_EQ(contact_patches(pa, pb, {}, workspace, patches).count, 2u);
@@ -147,8 +147,8 @@ TEST(ContactPatchesTest, AreEqualAndOppositeOnA) {
   const Asset b = make_random_asset({200, 0.2, {}, 0}, 51);
   std::vector<ContactPatch> ab(8), ba(8);
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree pa{a.view(), random_pose(random, 0.5), 1.0};
-    const PlacedTree pb{b.view(), random_pose(random, 0.1 * i), 0.3};
+    const PlacedAsset pa{a.view(), random_pose(random, 0.5), 1.0};
+    const PlacedAsset pb{b.view(), random_pose(random, 0.1 * i), 0.3};
     const std::size_t count = contact_patches(pa, pb, {}, workspace, ab).count;
     ASSERT_EQ(contact_patches(pb, pa, {}, workspace, ba).count, count);
     const double scale = testing::reference_sum(pa, pb, Measure::matched).force_scale;
@@ -168,8 +168,8 @@ TEST(ContactPatchesTest, KeepTheirNamesUnderSmallMotions) {
   std::vector<ContactPatch> here(8), there(8);
   int patches = 0, kept = 0;
   for (int i = 0; i < 100; ++i) {
-    const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
-    PlacedTree pb{b.view(), random_pose(random, 0.018 * i), 0.7};
+    const PlacedAsset pa{a.view(), random_pose(random, 0.2), 1.0};
+    PlacedAsset pb{b.view(), random_pose(random, 0.018 * i), 0.7};
     const std::size_t count = contact_patches(pa, pb, {}, workspace, here).count;
     pb.pose.t[0] += 1e-5;
     const std::size_t count_there = contact_patches(pa, pb, {}, workspace, there).count;
@@ -200,7 +200,7 @@ TEST(ContactPatchesTest, LargeTreesAreBinnedByLargerNodes) {
   arrays.header.volume = arrays.matched_tree.volume_sum;
   const Asset a(asset_bytes(arrays), "lattice");
   const Asset b = make_random_asset({100, 0.5, {}, 0}, 71);
-  const PlacedTree pa{a.view(), {}, 1.0}, pb{b.view(), {{1, 0, 0, 0}, {2, 0.1, 0}}, 1.5};
+  const PlacedAsset pa{a.view(), {}, 1.0}, pb{b.view(), {{1, 0, 0, 0}, {2, 0.1, 0}}, 1.5};
   expect_patches(pa, pb, {}, 16, workspace);
   PenetrationSettings stopped;
   stopped.max_visits = 40;
@@ -210,7 +210,7 @@ TEST(ContactPatchesTest, LargeTreesAreBinnedByLargerNodes) {
 TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
-  PlacedTree bad{a.view(), {}, 1.0};
+  PlacedAsset bad{a.view(), {}, 1.0};
   bad.pose.t[1] = std::numeric_limits<double>::quiet_NaN();
   ContactPatch patch;
   const ContactPatches answer = contact_patches({a.view(), {}, 1}, bad, {}, workspace, {&patch, 1});
@@ -218,17 +218,17 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(answer.penetration.volume));
   // Neither asset holds a mesh.
-  const PlacedTree placed{a.view(), {}, 1};
+  const PlacedAsset placed{a.view(), {}, 1};
   const ContactPatches exact =
       contact_patches(placed, placed, {.measure = Measure::exact}, workspace, {&patch, 1});
-  EXPECT_EQ(exact.penetration.status, QueryStatus::not_held);
+  EXPECT_EQ(exact.penetration.status, QueryStatus::missing_data);
   EXPECT_EQ(exact.count, 0u);
 }
 
 TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
-  const PlacedTree placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
+  const PlacedAsset placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};
   ContactPatch patch;
   const PenetrationSettings settings{.measure = Measure{77}};
   const Penetration whole = penetration(placed, other, settings, workspace);
@@ -245,20 +245,20 @@ TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
 TEST(WorkspaceDeathTest, TwoThreadsInOneAreSaid) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
-  const PlacedTree placed{a.view(), {}, 1};
+  const PlacedAsset placed{a.view(), {}, 1};
   // A field that asks on another thread what its own query asks on this one.
   struct Both {
     Workspace& workspace;
-    PlacedTree placed;
+    PlacedAsset placed;
   } both{workspace, placed};
-  const FunctionField field{
+  const FunctionShape field{
       [](const void* context, const Eigen::Vector3d&) noexcept {
         const auto& asked = *static_cast<const Both*>(context);
         std::thread([&] { penetration(asked.placed, asked.placed, {}, asked.workspace); }).join();
-        return FieldSample{1, Eigen::Vector3d::UnitX()};
+        return ShapeSample{-1, Eigen::Vector3d::UnitX()};
       },
       &both, 0};
-  EXPECT_DEATH(penetration(PlacedField{field, {}}, placed, {}, workspace), "two threads use one");
+  EXPECT_DEATH(penetration(PlacedShape{field, {}}, placed, {}, workspace), "two threads use one");
 }
 #endif
 

@@ -36,7 +36,7 @@ class ExactLoop : public ::testing::Test {
     ContactSettings settings;
     settings.measure = Measure::exact;
     settings.pair_id = pair_id;
-    const PlacedTree at_a{a.view(), {}, 1}, at_b{b.view(), pose, 1};
+    const PlacedAsset at_a{a.view(), {}, 1}, at_b{b.view(), pose, 1};
     ContactPatch patches[16];
     std::vector<OutlineSegment> segments(8000);
     testing::AnswerBits bits;
@@ -91,8 +91,7 @@ TEST_F(ExactLoop, AClosedPathGivesNoEnergy) {
     pose.t[1] = 0.2 * std::sin(2 * t);
     const Penetration p = ask(bolt_, nut_, pose, 1);
     ASSERT_GT(p.volume, 1);
-    const Eigen::Vector3d pull = p.volume * p.translation_gradient,
-                          now(pose.t[0], pose.t[1], pose.t[2]);
+    const Eigen::Vector3d pull = p.volume * p.force, now(pose.t[0], pose.t[1], pose.t[2]);
     if (i > 0) {
       const double work = 0.5 * (pull + force).dot(now - place);
       sum += work;
@@ -136,7 +135,7 @@ TEST_F(ExactLoop, RoomChangesNoBit) {
   for (std::size_t capacity = 4000; capacity < 40000; capacity += capacity / 8) {
     Workspace small(capacity);
     for (int i = 0; i < 12; ++i) {
-      const PlacedTree a{ball.view(), {}, 1},
+      const PlacedAsset a{ball.view(), {}, 1},
           b{ball.view(), {{1, 0, 0, 0}, {0, 0.002 * i, 0.1}}, 1};
       PenetrationSettings settings;
       settings.measure = Measure::exact;

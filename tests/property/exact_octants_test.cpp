@@ -57,7 +57,7 @@ TriangleMesh tilted(TriangleMesh mesh) {
 
 class ExactOctants : public ::testing::Test {
  protected:
-  const std::vector<ContactPatch>& ask(const PlacedTree& a, const PlacedTree& b,
+  const std::vector<ContactPatch>& ask(const PlacedAsset& a, const PlacedAsset& b,
                                        std::size_t room = 64) {
     patches_.assign(room, {});
     const ContactSettings settings{.measure = Measure::exact};
@@ -72,7 +72,7 @@ class ExactOctants : public ::testing::Test {
 
  private:
   /// Patches sum to the whole, each is its own wrench, and no two have one name.
-  void expect_whole(const PlacedTree& a, const PlacedTree& b) {
+  void expect_whole(const PlacedAsset& a, const PlacedAsset& b) {
     double volume = 0;
     Point force = Point::Zero(), torque = Point::Zero(), moment = Point::Zero();
     std::set<std::uint64_t> names;
@@ -85,7 +85,7 @@ class ExactOctants : public ::testing::Test {
       force += patch.force;
       torque += patch.torque;
       moment += patch.volume * patch.centroid;
-      const Point again = (patch.point - origin).cross(patch.force) + patch.twist * patch.normal;
+      const Point again = (patch.point - origin).cross(patch.force) + patch.torsion * patch.normal;
       if (patch.area > 1e-6 * std::cbrt(patch.volume * patch.volume)) {
         EXPECT_LE((again - patch.torque).norm(),
                   1e-13 * (area + (patch.point - origin).norm() * patch.area));
@@ -95,8 +95,8 @@ class ExactOctants : public ::testing::Test {
     }
     EXPECT_EQ(names.size(), patches_.size());
     EXPECT_NEAR(volume, whole_.volume, 1e-15 * area * size);
-    EXPECT_LE((force + whole_.translation_gradient).norm(), 1e-14 * area);
-    EXPECT_LE((torque + whole_.rotation_gradient).norm(), 1e-14 * area * size);
+    EXPECT_LE((force - whole_.force).norm(), 1e-14 * area);
+    EXPECT_LE((torque - whole_.torque).norm(), 1e-14 * area * size);
     EXPECT_LE((moment - whole_.volume * whole_.centroid).norm(), 1e-14 * area * area);
   }
 
@@ -113,11 +113,11 @@ TEST_F(ExactOctants, SumToTheWholeInAnyPose) {
   std::uniform_real_distribution<double> any(-1, 1);
   std::size_t divided = 0;
   for (int i = 0; i < 400; ++i) {
-    const PlacedTree a{assets[i % 4].view(), {}, 1};
+    const PlacedAsset a{assets[i % 4].view(), {}, 1};
     const Point axis(any(random), any(random), any(random)),
         t(any(random), any(random), any(random));
-    const PlacedTree b{assets[i / 4 % 4].view(), turned(axis, 3 * any(random), 1.6 * t),
-                       std::exp(any(random))};
+    const PlacedAsset b{assets[i / 4 % 4].view(), turned(axis, 3 * any(random), 1.6 * t),
+                        std::exp(any(random))};
     for (const std::size_t room : {1, 3, 64}) divided += ask(a, b, room).size() > 1 ? 1 : 0;
   }
   EXPECT_GT(divided, 80u);
@@ -175,7 +175,7 @@ TEST_F(ExactOctants, AFineFaceIsDividedLikeACoarseOne) {
   std::vector<ContactPatch> before;
   for (const bool a_is_table : {true, false}) {
     const auto both = [&](const Asset& box) {
-      const PlacedTree t{table.view(), {}, 1}, b{box.view(), pose, 1};
+      const PlacedAsset t{table.view(), {}, 1}, b{box.view(), pose, 1};
       return a_is_table ? ask(t, b) : ask(b, t);
     };
     const std::vector<ContactPatch> one = both(coarse), other = both(fine);
@@ -237,7 +237,7 @@ TEST_F(ExactOctants, ARingHoldsItsShaftAllAround) {
   const Asset ring = surface(pipe(1, 1.5, 0.4, 48));
   const std::vector<ContactPatch>& patches =
       ask({shaft.view(), {}, 1}, {ring.view(), turned({0, 0, 1}, 0.1, {0, 0, 0.3}), 1});
-  EXPECT_LE(whole().translation_gradient.norm(), 1e-12);
+  EXPECT_LE(whole().force.norm(), 1e-12);
   ASSERT_GE(patches.size(), 8u);
   double highest = 0;
   for (const double turn : {0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}) {
@@ -259,7 +259,7 @@ TEST_F(ExactOctants, AThreadHoldsAllAround) {
   const std::vector<ContactPatch>& patches =
       ask({bolt.view(), {}, 1}, {nut.view(), turned({0, 0, 1}, 0, {0, 0, 10.3}), 1}, 16);
   EXPECT_GE(patches.size(), 8u);
-  const Point axial(0, 0, whole().translation_gradient.z() < 0 ? 1 : -1);
+  const Point axial(0, 0, whole().force.z() > 0 ? 1 : -1);
   for (int quarter = 0; quarter < 4; ++quarter) {
     const double turn = (quarter + 0.5) * kPi / 2;
     const Point way(std::cos(turn), std::sin(turn), 0);

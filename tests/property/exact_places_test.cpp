@@ -30,11 +30,10 @@ Pose posed(const Eigen::Quaterniond& q, const Point& t) {
 
 class ExactPlaces : public ::testing::Test {
  protected:
-  Penetration ask(const PlacedTree& a, const PlacedTree& b) {
+  Penetration ask(const PlacedAsset& a, const PlacedAsset& b) {
     const Penetration found = testing::exactly(a, b, workspace_);
     EXPECT_EQ(found.status, QueryStatus::ok);
-    EXPECT_TRUE(found.centroid.allFinite() && found.translation_gradient.allFinite() &&
-                found.rotation_gradient.allFinite());
+    EXPECT_TRUE(found.centroid.allFinite() && found.force.allFinite() && found.torque.allFinite());
     EXPECT_LE(0, found.volume_min);
     EXPECT_LE(found.volume_min, found.volume);
     EXPECT_LE(found.volume, found.volume_max);
@@ -45,7 +44,7 @@ class ExactPlaces : public ::testing::Test {
   }
 
   /// `truth` within `relative`, and in the interval as far as the truth itself is known.
-  void expect_volume(const PlacedTree& a, const PlacedTree& b, double truth, double relative) {
+  void expect_volume(const PlacedAsset& a, const PlacedAsset& b, double truth, double relative) {
     const Penetration found = ask(a, b);
     EXPECT_NEAR(found.volume, truth, relative * truth);
     EXPECT_LE(found.volume_min, truth * (1 + 4e-16));
@@ -168,9 +167,9 @@ TEST_F(ExactPlaces, SizesFromTheTinyToTheHuge) {
   for (const double size : {1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9}) {
     const Asset own = surface(box_mesh(Point::Zero(), size * Point::Ones()));
     for (const bool by_scale : {false, true}) {
-      const PlacedTree a =
-          by_scale ? PlacedTree{cube_.view(), {}, size} : PlacedTree{own.view(), {}, 1};
-      PlacedTree b = a;
+      const PlacedAsset a =
+          by_scale ? PlacedAsset{cube_.view(), {}, size} : PlacedAsset{own.view(), {}, 1};
+      PlacedAsset b = a;
       b.pose = shifted(size * Point(0.5, 0.25, 0.75));
       SCOPED_TRACE(::testing::Message() << size << ' ' << by_scale);
       const double truth = 0.5 * 0.75 * 0.25 * size * size * size;
@@ -178,7 +177,7 @@ TEST_F(ExactPlaces, SizesFromTheTinyToTheHuge) {
       EXPECT_NEAR(found.volume, truth, 4e-15 * truth);
       EXPECT_LE(found.volume_min, truth * (1 + 1e-15));
       EXPECT_GE(found.volume_max, truth * (1 - 1e-15));
-      EXPECT_NEAR(found.translation_gradient.x() / (size * size), -0.75 * 0.25, 1e-14);
+      EXPECT_NEAR(found.force.x() / (size * size), 0.75 * 0.25, 1e-14);
     }
   }
 }
@@ -210,12 +209,12 @@ TEST_F(ExactPlaces, FarFromTheOrigin) {
   const Asset moved = surface(box_mesh(far, far + Point::Ones()));
   const Point t(0.5, -0.25, 0.125);
   const double truth = 0.5 * 0.75 * 0.875;
-  for (const auto& [a, b] : {std::pair(PlacedTree{moved.view(), shifted(-far), 1},
-                                       PlacedTree{cube_.view(), shifted(t), 1}),
-                             std::pair(PlacedTree{cube_.view(), shifted(far), 1},
-                                       PlacedTree{moved.view(), shifted(t), 1}),
-                             std::pair(PlacedTree{moved.view(), shifted(far), 1},
-                                       PlacedTree{cube_.view(), shifted(2 * far + t), 1})}) {
+  for (const auto& [a, b] : {std::pair(PlacedAsset{moved.view(), shifted(-far), 1},
+                                       PlacedAsset{cube_.view(), shifted(t), 1}),
+                             std::pair(PlacedAsset{cube_.view(), shifted(far), 1},
+                                       PlacedAsset{moved.view(), shifted(t), 1}),
+                             std::pair(PlacedAsset{moved.view(), shifted(far), 1},
+                                       PlacedAsset{cube_.view(), shifted(2 * far + t), 1})}) {
     const Penetration found = ask(a, b);
     EXPECT_NEAR(found.volume, truth, 1e-14);
     EXPECT_LE(found.volume_min, truth);
@@ -224,7 +223,7 @@ TEST_F(ExactPlaces, FarFromTheOrigin) {
 }
 
 struct Pair {
-  PlacedTree a, b;
+  PlacedAsset a, b;
 };
 
 /// Torus and ball, ball and box, bolt and nut in random poses in which they meet.
@@ -254,11 +253,11 @@ class ExactMotions : public ExactPlaces {
   }();
 };
 
-Point origin(const PlacedTree& placed) {
+Point origin(const PlacedAsset& placed) {
   return {placed.pose.t[0], placed.pose.t[1], placed.pose.t[2]};
 }
 
-Eigen::Quaterniond turn_of(const PlacedTree& placed) {
+Eigen::Quaterniond turn_of(const PlacedAsset& placed) {
   const double* q = placed.pose.q;
   return {q[0], q[1], q[2], q[3]};
 }
@@ -271,12 +270,11 @@ TEST_F(ExactMotions, TheSameWithAAndBExchanged) {
     EXPECT_NEAR(found.volume, other.volume, 1e-14 * (1 + found.volume));
     EXPECT_LE(std::max(found.volume_min, other.volume_min),
               std::min(found.volume_max, other.volume_max));
-    EXPECT_TRUE(found.translation_gradient.isApprox(-other.translation_gradient, 1e-12) ||
-                (found.translation_gradient + other.translation_gradient).norm() < 1e-13);
+    EXPECT_TRUE(found.force.isApprox(other.force, 1e-12) ||
+                (found.force + other.force).norm() < 1e-13);
     // Of the other solid, about the other origin.
-    const Point torque =
-        other.rotation_gradient + (origin(a) - origin(b)).cross(other.translation_gradient);
-    EXPECT_LE((found.rotation_gradient + torque).norm(), 1e-13);
+    const Point torque = other.torque + (origin(a) - origin(b)).cross(other.force);
+    EXPECT_LE((found.torque + torque).norm(), 1e-13);
     EXPECT_LE((found.centroid - other.centroid).norm() * found.volume, 1e-13);
   }
   EXPECT_GE(meeting, 40);
@@ -287,7 +285,7 @@ TEST_F(ExactMotions, TheSameInACommonMotion) {
   for (const auto& [a, b] : pairs()) {
     const Eigen::Quaterniond turn = testing::random_turn(random);
     const Point shift(3, -1, 2);
-    const auto carried = [&](PlacedTree placed) {
+    const auto carried = [&](PlacedAsset placed) {
       placed.pose = posed(turn * turn_of(placed), turn * origin(placed) + shift);
       return placed;
     };
@@ -296,8 +294,8 @@ TEST_F(ExactMotions, TheSameInACommonMotion) {
     EXPECT_NEAR(found.volume, other.volume, 2e-14);
     EXPECT_LE(std::max(found.volume_min, other.volume_min),
               std::min(found.volume_max, other.volume_max));
-    EXPECT_LE((turn * found.translation_gradient - other.translation_gradient).norm(), 2e-13);
-    EXPECT_LE((turn * found.rotation_gradient - other.rotation_gradient).norm(), 2e-13);
+    EXPECT_LE((turn * found.force - other.force).norm(), 2e-13);
+    EXPECT_LE((turn * found.torque - other.torque).norm(), 2e-13);
     if (found.volume > 1e-3) {
       EXPECT_LE((turn * found.centroid + shift - other.centroid).norm(), 1e-11);
     }
@@ -312,15 +310,15 @@ TEST_F(ExactMotions, GradientsAreThoseOfTheVolume) {
     for (int axis = 0; axis < 3; ++axis) {
       const Point unit = Point::Unit(axis);
       const auto volume = [&](double shift, double turn) {
-        PlacedTree moved = b;
+        PlacedAsset moved = b;
         moved.pose = posed(Eigen::Quaterniond(Eigen::AngleAxisd(turn, unit)) * turn_of(b),
                            origin(b) + shift * unit);
         return testing::exactly(a, moved, workspace_).volume;
       };
       const double by_shift = (volume(kStep, 0) - volume(-kStep, 0)) / (2 * kStep);
       const double by_turn = (volume(0, kStep) - volume(0, -kStep)) / (2 * kStep);
-      EXPECT_NEAR(found.translation_gradient[axis], by_shift, 2e-7);
-      EXPECT_NEAR(found.rotation_gradient[axis], by_turn, 2e-7);
+      EXPECT_NEAR(found.force[axis], -by_shift, 2e-7);
+      EXPECT_NEAR(found.torque[axis], -by_turn, 2e-7);
     }
   }
 }
@@ -332,12 +330,12 @@ TEST_F(ExactMotions, CentroidIsThatOfTheOverlap) {
   EXPECT_LE((found.centroid - Point(0.75, 0.625, 0.125)).norm(), 1e-15);
   const Asset large = surface(box_mesh({-3, -3, -3}, {3, 3, 3}));
   for (const Asset& asset : assets_) {
-    const PlacedTree inside{asset.view(), shifted({0.3, -0.2, 0.1}), 1};
+    const PlacedAsset inside{asset.view(), shifted({0.3, -0.2, 0.1}), 1};
     const Penetration all = ask({large.view(), {}, 1}, inside);
     const double volume = asset.view().volume();
     EXPECT_NEAR(all.volume, volume, 1e-13 * volume);
-    EXPECT_LE(all.translation_gradient.norm(), 1e-13);
-    EXPECT_LE(all.rotation_gradient.norm(), 1e-13);
+    EXPECT_LE(all.force.norm(), 1e-13);
+    EXPECT_LE(all.torque.norm(), 1e-13);
     const Penetration round = ask(inside, {large.view(), {}, 1});
     EXPECT_NEAR(round.volume, volume, 1e-13 * volume);
     EXPECT_LE((round.centroid - all.centroid).norm(), 1e-14);
@@ -352,7 +350,7 @@ class ExactLimits : public ExactPlaces {
 };
 
 TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
-  const PlacedTree a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
+  const PlacedAsset a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
   Workspace small(16);
   PenetrationSettings exact, spheres;
   exact.measure = Measure::exact;
@@ -369,8 +367,8 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
     same.max_visits = found == &of_visits ? 3 : 0;
     const Penetration matched = penetration(a, b, same, *workspace);
     EXPECT_EQ(found->volume, matched.volume);
-    EXPECT_EQ(found->translation_gradient, matched.translation_gradient);
-    EXPECT_EQ(found->rotation_gradient, matched.rotation_gradient);
+    EXPECT_EQ(found->force, matched.force);
+    EXPECT_EQ(found->torque, matched.torque);
     EXPECT_EQ(found->centroid, matched.centroid);
     // What is certain of the true volume.
     EXPECT_LE(found->volume_min, truth.volume);
@@ -379,12 +377,12 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
 }
 
 TEST_F(ExactLimits, OfSurfacesAloneHaveOnlyBounds) {
-  const PlacedTree a{alone_.view(), {}, 1}, b{alone_.view(), near_, 1};
-  const PlacedTree whole{ball_.view(), near_, 1};
+  const PlacedAsset a{alone_.view(), {}, 1}, b{alone_.view(), near_, 1};
+  const PlacedAsset whole{ball_.view(), near_, 1};
   const Penetration truth = ask(a, b);
   EXPECT_EQ(truth.volume, ask(a, whole).volume);
   Workspace small(16);
-  for (const PlacedTree& other : {b, whole}) {
+  for (const PlacedAsset& other : {b, whole}) {
     const Penetration found = testing::exactly(a, other, small);
     EXPECT_EQ(found.status, QueryStatus::budget_exhausted);
     EXPECT_TRUE(std::isnan(found.volume));
@@ -396,14 +394,14 @@ TEST_F(ExactLimits, OfSurfacesAloneHaveOnlyBounds) {
 
 TEST_F(ExactLimits, WithoutAMeshNothingIsHeld) {
   const Asset bare = testing::baked(testing::icosphere_mesh(2), "bare", 50, false);
-  const PlacedTree a{bare.view(), {}, 1}, b{ball_.view(), near_, 1};
-  EXPECT_EQ(testing::exactly(a, b, workspace_).status, QueryStatus::not_held);
-  EXPECT_EQ(testing::exactly(b, a, workspace_).status, QueryStatus::not_held);
+  const PlacedAsset a{bare.view(), {}, 1}, b{ball_.view(), near_, 1};
+  EXPECT_EQ(testing::exactly(a, b, workspace_).status, QueryStatus::missing_data);
+  EXPECT_EQ(testing::exactly(b, a, workspace_).status, QueryStatus::missing_data);
 }
 
 // However much room there is, once it is enough.
 TEST_F(ExactLimits, RoomNeverChangesAnAnswer) {
-  const PlacedTree a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
+  const PlacedAsset a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
   const Penetration truth = ask(a, b);
   int enough = 0;
   for (std::size_t capacity = 1; capacity < 1u << 16; capacity *= 2) {
@@ -416,7 +414,7 @@ TEST_F(ExactLimits, RoomNeverChangesAnAnswer) {
     ++enough;
     EXPECT_EQ(found.volume, truth.volume);
     EXPECT_EQ(found.volume_max, truth.volume_max);
-    EXPECT_EQ(found.rotation_gradient, truth.rotation_gradient);
+    EXPECT_EQ(found.torque, truth.torque);
   }
   EXPECT_GE(enough, 2);
 }

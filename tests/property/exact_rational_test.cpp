@@ -62,7 +62,7 @@ class ExactRational : public ::testing::Test {
     // Where faces of one mesh cross its points are rounded, no more.
     ASSERT_LE(asset_a.view().mesh_error() + asset_b.view().mesh_error(), 1e-14) << what;
     const Rational truth = testing::rational_overlap(a, moved(b, pose));
-    const PlacedTree placed_a{asset_a.view(), {}, 1}, placed_b{asset_b.view(), pose, 1};
+    const PlacedAsset placed_a{asset_a.view(), {}, 1}, placed_b{asset_b.view(), pose, 1};
     const Penetration found = testing::exactly(placed_a, placed_b, workspace_);
     const auto number = truth.convert_to<double>();
     ASSERT_EQ(found.status, QueryStatus::ok) << what;

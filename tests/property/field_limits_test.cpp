@@ -30,8 +30,8 @@ void expect_bounds(const char* name, const char* limit, const Penetration& got,
   EXPECT_GE(got.volume_max, full.volume * (1 - 1e-6)) << name << ' ' << limit;
   EXPECT_LE(got.volume_min, got.volume) << name << ' ' << limit;
   EXPECT_GE(got.volume_max, got.volume) << name << ' ' << limit;
-  EXPECT_TRUE(std::isfinite(got.volume_max) && got.translation_gradient.allFinite() &&
-              got.rotation_gradient.allFinite() && got.centroid.allFinite())
+  EXPECT_TRUE(std::isfinite(got.volume_max) && got.force.allFinite() && got.torque.allFinite() &&
+              got.centroid.allFinite())
       << name << ' ' << limit;
   if (got.status == QueryStatus::ok) {
     EXPECT_NEAR(got.volume, full.volume, 1e-6 * full.volume) << name << ' ' << limit;
@@ -43,9 +43,9 @@ TEST(FieldQuery, LimitsKeepTrueBounds) {
   Workspace large, tiny(64);
   for (const auto& [name, field] : fields()) {
     for (int i = 0; i < 6; ++i) {
-      const PlacedField a{field, random_pose(random, 0.1), 1};
-      const PlacedTree b{(i % 2 == 0 ? cube() : torus()).view(), random_pose(random, 0.15 * i),
-                         0.8};
+      const PlacedShape a{field, random_pose(random, 0.1), 1};
+      const PlacedAsset b{(i % 2 == 0 ? cube() : torus()).view(), random_pose(random, 0.15 * i),
+                          0.8};
       const Penetration full = penetration(a, b, {}, large);
       for (const auto& [limit, settings] : limits())
         expect_bounds(name, limit, penetration(a, b, settings, large), full);
@@ -59,9 +59,9 @@ TEST(UnlikePairs, LimitsKeepTrueBounds) {
   Workspace large, tiny(64);
   for (const SurfacePair& pair : pairs()) {
     for (int i = 0; i < 60; ++i) {
-      const PlacedTree a{pair.a.view(), random_pose(random, 0), 1};
-      const PlacedTree b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
-                         pair.scale_b};
+      const PlacedAsset a{pair.a.view(), random_pose(random, 0), 1};
+      const PlacedAsset b{pair.b.view(), random_pose(random, (0.5 + 0.0133 * i) * pair.distance),
+                          pair.scale_b};
       const Penetration full = penetration(a, b, {}, large);
       for (const auto& [limit, settings] : limits())
         expect_bounds(pair.name, limit, penetration(a, b, settings, large), full);
@@ -81,8 +81,8 @@ void expect_shares(const char* name, const ContactPatches& got, const Penetratio
   EXPECT_EQ(got.penetration.volume, whole.volume) << name;
   EXPECT_EQ(got.penetration.status, whole.status) << name;
   EXPECT_EQ(got.penetration.node_visits, whole.node_visits) << name;
-  EXPECT_EQ(got.penetration.translation_gradient, whole.translation_gradient) << name;
-  EXPECT_EQ(got.penetration.rotation_gradient, whole.rotation_gradient) << name;
+  EXPECT_EQ(got.penetration.force, whole.force) << name;
+  EXPECT_EQ(got.penetration.torque, whole.torque) << name;
   // Where a stopped query has summed nothing yet there is nothing to divide.
   if (whole.status == QueryStatus::ok) {
     EXPECT_EQ(got.count > 0, whole.volume > 0) << name;
@@ -100,8 +100,8 @@ void expect_shares(const char* name, const ContactPatches& got, const Penetratio
     EXPECT_GE(patch.volume, 0) << name;
   }
   EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume) << name;
-  EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * pull) << name;
-  EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull)) << name;
+  EXPECT_LE((force - whole.force).norm(), 1e-12 * pull) << name;
+  EXPECT_LE((torque - whole.torque).norm(), 1e-12 * (turn + 2 * pull)) << name;
 }
 
 TEST(FieldQuery, PatchesAddUpToTheWhole) {
@@ -110,8 +110,8 @@ TEST(FieldQuery, PatchesAddUpToTheWhole) {
   ContactPatch patches[12];
   for (const auto& [name, field] : fields()) {
     for (int i = 0; i < 8; ++i) {
-      const PlacedField a{field, random_pose(random, 0.1), 1};
-      const PlacedTree b{cube().view(), random_pose(random, 0.12 * i), 0.8};
+      const PlacedShape a{field, random_pose(random, 0.1), 1};
+      const PlacedAsset b{cube().view(), random_pose(random, 0.12 * i), 0.8};
       const Penetration whole = penetration(a, b, {}, workspace);
       const ContactPatches got = contact_patches(a, b, {}, workspace, patches);
       expect_shares(name, got, whole, patches);
@@ -125,9 +125,9 @@ TEST(UnlikePairs, PatchesAddUpToTheWhole) {
   ContactPatch patches[12];
   for (const SurfacePair& pair : pairs()) {
     for (int i = 0; i < 24; ++i) {
-      const PlacedTree a{pair.a.view(), random_pose(random, 0.1), 1};
-      const PlacedTree b{pair.b.view(), random_pose(random, (0.2 + 0.04 * i) * pair.distance),
-                         pair.scale_b};
+      const PlacedAsset a{pair.a.view(), random_pose(random, 0.1), 1};
+      const PlacedAsset b{pair.b.view(), random_pose(random, (0.2 + 0.04 * i) * pair.distance),
+                          pair.scale_b};
       // A stopped query is divided too.
       const PenetrationSettings settings = {.max_visits =
                                                 i % 3 == 0 ? 5u * static_cast<unsigned>(i) : 0};
@@ -137,7 +137,8 @@ TEST(UnlikePairs, PatchesAddUpToTheWhole) {
   }
 }
 
-void expect_no_normals(const PlacedField& a, const PlacedTree& b, const ContactSettings& settings) {
+void expect_no_normals(const PlacedShape& a, const PlacedAsset& b,
+                       const ContactSettings& settings) {
   Workspace workspace;
   ContactPatch patches[8];
   const ContactPatches got = contact_patches(a, b, settings, workspace, patches);
@@ -153,7 +154,7 @@ void expect_no_normals(const PlacedField& a, const PlacedTree& b, const ContactS
 TEST(FieldQuery, PatchesInsideHaveNoNormal) {
   std::mt19937_64 random(29);
   for (int i = 0; i < 20; ++i) {
-    const PlacedField box{BoxField{Vector3d(2, 2, 2)}, random_pose(random, 0.3), 1.7};
+    const PlacedShape box{BoxShape{Vector3d(2, 2, 2)}, random_pose(random, 0.3), 1.7};
     expect_no_normals(box, {cube().view(), box.pose, 0.05 + 0.01 * i}, {});
   }
 }

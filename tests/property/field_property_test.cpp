@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include "query/probe/cap.h"
 #include "support/box_overlap.h"
@@ -25,7 +25,7 @@ using namespace testing;
 void expect_gradients(const char* name, const Ask& ask, const Pose& pose, double way,
                       double rounding, std::mt19937_64& random) {
   for (int kind = 0; kind < 3; ++kind) {
-    Motion motion{pose};
+    Sweep motion{pose};
     if (kind != 1) motion.v = way * random_direction(random);
     if (kind != 0) motion.w = 2 * way * random_direction(random);
     const Work work = work_of(ask, motion, 40);
@@ -43,7 +43,7 @@ TEST(FieldQuery, GradientsAreThoseOfTheVolume) {
   Workspace workspace;
   std::mt19937_64 random(21);
   for (const auto& [name, field] : fields()) {
-    const PlacedField a{field, random_pose(random, 0.3), 1.3};
+    const PlacedShape a{field, random_pose(random, 0.3), 1.3};
     for (int i = 0; i < 6; ++i) {
       const Asset& body = i % 2 == 0 ? cube() : torus();
       const double scale = i < 3 ? 0.4 : 0.9;
@@ -63,15 +63,15 @@ TEST(FieldQuery, EitherMayBeTheSecond) {
   std::mt19937_64 random(24);
   std::vector<ContactPatch> patches(6), turned(6);
   for (const auto& [name, field] : fields()) {
-    const PlacedTree body{cube().view(), random_pose(random, 0.3), 0.6};
+    const PlacedAsset body{cube().view(), random_pose(random, 0.3), 0.6};
     Pose pose = random_pose(random, 0.4);
     for (int k = 0; k < 3; ++k) pose.t[k] += body.pose.t[k];
     const Ask ask = [&](const Pose& p) {
-      return penetration(body, PlacedField{field, p, 1.3}, {}, workspace);
+      return penetration(body, PlacedShape{field, p, 1.3}, {}, workspace);
     };
     expect_gradients(name, ask, pose, 0.02, 1e-12, random);
 
-    const PlacedField still{field, pose, 1.3};
+    const PlacedShape still{field, pose, 1.3};
     const ContactPatches one = contact_patches(still, body, {}, workspace, patches);
     const ContactPatches other = contact_patches(body, still, {}, workspace, turned);
     ASSERT_EQ(one.count, other.count) << name;
@@ -84,30 +84,30 @@ TEST(FieldQuery, EitherMayBeTheSecond) {
       torque += turned[i].torque;
     }
     const double scale = force.norm() + torque.norm() + 1e-12;
-    EXPECT_LT((force + other.penetration.translation_gradient).norm(), 1e-12 * scale) << name;
-    EXPECT_LT((torque + other.penetration.rotation_gradient).norm(), 1e-12 * scale) << name;
+    EXPECT_LT((force - other.penetration.force).norm(), 1e-12 * scale) << name;
+    EXPECT_LT((torque - other.penetration.torque).norm(), 1e-12 * scale) << name;
 
-    PlacedTree away = body;
+    PlacedAsset away = body;
     away.pose.t[2] += 9;
     const Separation gap = separation(still, away, {}, workspace);
     const Separation back = separation(away, still, {}, workspace);
     EXPECT_EQ(gap.distance, back.distance);
     EXPECT_EQ(gap.point_a, back.point_b);
     EXPECT_EQ(gap.normal, -back.normal);
-    EXPECT_EQ(overlap(still, away, workspace), overlap(away, still, workspace));
+    EXPECT_EQ(overlap(still, away, workspace).answer, overlap(away, still, workspace).answer);
   }
 }
 
 TEST(FieldQuery, TwoFieldsHoldNoSpheres) {
   Workspace workspace;
   ContactPatch patch;
-  const PlacedSolid box(BoxField{}, Pose{}), ball(BallField{}, Pose{});
+  const PlacedSolid box(BoxShape{}, Pose{}), ball(BallShape{}, Pose{});
   const Penetration found = penetration(box, ball, {}, workspace);
-  EXPECT_EQ(found.status, QueryStatus::not_held);
+  EXPECT_EQ(found.status, QueryStatus::missing_data);
   EXPECT_TRUE(std::isnan(found.volume));
-  EXPECT_EQ(separation(box, ball, {}, workspace).status, QueryStatus::not_held);
+  EXPECT_EQ(separation(box, ball, {}, workspace).status, QueryStatus::missing_data);
   EXPECT_EQ(contact_patches(box, ball, {}, workspace, {&patch, 1}).count, 0u);
-  EXPECT_EQ(overlap(box, ball, workspace), Overlapping::unknown);
+  EXPECT_EQ(overlap(box, ball, workspace), YesNo::unknown);
 }
 
 TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
@@ -115,13 +115,13 @@ TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   // not be left out by their way to the rim.
   Workspace workspace;
   const Asset one = make_random_asset({300, 0.3, {}, 0}, 5);
-  const PlacedField a{CylinderField{0.4, 0.3}, {}, 1};
+  const PlacedShape a{CylinderShape{0.4, 0.3}, {}, 1};
   std::mt19937_64 random(31);
   std::uniform_real_distribution<double> uniform(0, 0.5);
   for (int i = 0; i < 400; ++i) {
     Pose pose = random_pose(random, 0);
     pose.t[0] = 0.4 + uniform(random), pose.t[2] = 0.3 + uniform(random);
-    const PlacedTree b{one.view(), pose, 0.5};
+    const PlacedAsset b{one.view(), pose, 0.5};
     double want = 0;
     for (const WorldSphere& s : world_spheres(b, Measure::matched)) {
       const double whole = 4 * std::numbers::pi / 3 * s.r * s.r * s.r;
@@ -139,7 +139,7 @@ TEST(UnlikePairs, GradientsAreThoseOfTheVolume) {
   for (const SurfacePair& pair : pairs()) {
     int met = 0;
     for (int i = 0; i < 8; ++i) {
-      const PlacedTree a{pair.a.view(), random_pose(random, 0.3), 1.2};
+      const PlacedAsset a{pair.a.view(), random_pose(random, 0.3), 1.2};
       Pose pose = random_pose(random, 1.2 * pair.distance);
       for (int k = 0; k < 3; ++k) pose.t[k] += a.pose.t[k];
       const Ask ask = [&](const Pose& p) {
@@ -160,9 +160,9 @@ TEST(UnlikePairs, AnswersAreSound) {
     for (const bool spheres_only : {false, true}) {
       for (int i = 0; i < 20; ++i) {
         const PenetrationSettings settings = {.spheres_only = spheres_only};
-        const PlacedTree a{pair.a.view(), random_pose(random, 0.3), 1.2};
-        const PlacedTree b{pair.b.view(), random_pose(random, 1.2 * pair.distance),
-                           1.2 * pair.scale_b};
+        const PlacedAsset a{pair.a.view(), random_pose(random, 0.3), 1.2};
+        const PlacedAsset b{pair.b.view(), random_pose(random, 1.2 * pair.distance),
+                            1.2 * pair.scale_b};
         const Penetration ab = penetration(a, b, settings, workspace);
         const Penetration ba = penetration(b, a, settings, workspace);
         EXPECT_EQ(ab.status, QueryStatus::ok);
@@ -170,13 +170,10 @@ TEST(UnlikePairs, AnswersAreSound) {
         EXPECT_GE(ab.volume_max, ab.volume);
         EXPECT_LE(ab.volume_min, ba.volume * (1 + 1e-5));
         EXPECT_NEAR(ab.volume, ba.volume, 1e-5 * ab.volume) << pair.name;
-        const double force = ab.translation_gradient.norm() + std::pow(ab.volume, 2.0 / 3);
-        EXPECT_LE((ab.translation_gradient + ba.translation_gradient).norm(), 1e-4 * force)
-            << pair.name;
-        const Vector3d torque_a =
-            ba.rotation_gradient + position(a.pose).cross(ba.translation_gradient);
-        const Vector3d torque_b =
-            ab.rotation_gradient + position(b.pose).cross(ab.translation_gradient);
+        const double force = ab.force.norm() + std::pow(ab.volume, 2.0 / 3);
+        EXPECT_LE((ab.force + ba.force).norm(), 1e-4 * force) << pair.name;
+        const Vector3d torque_a = ba.torque + position(a.pose).cross(ba.force);
+        const Vector3d torque_b = ab.torque + position(b.pose).cross(ab.force);
         EXPECT_LE((torque_a + torque_b).norm(), 1e-4 * force * 2) << pair.name;
         if (!(ab.volume > 0)) continue;
         EXPECT_LE((ab.centroid - ba.centroid).norm(), 1e-4) << pair.name;
@@ -193,7 +190,7 @@ TEST(UnlikePairs, AnswersAreSound) {
 TEST(UnlikePairs, EnergyIsConservedOverClosedLoops) {
   Workspace workspace;
   for (const bool swapped : {false, true}) {
-    const PlacedTree fixed{cube().view(), {}, 1};
+    const PlacedAsset fixed{cube().view(), {}, 1};
     const Vector3d axis = Vector3d(0.3, -0.5, 0.8).normalized();
     const auto pose = [&](double phase) {
       const double turn = 2 * std::numbers::pi * phase;
@@ -201,19 +198,18 @@ TEST(UnlikePairs, EnergyIsConservedOverClosedLoops) {
                      {0.75 + 0.25 * std::cos(turn), 0.2 * std::sin(turn), 0.1});
     };
     const auto ask = [&](double phase) {
-      const PlacedTree moving{torus().view(), pose(phase), 0.9};
+      const PlacedAsset moving{torus().view(), pose(phase), 0.9};
       if (!swapped) return penetration(fixed, moving, {}, workspace);
       Penetration p = penetration(moving, fixed, {}, workspace);
-      p.rotation_gradient =
-          -(p.rotation_gradient - position(moving.pose).cross(p.translation_gradient));
-      p.translation_gradient = -p.translation_gradient;
+      p.torque = -(p.torque - position(moving.pose).cross(p.force));
+      p.force = -p.force;
       return p;
     };
     const auto power = [&](double phase) {
       const double turn = 2 * std::numbers::pi * phase;
       const Penetration p = ask(phase);
       const Vector3d v(-0.25 * std::sin(turn), 0.2 * std::cos(turn), 0);
-      return 2 * std::numbers::pi * (p.translation_gradient.dot(v) + p.rotation_gradient.dot(axis));
+      return -2 * std::numbers::pi * (p.force.dot(v) + p.torque.dot(axis));
     };
     constexpr int kSteps = 6000;  // forces have kinks where balls touch
     double work = 0, half = 0, moved = 0;
@@ -246,9 +242,9 @@ TEST(UnlikePairs, CarriedThroughAWall) {
         constexpr int kSteps = 400;
         for (int i = 0; i <= kSteps; ++i) {
           const double z = -0.7 + 1.4 * i / kSteps;
-          const PlacedTree body{cube().view(), pose_of(q, {0.05, -0.1, z}), 0.5};
-          const PlacedTree wall{(thin ? plate() : slab()).view(), {}, 1};
-          const Penetration got = way == 0 ? penetration(PlacedField{BoxField{{1, 1, half}}, {}, 1},
+          const PlacedAsset body{cube().view(), pose_of(q, {0.05, -0.1, z}), 0.5};
+          const PlacedAsset wall{(thin ? plate() : slab()).view(), {}, 1};
+          const Penetration got = way == 0 ? penetration(PlacedShape{BoxShape{{1, 1, half}}, {}, 1},
                                                          body, {}, workspace)
                                   : way == 1 ? penetration(wall, body, exact, workspace)
                                              : penetration(body, wall, exact, workspace);
@@ -286,13 +282,13 @@ TEST(UnlikePairs, NoJumpWhereMethodsChangeHands) {
         for (int i = 0; i < 8; ++i)
           low =
               std::min(low, (q * Vector3d((i & 1) - 0.5, (i >> 1 & 1) - 0.5, (i >> 2) - 0.5)).z());
-        const PlacedTree a{cube().view(), {}, 1};
-        const PlacedTree b{cube().view(), pose_of(q, {0.03, -0.05, 0.5 - scale * (low + depth)}),
-                           scale};
+        const PlacedAsset a{cube().view(), {}, 1};
+        const PlacedAsset b{cube().view(), pose_of(q, {0.03, -0.05, 0.5 - scale * (low + depth)}),
+                            scale};
         const Penetration p =
             swapped ? penetration(b, a, {}, workspace) : penetration(a, b, {}, workspace);
         const double share = p.volume / (scale * scale * scale);
-        const double force = p.translation_gradient.norm() / (scale * scale);
+        const double force = p.force.norm() / (scale * scale);
         if (last > 0) {
           const double step = std::abs(share / last - 1);
           if (step > worst) worst = step, at = scale;
@@ -315,8 +311,9 @@ TEST(FieldQuery, HalfSpaceIsASumOfCaps) {
   for (int i = 0; i < 60; ++i) {
     const double scale = std::pow(10.0, i % 7 - 3);
     const Vector3d normal = random_direction(random);
-    const PlacedField a{HalfSpaceField{normal, 0.1 * scale}, random_pose(random, scale), 0.7};
-    const PlacedTree b{(i % 2 == 0 ? off : cube()).view(), random_pose(random, 0.5 * scale), scale};
+    const PlacedShape a{HalfSpaceShape{normal, 0.1 * scale}, random_pose(random, scale), 0.7};
+    const PlacedAsset b{(i % 2 == 0 ? off : cube()).view(), random_pose(random, 0.5 * scale),
+                        scale};
     const Vector3d n = rotation(a.pose) * normal;
     double volume = 0, scale_of_force = 0;
     Vector3d force = Vector3d::Zero(), torque = force, moment = force;
@@ -324,17 +321,17 @@ TEST(FieldQuery, HalfSpaceIsASumOfCaps) {
       const double d = 0.07 * scale - n.dot(s.centre - position(a.pose));
       const Cap c = cap(s.r, d);
       volume += c.volume;
-      force -= c.derivative * n;
+      force += c.derivative * n;
       scale_of_force += c.derivative;
-      torque -= (s.centre - position(b.pose)).cross(c.derivative * n);
+      torque += (s.centre - position(b.pose)).cross(c.derivative * n);
       moment += c.volume * s.centre - c.moment * n;
     }
     const Penetration p = penetration(a, b, {}, workspace);
     ASSERT_EQ(p.status, QueryStatus::ok);
     const double lever = 20 * scale;  // the farthest sphere
     EXPECT_NEAR(p.volume, volume, 1e-12 * volume + 1e-12 * scale * scale_of_force);
-    EXPECT_LE((p.translation_gradient - force).norm(), 1e-11 * scale_of_force);
-    EXPECT_LE((p.rotation_gradient - torque).norm(), 1e-11 * scale_of_force * lever);
+    EXPECT_LE((p.force - force).norm(), 1e-11 * scale_of_force);
+    EXPECT_LE((p.torque - torque).norm(), 1e-11 * scale_of_force * lever);
     if (volume > 1e-6 * scale * scale * scale) {
       EXPECT_LE((p.centroid - moment / volume).norm(), 1e-9 * lever);
     }

@@ -16,18 +16,18 @@ namespace {
 using namespace testing;
 
 /// Distance of a point from a field in its own frame, positive outside.
-double outside_of(const Field& field, const Vector3d& x) {
-  if (const auto* f = std::get_if<HalfSpaceField>(&field)) return f->normal.dot(x) - f->offset;
-  if (const auto* f = std::get_if<BallField>(&field)) return x.norm() - f->radius;
-  if (const auto* f = std::get_if<BoxField>(&field)) {
+double outside_of(const Shape& field, const Vector3d& x) {
+  if (const auto* f = std::get_if<HalfSpaceShape>(&field)) return f->normal.dot(x) - f->offset;
+  if (const auto* f = std::get_if<BallShape>(&field)) return x.norm() - f->radius;
+  if (const auto* f = std::get_if<BoxShape>(&field)) {
     const Vector3d q = x.cwiseAbs() - f->half_extents;
     return q.cwiseMax(0.0).norm() + std::min(0.0, q.maxCoeff());
   }
-  if (const auto* f = std::get_if<CapsuleField>(&field)) {
+  if (const auto* f = std::get_if<CapsuleShape>(&field)) {
     const double z = std::clamp(x.z(), -f->half_height, f->half_height);
     return (x - Vector3d(0, 0, z)).norm() - f->radius;
   }
-  const auto& f = std::get<CylinderField>(field);
+  const auto& f = std::get<CylinderShape>(field);
   const double side = x.head<2>().norm() - f.radius, end = std::abs(x.z()) - f.half_height;
   return std::hypot(std::max(side, 0.0), std::max(end, 0.0)) + std::min(0.0, std::max(side, end));
 }
@@ -42,8 +42,8 @@ TEST(FieldQuery, SeparationIsTheNearestSpheres) {
     const double scale = 1.3;
     int apart = 0;
     for (int i = 0; i < 30; ++i) {
-      const PlacedField a{field, random_pose(random, 0.3), scale};
-      const PlacedTree b{cube().view(), random_pose(random, 0.1 + 0.08 * i), 0.5};
+      const PlacedShape a{field, random_pose(random, 0.3), scale};
+      const PlacedAsset b{cube().view(), random_pose(random, 0.1 + 0.08 * i), 0.5};
       const Separation got = separation(a, b, {}, workspace);
       ASSERT_EQ(got.status, QueryStatus::ok) << name;
       const Quaterniond q = rotation(a.pose).conjugate();
@@ -54,7 +54,7 @@ TEST(FieldQuery, SeparationIsTheNearestSpheres) {
       if (mesh) {
         // The torus as its segments: by another query, against a ball field of its own.
         const Separation trees =
-            separation(PlacedTree{torus().view(), a.pose, scale}, b, {}, workspace);
+            separation(PlacedAsset{torus().view(), a.pose, scale}, b, {}, workspace);
         EXPECT_LE(got.distance_min, trees.distance_max + 1e-9);
         EXPECT_GE(got.distance_max, trees.distance_min - 1e-9);
       } else {
@@ -101,14 +101,14 @@ TEST(FieldQuery, SeparationFromALargeTerrain) {
   Workspace workspace;
   std::vector<float> heights(1000 * 1000);
   for (std::size_t i = 0; i < heights.size(); ++i) heights[i] = static_cast<float>(i % 7) * 0.001f;
-  HeightField terrain;
+  HeightFieldShape terrain;
   terrain.heights = heights.data();
   terrain.columns = terrain.rows = 1000;
   terrain.spacing[0] = terrain.spacing[1] = 0.01;
   terrain.lowest = 0, terrain.highest = 0.0061;
   for (const double z : {1.0, 3.0, 50.0}) {
-    const PlacedTree b{cube().view(), pose_of(Quaterniond::Identity(), {5, 5, z}), 1};
-    const Separation got = separation(PlacedField{terrain, {}, 1}, b, {}, workspace);
+    const PlacedAsset b{cube().view(), pose_of(Quaterniond::Identity(), {5, 5, z}), 1};
+    const Separation got = separation(PlacedShape{terrain, {}, 1}, b, {}, workspace);
     double lowest = std::numeric_limits<double>::infinity();
     for (const WorldSphere& s : world_spheres(b, Measure::inner))
       lowest = std::min(lowest, s.centre.z() - s.r);

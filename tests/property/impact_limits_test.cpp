@@ -18,49 +18,49 @@ using namespace testing;
 
 TEST(TimeOfImpact, OneHoldsTheOther) {
   for (const bool first : {false, true}) {
-    const PlacedTree small{torus().view(), {}, 0.1}, large{cube().view(), {}, 1};
+    const PlacedAsset small{torus().view(), {}, 0.1}, large{cube().view(), {}, 1};
     const TimeOfImpact found =
         first ? time_of_impact(small, large, {}, {}, workspace())
               : time_of_impact(large, small, {{}, straight({1, 0, 0})}, {}, workspace());
-    EXPECT_EQ(found.status, ImpactStatus::overlapping);
+    EXPECT_EQ(found.kind, ImpactKind::overlapping);
     EXPECT_EQ(found.time, 0);
   }
-  const PlacedTree large{cube().view(), {}, 1};
-  for (const Field& inside : {Field{BallField{0.1}}, Field{BoxField{{0.1, 0.1, 0.1}}},
-                              Field{BallField{2}}, Field{HalfSpaceField{{0, 0, 1}, 1}}})
-    EXPECT_EQ(time_of_impact(PlacedField{inside, {}, 1}, large, {}, {}, workspace()).status,
-              ImpactStatus::overlapping);
+  const PlacedAsset large{cube().view(), {}, 1};
+  for (const Shape& inside : {Shape{BallShape{0.1}}, Shape{BoxShape{{0.1, 0.1, 0.1}}},
+                              Shape{BallShape{2}}, Shape{HalfSpaceShape{{0, 0, 1}, 1}}})
+    EXPECT_EQ(time_of_impact(PlacedShape{inside, {}, 1}, large, {}, {}, workspace()).kind,
+              ImpactKind::overlapping);
   // In the hole of a ring it is free.
   const TimeOfImpact free =
-      time_of_impact(PlacedTree{torus().view(), {}, 1}, {cube().view(), {}, 0.2},
+      time_of_impact(PlacedAsset{torus().view(), {}, 1}, {cube().view(), {}, 0.2},
                      {{}, straight({0, 0, 3})}, {}, workspace());
-  EXPECT_EQ(free.status, ImpactStatus::no_impact);
+  EXPECT_EQ(free.kind, ImpactKind::no_impact);
 }
 
 TEST(TimeOfImpact, WhatSlidesOrPartsIsNoImpact) {
   ImpactSettings settings;
   settings.tolerance = 1e-2;
   const double gap = 1e-3;  // nearer than the tolerance
-  const PlacedTree floor{wall().view(), {}, 1}, box{cube().view(), at({0, 0, 1.5 + gap}), 1};
+  const PlacedAsset floor{wall().view(), {}, 1}, box{cube().view(), at({0, 0, 1.5 + gap}), 1};
   const Motion slide = straight({30, 7, 0}), part = straight({1, 0, 1}),
                sink = straight({0, 0, -1});
   const Motion spin{{1, 2, 0}, {0, 0, 5}, Vector3d::Zero()};
   for (const Motion& motion : {slide, part, spin, Motion{}}) {
-    EXPECT_EQ(time_of_impact(floor, box, {{}, motion}, settings, workspace()).status,
-              ImpactStatus::no_impact);
-    EXPECT_EQ(time_of_impact(PlacedField{HalfSpaceField{}, at({0, 0, 1}), 1}, box, {{}, motion},
+    EXPECT_EQ(time_of_impact(floor, box, {{}, motion}, settings, workspace()).kind,
+              ImpactKind::no_impact);
+    EXPECT_EQ(time_of_impact(PlacedShape{HalfSpaceShape{}, at({0, 0, 1}), 1}, box, {{}, motion},
                              settings, workspace())
-                  .status,
-              ImpactStatus::no_impact);
+                  .kind,
+              ImpactKind::no_impact);
   }
   const TimeOfImpact found = time_of_impact(floor, box, {{}, sink}, settings, workspace());
-  EXPECT_EQ(found.status, ImpactStatus::impact);
+  EXPECT_EQ(found.kind, ImpactKind::impact);
   EXPECT_EQ(found.time, 0);
   // Both move alike, however fast.
   EXPECT_EQ(time_of_impact(floor, box, {straight({1e6, 1e6, 1e6}), straight({1e6, 1e6, 1e6})},
                            settings, workspace())
-                .status,
-            ImpactStatus::no_impact);
+                .kind,
+            ImpactKind::no_impact);
 }
 
 TEST(TimeOfImpact, LimitsKeepWhatIsCertain) {
@@ -68,8 +68,8 @@ TEST(TimeOfImpact, LimitsKeepWhatIsCertain) {
   ImpactSettings settings;
   settings.tolerance = 1e-4;
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree a{torus().view(), random_pose(random, 0), 1};
-    const PlacedTree b{ball().view(), random_pose(random, 2), 0.3};
+    const PlacedAsset a{torus().view(), random_pose(random, 0), 1};
+    const PlacedAsset b{ball().view(), random_pose(random, 2), 0.3};
     Motions motions{{}, random_motion(random, 0.1, 2)};
     motions.b.velocity -= 2 * Vector3d(b.pose.t[0], b.pose.t[1], b.pose.t[2]);
     const TimeOfImpact whole = time_of_impact(a, b, motions, settings, workspace());
@@ -86,7 +86,7 @@ TEST(TimeOfImpact, LimitsKeepWhatIsCertain) {
         EXPECT_EQ(found.status, whole.status);
         EXPECT_EQ(found.time, whole.time);
       } else {
-        EXPECT_EQ(found.status, ImpactStatus::budget_exhausted);
+        EXPECT_EQ(found.status, QueryStatus::budget_exhausted);
       }
     }
     Workspace little(1);
@@ -103,18 +103,18 @@ TEST(TimeOfImpact, RefusesWhatIsNoInput) {
   const NoFloatTraps untrapped;
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
-  const PlacedTree a{cube().view(), {}, 1}, b{ball().view(), at({3, 0, 0}), 1};
-  const auto status = [&](const PlacedTree& x, const PlacedTree& y, const Motions& motions,
+  const PlacedAsset a{cube().view(), {}, 1}, b{ball().view(), at({3, 0, 0}), 1};
+  const auto status = [&](const PlacedAsset& x, const PlacedAsset& y, const Motions& motions,
                           double duration) {
     ImpactSettings settings;
     settings.duration = duration;
     const TimeOfImpact found = time_of_impact(x, y, motions, settings, workspace());
     EXPECT_EQ(std::isnan(found.time) && std::isnan(found.distance_min) && found.normal.hasNaN(),
-              found.status == ImpactStatus::invalid_input);
+              found.status == QueryStatus::invalid_input);
     return found.status;
   };
-  constexpr ImpactStatus kInvalid = ImpactStatus::invalid_input;
-  EXPECT_EQ(status(a, b, {}, 1), ImpactStatus::no_impact);
+  constexpr QueryStatus kInvalid = QueryStatus::invalid_input;
+  EXPECT_EQ(status(a, b, {}, 1), QueryStatus::ok);
   for (const double bad : {nan, inf, -inf, -1.0, 0.0}) EXPECT_EQ(status(a, b, {}, bad), kInvalid);
   for (const double bad : {nan, inf}) {
     for (int k = 0; k < 3; ++k) {
@@ -134,14 +134,14 @@ TEST(TimeOfImpact, RefusesWhatIsNoInput) {
   EXPECT_EQ(status(a, {ball().view(), at({3, 0, 0}), -1}, {}, 1), kInvalid);
   EXPECT_EQ(status(a, b, {{}, motion_between({}, {}, 0)}, 1), kInvalid);
   EXPECT_EQ(status(a, b, {{}, motion_between({}, {{0, 0, 0, 0}, {}}, 1)}, 1), kInvalid);
-  const auto of_field = [&](const Field& field) {
-    return time_of_impact(PlacedField{field, {}, 1}, b, {}, {}, workspace()).status;
+  const auto of_field = [&](const Shape& field) {
+    return time_of_impact(PlacedShape{field, {}, 1}, b, {}, {}, workspace()).status;
   };
-  EXPECT_EQ(of_field(BallField{-1}), kInvalid);
-  EXPECT_EQ(of_field(HalfSpaceField{{0, 0, 0}, 0}), kInvalid);
-  EXPECT_EQ(of_field(FunctionField{
+  EXPECT_EQ(of_field(BallShape{-1}), kInvalid);
+  EXPECT_EQ(of_field(HalfSpaceShape{{0, 0, 0}, 0}), kInvalid);
+  EXPECT_EQ(of_field(FunctionShape{
                 [](const void*, const Vector3d&) noexcept {
-                  return FieldSample{std::numeric_limits<double>::quiet_NaN(), Vector3d::Zero()};
+                  return ShapeSample{std::numeric_limits<double>::quiet_NaN(), Vector3d::Zero()};
                 },
                 nullptr, 0}),
             kInvalid);
@@ -158,9 +158,10 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
     const Pose pose = random_pose(random, 2.5);
     Motion motion = random_motion(random, 0.1, 3);
     motion.velocity -= 2 * Vector3d(pose.t[0], pose.t[1], pose.t[2]);
-    const TimeOfImpact want = time_of_impact(
-        PlacedTree{torus().view(), {}, 1}, {cube().view(), pose, 1}, {{}, motion}, {}, workspace());
-    ASSERT_EQ(want.status, ImpactStatus::impact);
+    const TimeOfImpact want =
+        time_of_impact(PlacedAsset{torus().view(), {}, 1}, {cube().view(), pose, 1}, {{}, motion},
+                       {}, workspace());
+    ASSERT_EQ(want.kind, ImpactKind::impact);
     for (const double size : {0x1p-20, 0x1p20}) {
       for (const double far : {0.0, 1e6}) {
         Pose pose_a, pose_b = pose;
@@ -171,7 +172,7 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
         Motion scaled = motion;
         scaled.velocity *= size;
         const TimeOfImpact found =
-            time_of_impact(PlacedTree{torus().view(), pose_a, size}, {cube().view(), pose_b, size},
+            time_of_impact(PlacedAsset{torus().view(), pose_a, size}, {cube().view(), pose_b, size},
                            {{}, scaled}, {}, workspace());
         EXPECT_EQ(found.status, want.status);
         EXPECT_NEAR(found.time, want.time, far == 0 ? 0 : 1e-4);
@@ -184,7 +185,7 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
     ImpactSettings settings;
     settings.duration = 1e-6;
     const TimeOfImpact found =
-        time_of_impact(PlacedTree{torus().view(), {}, 1}, {cube().view(), pose, 1}, {{}, fast},
+        time_of_impact(PlacedAsset{torus().view(), {}, 1}, {cube().view(), pose, 1}, {{}, fast},
                        settings, workspace());
     EXPECT_NEAR(1e6 * found.time, want.time, 1e-9);
   }

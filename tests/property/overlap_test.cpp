@@ -1,5 +1,5 @@
 #include <gtest/gtest.h>
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include <array>
 #include <limits>
@@ -19,7 +19,7 @@ struct Truth {
   bool spheres_meet = false, covers_meet = false;
 };
 
-Truth truth_of(const PlacedTree& a, const PlacedTree& b) {
+Truth truth_of(const PlacedAsset& a, const PlacedAsset& b) {
   const auto spheres_a = testing::world_spheres(a, Measure::inner);
   const auto spheres_b = testing::world_spheres(b, Measure::inner);
   Truth truth;
@@ -41,8 +41,8 @@ TEST(Overlap, SaysWhatIsCertain) {
     const Asset b = make_random_asset({n / 2 + 1, 0.1, {}, 0}, 21);
     for (int i = 0; i < 60; ++i) {
       const double scale = i % 3 == 0 ? 1e-3 : 1.7;
-      const PlacedTree pa{a.view(), random_pose(random, 1), 1};
-      PlacedTree pb{b.view(), random_pose(random, 0), scale};
+      const PlacedAsset pa{a.view(), random_pose(random, 1), 1};
+      PlacedAsset pb{b.view(), random_pose(random, 0), scale};
       const Eigen::Vector3d to = testing::random_vector(
           [&] { return std::uniform_real_distribution<double>(-3.5, 3.5)(random); });
       const Eigen::Vector3d centre =
@@ -50,12 +50,12 @@ TEST(Overlap, SaysWhatIsCertain) {
           Eigen::Vector3d(1, 2, 3);
       for (int k = 0; k < 3; ++k) pb.pose.t[k] = pa.pose.t[k] + centre[k] + to[k];
       const Truth truth = truth_of(pa, pb);
-      for (const Overlapping answer : {overlap(pa, pb, workspace), overlap(pb, pa, workspace)}) {
-        ++said[static_cast<std::size_t>(answer)];
+      for (const YesNoAnswer answer : {overlap(pa, pb, workspace), overlap(pb, pa, workspace)}) {
+        ++said[static_cast<std::size_t>(answer.answer)];
         // With 256 visits all is found out about trees of this size.
-        const Overlapping expected = truth.spheres_meet  ? Overlapping::yes
-                                     : truth.covers_meet ? Overlapping::unknown
-                                                         : Overlapping::no;
+        const YesNo expected = truth.spheres_meet  ? YesNo::yes
+                               : truth.covers_meet ? YesNo::unknown
+                                                   : YesNo::no;
         EXPECT_EQ(answer, expected) << n << " spheres, pose " << i;
       }
     }
@@ -65,26 +65,26 @@ TEST(Overlap, SaysWhatIsCertain) {
 
 TEST(Overlap, NeedsTimeAndRoom) {
   const Asset a = make_random_asset({700, 0.2, {}, 0}, 20);
-  const PlacedTree pa{a.view(), {}, 1}, near{a.view(), {{1, 0, 0, 0}, {1.9, 0, 0}}, 1};
+  const PlacedAsset pa{a.view(), {}, 1}, near{a.view(), {{1, 0, 0, 0}, {1.9, 0, 0}}, 1};
   Workspace workspace, small(64);
-  ASSERT_NE(overlap(pa, near, workspace), Overlapping::no);
-  const Overlapping hurried = overlap(pa, near, small);
-  EXPECT_TRUE(hurried == Overlapping::unknown || hurried == overlap(pa, near, workspace));
+  ASSERT_NE(overlap(pa, near, workspace), YesNo::no);
+  const YesNoAnswer hurried = overlap(pa, near, small);
+  EXPECT_TRUE(hurried == YesNo::unknown || hurried == overlap(pa, near, workspace).answer);
 
   const testing::NoFloatTraps with_nan;
-  PlacedTree wrong = pa;
+  PlacedAsset wrong = pa;
   wrong.scale = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(overlap(pa, wrong, workspace), Overlapping::unknown);
-  EXPECT_EQ(overlap(PlacedTree(), pa, workspace), Overlapping::unknown);
-  EXPECT_EQ(overlap(PlacedField{BallField{-1}, {}}, pa, workspace), Overlapping::unknown);
+  EXPECT_EQ(overlap(pa, wrong, workspace), YesNo::unknown);
+  EXPECT_EQ(overlap(PlacedAsset(), pa, workspace), YesNo::unknown);
+  EXPECT_EQ(overlap(PlacedShape{BallShape{-1}, {}}, pa, workspace), YesNo::unknown);
   Workspace taken = std::move(workspace);
-  EXPECT_EQ(overlap(pa, pa, workspace), Overlapping::unknown);  // NOLINT: what is tested
-  EXPECT_EQ(overlap(pa, pa, taken), Overlapping::yes);
+  EXPECT_EQ(overlap(pa, pa, workspace), YesNo::unknown);  // NOLINT: what is tested
+  EXPECT_EQ(overlap(pa, pa, taken), YesNo::yes);
 }
 
 /// Half a distance: what a bound may say.
-FieldSample cautious_plane(const void*, const Eigen::Vector3d& x) noexcept {
-  return {-0.5 * x.z(), {0, 0, -0.5}};
+ShapeSample cautious_plane(const void*, const Eigen::Vector3d& x) noexcept {
+  return {0.5 * x.z(), {0, 0, 0.5}};
 }
 
 TEST(Overlap, OfFields) {
@@ -94,7 +94,7 @@ TEST(Overlap, OfFields) {
   const Asset b = make_random_asset({300, 0.2, {}, 0}, 21);
   for (int i = 0; i < 400; ++i) {
     const double scale = i % 2 == 0 ? 0.3 : 2;
-    PlacedTree pb{b.view(), random_pose(random, 0), scale};
+    PlacedAsset pb{b.view(), random_pose(random, 0), scale};
     pb.pose.t[2] = scale * (0.7 + 0.002 * i);
     Truth plane, ball;
     bool centre_below = false;
@@ -107,20 +107,18 @@ TEST(Overlap, OfFields) {
       ball.covers_meet |= off < sphere.cover;
     }
     const auto expected = [](const Truth& truth) {
-      return truth.spheres_meet  ? Overlapping::yes
-             : truth.covers_meet ? Overlapping::unknown
-                                 : Overlapping::no;
+      return truth.spheres_meet ? YesNo::yes : truth.covers_meet ? YesNo::unknown : YesNo::no;
     };
-    const Overlapping of_plane = overlap(PlacedField{HalfSpaceField(), {}}, pb, workspace);
+    const YesNoAnswer of_plane = overlap(PlacedShape{HalfSpaceShape(), {}}, pb, workspace);
     EXPECT_EQ(of_plane, expected(plane)) << i;
-    EXPECT_EQ(overlap(PlacedField{BallField{0.4}, {}}, pb, workspace), expected(ball)) << i;
-    ++said[static_cast<std::size_t>(of_plane)];
+    EXPECT_EQ(overlap(PlacedShape{BallShape{0.4}, {}}, pb, workspace), expected(ball)) << i;
+    ++said[static_cast<std::size_t>(of_plane.answer)];
     // Distances that are too small make nothing certain that is not.
-    const PlacedField careful{FunctionField{cautious_plane}, {}};
-    const Overlapping cautious = overlap(careful, pb, workspace);
-    EXPECT_TRUE(cautious != Overlapping::yes || centre_below) << i;
-    EXPECT_TRUE(cautious != Overlapping::no || !plane.covers_meet) << i;
-    EXPECT_TRUE(cautious == Overlapping::yes || !centre_below) << i;
+    const PlacedShape careful{FunctionShape{cautious_plane}, {}};
+    const YesNoAnswer cautious = overlap(careful, pb, workspace);
+    EXPECT_TRUE(cautious != YesNo::yes || centre_below) << i;
+    EXPECT_TRUE(cautious != YesNo::no || !plane.covers_meet) << i;
+    EXPECT_TRUE(cautious == YesNo::yes || !centre_below) << i;
   }
   for (const int times : said) EXPECT_GT(times, 20);
 }

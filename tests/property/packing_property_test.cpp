@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/error.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 #include <oneapi/tbb/global_control.h>
 
 #include <algorithm>
@@ -62,9 +62,9 @@ void expect_certified(const SpherePacking& packing, const Solid& solid, double r
   for (std::size_t i = 0; i < packing.spheres.size(); ++i) {
     const Sphere& a = packing.spheres[i];
     const Eigen::Vector3d centre(a.x, a.y, a.z);
-    const double distance = solid.signed_distance(packing.frame.from_unit(centre)) / scale;
+    const double depth = -solid.signed_distance(packing.frame.from_unit(centre)) / scale;
     ASSERT_GT(a.r, 0);
-    ASSERT_LE(double{a.r} + 1e-12, distance + rounding) << "sphere " << i;
+    ASSERT_LE(double{a.r} + 1e-12, depth + rounding) << "sphere " << i;
     for (std::size_t j = 0; j < i; ++j) {
       const Sphere& b = packing.spheres[j];
       const double gap =

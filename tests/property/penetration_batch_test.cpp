@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/lenses.h>
 #include <ist/query.h>
 #include <ist/query_tbb.h>
+#include <ist/shapes.h>
 
 #include <cmath>
 #include <limits>
@@ -23,8 +23,8 @@ class PenetrationBatch : public ::testing::Test {
   PenetrationBatch() {
     std::mt19937_64 random(3);
     for (int i = 0; i < 203; ++i) {
-      const PlacedTree a{assets_[i % 3].view(), random_pose(random, 0.2), 1.0};
-      PlacedTree b{assets_[i % 2].view(), random_pose(random, 0.01 * i), i % 5 == 0 ? 0.1 : 1.0};
+      const PlacedAsset a{assets_[i % 3].view(), random_pose(random, 0.2), 1.0};
+      PlacedAsset b{assets_[i % 2].view(), random_pose(random, 0.01 * i), i % 5 == 0 ? 0.1 : 1.0};
       if (i == 77) b.pose.t[0] = std::numeric_limits<double>::quiet_NaN();
       pairs_.push_back({a, b});
     }
@@ -49,8 +49,8 @@ class PenetrationBatch : public ::testing::Test {
       ASSERT_EQ(answers[i].volume_min, one.volume_min);
       ASSERT_EQ(answers[i].volume_max, one.volume_max);
       ASSERT_EQ(answers[i].centroid, one.centroid);
-      ASSERT_EQ(answers[i].translation_gradient, one.translation_gradient);
-      ASSERT_EQ(answers[i].rotation_gradient, one.rotation_gradient);
+      ASSERT_EQ(answers[i].force, one.force);
+      ASSERT_EQ(answers[i].torque, one.torque);
       ASSERT_EQ(answers[i].status, one.status);
       ASSERT_EQ(answers[i].node_visits, one.node_visits);
       ASSERT_EQ(answers[i].sphere_pairs, one.sphere_pairs);
@@ -96,7 +96,7 @@ TEST_F(PenetrationBatch, Patches) {
   expect_same_patches(std::span<const PlacedPair>(pairs_));
   std::vector<PlacedPair> fields;
   for (const PlacedPair& pair : pairs_)
-    fields.push_back({{BallField{0.8}, std::get<PlacedTree>(pair.a.placed).pose}, pair.b});
+    fields.push_back({{BallShape{0.8}, std::get<PlacedAsset>(pair.a.placed).pose}, pair.b});
   expect_same_patches(std::span<const PlacedPair>(fields));
 
   std::vector<ContactPatches> answers(3);
@@ -143,13 +143,13 @@ TEST_F(PenetrationBatch, OnAPoolThatRunsWorkersOneByOneAndBackwards) {
 
 // Meshes: the same bits on many threads, and NaN where one is not held.
 TEST_F(PenetrationBatch, Exact) {
-  const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
-  const Asset ball = bake_surface(close_mesh(testing::icosphere_mesh(4), "ball"));
+  const Asset cube = bake_mesh_only(close_mesh(testing::cube_mesh(), "cube"));
+  const Asset ball = bake_mesh_only(close_mesh(testing::icosphere_mesh(4), "ball"));
   std::size_t met = 0;
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (i == 50) continue;  // holds spheres alone
-    std::get<PlacedTree>(pairs_[i].a.placed).tree = (i % 2 == 0 ? cube : ball).view();
-    std::get<PlacedTree>(pairs_[i].b.placed).tree = (i % 3 == 0 ? cube : ball).view();
+    std::get<PlacedAsset>(pairs_[i].a.placed).asset = (i % 2 == 0 ? cube : ball).view();
+    std::get<PlacedAsset>(pairs_[i].b.placed).asset = (i % 3 == 0 ? cube : ball).view();
   }
   std::vector<Workspace> scratch;
   for (int i = 0; i < 8; ++i) scratch.emplace_back();
@@ -160,7 +160,7 @@ TEST_F(PenetrationBatch, Exact) {
     const Penetration one = penetration(pairs_[i].a, pairs_[i].b, exact, scratch[0]);
     ASSERT_EQ(answers[i].status, one.status) << "pair " << i;
     if (i == 50) {
-      EXPECT_EQ(one.status, QueryStatus::not_held);
+      EXPECT_EQ(one.status, QueryStatus::missing_data);
       EXPECT_TRUE(std::isnan(answers[i].volume));
       continue;
     }
@@ -173,8 +173,8 @@ TEST_F(PenetrationBatch, Exact) {
     ASSERT_EQ(answers[i].volume_min, one.volume_min);
     ASSERT_EQ(answers[i].volume_max, one.volume_max);
     ASSERT_EQ(answers[i].centroid, one.centroid);
-    ASSERT_EQ(answers[i].translation_gradient, one.translation_gradient);
-    ASSERT_EQ(answers[i].rotation_gradient, one.rotation_gradient);
+    ASSERT_EQ(answers[i].force, one.force);
+    ASSERT_EQ(answers[i].torque, one.torque);
     ASSERT_EQ(answers[i].node_visits, one.node_visits);
     met += one.volume > 0;
   }
@@ -183,21 +183,21 @@ TEST_F(PenetrationBatch, Exact) {
 
 // A field has no mesh: nobody takes that for no contact.
 TEST_F(PenetrationBatch, ExactOfAFieldIsNotHeld) {
-  const Asset cube = bake_surface(close_mesh(testing::cube_mesh(), "cube"));
+  const Asset cube = bake_mesh_only(close_mesh(testing::cube_mesh(), "cube"));
   std::vector<Workspace> scratch(1);
-  const PlacedPair pairs[] = {{{BallField{0.8}, {}}, {cube.view(), {}, 1}}};
+  const PlacedPair pairs[] = {{{BallShape{0.8}, {}}, {cube.view(), {}, 1}}};
   Penetration answers[1];
   penetration_batch(pairs, {.measure = Measure::exact}, scratch, answers);
   for (const Penetration& answer : answers) {
-    EXPECT_EQ(answer.status, QueryStatus::not_held);
-    EXPECT_TRUE(std::isnan(answer.volume) && answer.translation_gradient.hasNaN());
+    EXPECT_EQ(answer.status, QueryStatus::missing_data);
+    EXPECT_TRUE(std::isnan(answer.volume) && answer.force.hasNaN());
   }
   ContactPatch patches[2];
   const ContactPatches found =
       contact_patches(pairs[0].a, pairs_[0].b, {.measure = Measure::exact}, scratch[0], patches);
-  EXPECT_EQ(found.penetration.status, QueryStatus::not_held);
+  EXPECT_EQ(found.penetration.status, QueryStatus::missing_data);
   EXPECT_EQ(found.count, 0u);
-  const auto& tree = std::get<PlacedTree>(pairs_[0].b.placed);
+  const auto& tree = std::get<PlacedAsset>(pairs_[0].b.placed);
   EXPECT_EQ(overlap_lenses(tree, tree, {.measure = Measure::exact}, {}).status,
             QueryStatus::invalid_input);
 }

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "query/exact/crossing.h"
-#include "query/field/probe_sum.h"
 #include "query/probe/cap.h"
 #include "query/probe/patch_sums.h"
+#include "query/shape/probe_sum.h"
 #include "support/test_meshes.h"
 #include "support/turns.h"
 
@@ -206,15 +206,15 @@ Vector3d in_box(std::mt19937_64& random, const Vector3d& half) {
   return Vector3d(x, y, z).cwiseProduct(half);
 }
 
-struct Shape {
+struct Facets {
   const char* name;
   TriangleMesh mesh;
   double radius;  ///< of balls that it is met by, the geometric mean
 };
 
-std::vector<Shape> shapes() {
+std::vector<Facets> shapes() {
   const Vector3d one = Vector3d::Ones();
-  std::vector<Shape> all;
+  std::vector<Facets> all;
   all.push_back({"box", testing::box_mesh(-Vector3d(1, 0.7, 0.4), Vector3d(1, 0.7, 0.4)), 0.4});
   all.push_back(
       {"tetrahedron", tetrahedron({0, 0, 0}, {1, 0.1, 0}, {0.2, 0.9, 0.1}, {0.3, 0.3, 0.8}), 0.25});
@@ -230,7 +230,7 @@ std::vector<Shape> shapes() {
 }
 
 /// Balls about the surface of a mesh, from a tenth to ten times the shape's radius.
-Ball random_ball(const Shape& shape, const TriangleMesh& mesh, std::mt19937_64& random) {
+Ball random_ball(const Facets& shape, const TriangleMesh& mesh, std::mt19937_64& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   const auto& t = mesh.triangles[random() % mesh.triangles.size()];
   double a = 0.5 + 0.5 * uniform(random), b = 0.5 + 0.5 * uniform(random);
@@ -245,7 +245,7 @@ Ball random_ball(const Shape& shape, const TriangleMesh& mesh, std::mt19937_64& 
 
 TEST(Probe, PartsAgainstSlices) {
   std::mt19937_64 random(11);
-  for (const Shape& shape : shapes()) {
+  for (const Facets& shape : shapes()) {
     double worst = 0, worst_moment = 0;
     for (int i = 0; i < 30; ++i) {
       const TriangleMesh mesh =
@@ -268,7 +268,7 @@ TEST(Probe, PartsAgainstSlices) {
 
 TEST(Probe, GradientIsThatOfTheVolume) {
   std::mt19937_64 random(12);
-  for (const Shape& shape : shapes()) {
+  for (const Facets& shape : shapes()) {
     double worst = 0;
     for (int i = 0; i < 300; ++i) {
       const TriangleMesh mesh = turned(shape.mesh, random_turn(random), Vector3d::Zero());
@@ -324,7 +324,7 @@ TriangleMesh cut_up(const TriangleMesh& mesh, std::mt19937_64& random) {
 
 TEST(Probe, CuttingTrianglesChangesNothing) {
   std::mt19937_64 random(13);
-  for (const Shape& shape : shapes()) {
+  for (const Facets& shape : shapes()) {
     double worst = 0, worst_pull = 0, worst_moment = 0;
     for (int i = 0; i < 100; ++i) {
       const TriangleMesh mesh = turned(shape.mesh, random_turn(random), Vector3d::Zero());

@@ -22,14 +22,14 @@ class QueryBudget : public ::testing::Test {
   Workspace workspace_;
   std::mt19937_64 random_{9};
 
-  PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
-  PlacedTree placed_b(double distance) { return {b_.view(), random_pose(random_, distance), 0.8}; }
+  PlacedAsset placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
+  PlacedAsset placed_b(double distance) { return {b_.view(), random_pose(random_, distance), 0.8}; }
 };
 
 /// [u³] Of the smaller solid's matched spheres.
-double smaller_volume(const PlacedTree& a, const PlacedTree& b) {
-  const auto volume = [](const PlacedTree& placed) {
-    const AssetHeader& header = placed.tree.header();
+double smaller_volume(const PlacedAsset& a, const PlacedAsset& b) {
+  const auto volume = [](const PlacedAsset& placed) {
+    const AssetHeader& header = placed.asset.header();
     const double unit = std::ldexp(placed.scale, header.exponent);
     return header.matched_tree.volume_sum * unit * unit * unit;
   };
@@ -42,8 +42,8 @@ void expect_bounds(const Penetration& stopped, const Penetration& finished) {
   EXPECT_GE(stopped.volume_max, finished.volume);
   EXPECT_LE(stopped.volume_min, stopped.volume);
   EXPECT_GE(stopped.volume_max, stopped.volume);
-  EXPECT_TRUE(stopped.translation_gradient.allFinite());
-  EXPECT_TRUE(stopped.rotation_gradient.allFinite());
+  EXPECT_TRUE(stopped.force.allFinite());
+  EXPECT_TRUE(stopped.torque.allFinite());
   EXPECT_TRUE(stopped.centroid.allFinite());
 }
 
@@ -53,7 +53,7 @@ TEST_F(QueryBudget, VisitsAreKeptAndBoundsHold) {
     double width = 0, error = 0;
     random_.seed(9);
     for (int i = 0; i < 40; ++i) {
-      const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+      const PlacedAsset a = placed_a(), b = placed_b(0.05 * i);
       const Penetration finished = penetration(a, b, {}, workspace_);
       PenetrationSettings settings;
       settings.max_visits = visits;
@@ -82,16 +82,16 @@ TEST(KeptWithin, AStoppedAnswerShrinksAsAWhole) {
   answer.volume = 3;
   answer.volume_min = 2;
   answer.volume_max = 5;
-  answer.translation_gradient = {0, 0, 6};
-  answer.rotation_gradient = {3, 0, 0};
+  answer.force = {0, 0, 6};
+  answer.torque = {3, 0, 0};
   EXPECT_EQ(kept_within(1, answer).volume, 3);  // finished
   answer.status = QueryStatus::budget_exhausted;
   const Penetration kept = kept_within(1, answer);
   EXPECT_EQ(kept.volume, 1);
   EXPECT_EQ(kept.volume_min, 1);
   EXPECT_EQ(kept.volume_max, 5);
-  EXPECT_DOUBLE_EQ(kept.translation_gradient.z(), 2);
-  EXPECT_DOUBLE_EQ(kept.rotation_gradient.x(), 1);
+  EXPECT_DOUBLE_EQ(kept.force.z(), 2);
+  EXPECT_DOUBLE_EQ(kept.torque.x(), 1);
   EXPECT_EQ(kept_within(4, answer).volume, 3);
 }
 
@@ -101,7 +101,7 @@ TEST_F(QueryBudget, TheSmallestPairsAreLeft) {
   double one = 0, many = 0;
   int asked = 0;
   for (int i = 0; i < 40; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.05 * i);
     const Penetration finished = penetration(a, b, {}, workspace_);
     if (finished.node_visits < 10 * kMany) continue;
     const auto widened = [&](std::uint32_t left) {
@@ -122,11 +122,11 @@ TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {
   Workspace small(64), ample(1 << 16);
   int full = 0;
   for (int i = 0; i < 40; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.05 * i);
     const Penetration finished = penetration(a, b, {}, workspace_);
     const Penetration same = penetration(a, b, {}, ample);
     EXPECT_EQ(same.volume, finished.volume);
-    EXPECT_EQ(same.translation_gradient, finished.translation_gradient);
+    EXPECT_EQ(same.force, finished.force);
     const Penetration cramped = penetration(a, b, {}, small);
     expect_bounds(cramped, finished);
     if (cramped.status == QueryStatus::budget_exhausted) ++full;
@@ -140,7 +140,7 @@ TEST_F(QueryBudget, AWorkspaceChangesNothingButWhenFull) {
 TEST_F(QueryBudget, AStoppedSeparationStillHoldsTheGap) {
   for (const std::uint32_t visits : {1u, 5u, 20u, 80u}) {
     for (int i = 0; i < 20; ++i) {
-      const PlacedTree a = placed_a(), b = placed_b(1.6 + 0.1 * i);
+      const PlacedAsset a = placed_a(), b = placed_b(1.6 + 0.1 * i);
       const testing::ReferenceGap gap = testing::reference_gap(a, b);
       PenetrationSettings settings;
       settings.max_visits = visits;

@@ -42,31 +42,31 @@ class QueryDetails : public ::testing::Test {
   Workspace workspace_;
   std::mt19937_64 random_{5};
 
-  PlacedTree placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
-  PlacedTree placed_b(double distance, double scale = 1.6) {
+  PlacedAsset placed_a() { return {a_.view(), random_pose(random_, 0.2), 1.0}; }
+  PlacedAsset placed_b(double distance, double scale = 1.6) {
     return {b_.view(), random_pose(random_, distance), scale};
   }
-  Penetration ask(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+  Penetration ask(const PlacedAsset& a, const PlacedAsset& b, std::uint32_t budget) {
     return penetration(a, b, {.pair_budget = budget}, workspace_);
   }
 
-  static DetailChain chain_of(const PlacedTree& a, const PlacedTree& b) {
-    return {a.tree.header(), b.tree.header(),
-            std::ldexp(b.scale / a.scale, b.tree.header().exponent - a.tree.header().exponent)};
+  static DetailChain chain_of(const PlacedAsset& a, const PlacedAsset& b) {
+    return {a.asset.header(), b.asset.header(),
+            std::ldexp(b.scale / a.scale, b.asset.header().exponent - a.asset.header().exponent)};
   }
-  static double unit3(const PlacedTree& a) {
-    return std::pow(std::ldexp(a.scale, a.tree.header().exponent), 3);
+  static double unit3(const PlacedAsset& a) {
+    return std::pow(std::ldexp(a.scale, a.asset.header().exponent), 3);
   }
 
   /// The coarsest trees of both.
-  static std::array<SphereTree, 2> coarsest(const PlacedTree& a, const PlacedTree& b) {
+  static std::array<SphereTree, 2> coarsest(const PlacedAsset& a, const PlacedAsset& b) {
     const DetailPair pair = chain_of(a, b).coarsest();
-    return {SphereTree(a.tree.header(), matched_tree(a.tree.header(), pair.a)),
-            SphereTree(b.tree.header(), matched_tree(b.tree.header(), pair.b))};
+    return {SphereTree(a.asset.header(), matched_tree(a.asset.header(), pair.a)),
+            SphereTree(b.asset.header(), matched_tree(b.asset.header(), pair.b))};
   }
 
   /// What a quick look sees, summed in double.
-  static QuickLook look(const PlacedTree& a, const PlacedTree& b) {
+  static QuickLook look(const PlacedAsset& a, const PlacedAsset& b) {
     const auto [tree_a, tree_b] = coarsest(a, b);
     const Similarity map = relative_pose(a, b)->a_from_b;
     const auto fill = [](const NodeBall& ball, double volume) {
@@ -94,7 +94,7 @@ class QueryDetails : public ::testing::Test {
   }
 
   /// The blended sum over all pairs of spheres in double.
-  static double reference(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+  static double reference(const PlacedAsset& a, const PlacedAsset& b, std::uint32_t budget) {
     const DetailChain chain = chain_of(a, b);
     const auto sum = [&](const DetailPair& pair) {
       return reference_sum(a, b, Measure::matched, pair.a, pair.b).volume;
@@ -110,7 +110,7 @@ class QueryDetails : public ::testing::Test {
   }
 
   /// Volume, bounds and gradients against the reference and its differences.
-  void expect_reference(const PlacedTree& a, const PlacedTree& b, std::uint32_t budget) {
+  void expect_reference(const PlacedAsset& a, const PlacedAsset& b, std::uint32_t budget) {
     const double h = 1e-5;
     const Penetration answer = ask(a, b, budget);
     const double sum = reference(a, b, budget);
@@ -122,24 +122,24 @@ class QueryDetails : public ::testing::Test {
     for (int k = 0; k < 3; ++k) {
       const Vector3d step = h * Vector3d::Unit(k);
       const auto at = [&](const Vector3d& shift, const Vector3d& turn) {
-        return reference(a, {b.tree, moved(b.pose, shift, turn), b.scale}, budget);
+        return reference(a, {b.asset, moved(b.pose, shift, turn), b.scale}, budget);
       };
       force[k] = (at(step, {0, 0, 0}) - at(-step, {0, 0, 0})) / (2 * h);
       torque[k] = (at({0, 0, 0}, step) - at({0, 0, 0}, -step)) / (2 * h);
     }
     const double scale = reference_sum(a, b, Measure::matched).force_scale;
-    EXPECT_LE((answer.translation_gradient - force).norm(), 1e-4 * scale);
-    EXPECT_LE((answer.rotation_gradient - torque).norm(), 1e-4 * 3 * scale);
+    EXPECT_LE((answer.force + force).norm(), 1e-4 * scale);
+    EXPECT_LE((answer.torque + torque).norm(), 1e-4 * 3 * scale);
   }
 };
 
 TEST_F(QueryDetails, AnAmpleBudgetTakesTheFinestLevel) {
   for (int i = 0; i < 30; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.12 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.12 * i);
     const Penetration finest = ask(a, b, 0), ample = ask(a, b, 1u << 30);
     EXPECT_EQ(ample.volume, finest.volume);
-    EXPECT_EQ(ample.translation_gradient, finest.translation_gradient);
-    EXPECT_EQ(ample.rotation_gradient, finest.rotation_gradient);
+    EXPECT_EQ(ample.force, finest.force);
+    EXPECT_EQ(ample.torque, finest.torque);
     EXPECT_EQ(ample.volume_max, finest.volume_max);
     EXPECT_LT((ample.centroid - finest.centroid).norm(), 1e-12);
   }
@@ -147,7 +147,7 @@ TEST_F(QueryDetails, AnAmpleBudgetTakesTheFinestLevel) {
 
 TEST_F(QueryDetails, ATinyBudgetTakesTheCoarsestLevel) {
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.05 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.05 * i);
     const ReferenceSum coarsest = reference_sum(a, b, Measure::matched, 3, 2);
     const Penetration answer = ask(a, b, 1);
     EXPECT_NEAR(answer.volume, coarsest.volume, 1e-5 * coarsest.volume);
@@ -193,7 +193,7 @@ std::uint32_t sharing_budget(const DetailChain& chain, double coarse, std::uint3
 TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 24; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.13 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.13 * i);
     const DetailChain chain = chain_of(a, b);
     const double coarse =
         reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
@@ -210,7 +210,7 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
 TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 150 && blended < 12; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.02 * i);
+    const PlacedAsset a = placed_a(), b = placed_b(0.02 * i);
     const DetailChain chain = chain_of(a, b);
     const double coarse =
         reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
@@ -230,7 +230,7 @@ TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
 
 TEST_F(QueryDetails, AQuickLookIsEvenlyFilledBallsAndHasTheirSlope) {
   for (int i = 0; i < 40; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.1 * i, i % 2 == 0 ? 1.6 : 0.05);
+    const PlacedAsset a = placed_a(), b = placed_b(0.1 * i, i % 2 == 0 ? 1.6 : 0.05);
     const auto [tree_a, tree_b] = coarsest(a, b);
     const Similarity map = relative_pose(a, b)->a_from_b;
     const QuickLook sum = look(a, b), seen = quick_look(tree_a, tree_b, map, true);
@@ -244,8 +244,8 @@ TEST_F(QueryDetails, AQuickLookIsEvenlyFilledBallsAndHasTheirSlope) {
 
 // Half the step, half the largest change: a jump would not shrink.
 TEST_F(QueryDetails, NothingJumpsAlongAPath) {
-  const PlacedTree a{a_.view(), {}, 1.0};
-  PlacedTree b{b_.view(), random_pose(random_, 0), 1.6};
+  const PlacedAsset a{a_.view(), {}, 1.0};
+  PlacedAsset b{b_.view(), random_pose(random_, 0), 1.6};
   const Vector3d direction = Vector3d(1, 0.3, -0.2).normalized();
   const auto largest_changes = [&](int steps, std::uint32_t budget) {
     double volume = 0, force = 0, torque = 0;
@@ -256,8 +256,8 @@ TEST_F(QueryDetails, NothingJumpsAlongAPath) {
       const Penetration now = ask(a, b, budget);
       if (i > 0) {
         volume = std::max(volume, std::abs(now.volume - before.volume));
-        force = std::max(force, (now.translation_gradient - before.translation_gradient).norm());
-        torque = std::max(torque, (now.rotation_gradient - before.rotation_gradient).norm());
+        force = std::max(force, (now.force - before.force).norm());
+        torque = std::max(torque, (now.torque - before.torque).norm());
       }
       before = now;
     }
@@ -287,7 +287,7 @@ TEST(QueryDetailsAlone, WithoutACoarseEstimateTheFinestAnswers) {
   arrays.header.volume = arrays.matched_tree.volume_sum;
   const Asset asset(asset_bytes(arrays), "two levels");
   Workspace workspace;
-  const PlacedTree a{asset.view(), {}, 1}, b{asset.view(), {{0, 0, 0, 1}, {1.9, 0, 0}}, 1};
+  const PlacedAsset a{asset.view(), {}, 1}, b{asset.view(), {{0, 0, 0, 1}, {1.9, 0, 0}}, 1};
   const Penetration finest = penetration(a, b, {}, workspace);
   ASSERT_GT(finest.volume, 0);
   EXPECT_EQ(penetration(a, b, {.pair_budget = 1}, workspace).volume, finest.volume);
@@ -295,11 +295,10 @@ TEST(QueryDetailsAlone, WithoutACoarseEstimateTheFinestAnswers) {
 
 TEST_F(QueryDetails, TheOtherWayRoundIsTheSame) {
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.15 * i, i % 2 == 0 ? 1.6 : 0.3);
+    const PlacedAsset a = placed_a(), b = placed_b(0.15 * i, i % 2 == 0 ? 1.6 : 0.3);
     const Penetration ab = ask(a, b, 500), ba = ask(b, a, 500);
     EXPECT_NEAR(ab.volume, ba.volume, 1e-5 * ab.volume);
-    EXPECT_LE((ab.translation_gradient + ba.translation_gradient).norm(),
-              1e-3 * ab.translation_gradient.norm() + 1e-9);
+    EXPECT_LE((ab.force + ba.force).norm(), 1e-3 * ab.force.norm() + 1e-9);
   }
 }
 
@@ -307,14 +306,14 @@ TEST_F(QueryDetails, PatchesSumToTheBlend) {
   ContactPatch patches[6];
   int blends = 0;
   for (int i = 0; i < 200; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.05 * (i % 40), i % 2 == 0 ? 1.6 : 0.3);
+    const PlacedAsset a = placed_a(), b = placed_b(0.05 * (i % 40), i % 2 == 0 ? 1.6 : 0.3);
     const PenetrationSettings settings{.pair_budget = 100u << (i % 6)};
     const Penetration whole = penetration(a, b, settings, workspace_);
     const ContactPatches found = contact_patches(a, b, settings, workspace_, patches);
     EXPECT_EQ(found.penetration.volume, whole.volume);
     EXPECT_EQ(found.penetration.volume_max, whole.volume_max);
-    EXPECT_EQ(found.penetration.translation_gradient, whole.translation_gradient);
-    EXPECT_EQ(found.penetration.rotation_gradient, whole.rotation_gradient);
+    EXPECT_EQ(found.penetration.force, whole.force);
+    EXPECT_EQ(found.penetration.torque, whole.torque);
     EXPECT_EQ(found.count > 0, whole.volume > 0);
     double volume = 0, pull = 0, turn = 0;
     Vector3d force = Vector3d::Zero(), torque = force;
@@ -326,8 +325,8 @@ TEST_F(QueryDetails, PatchesSumToTheBlend) {
       turn += patch.torque.norm();
     }
     EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume);
-    EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * (pull + 1e-300));
-    EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
+    EXPECT_LE((force - whole.force).norm(), 1e-12 * (pull + 1e-300));
+    EXPECT_LE((torque - whole.torque).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
     blends += whole.volume != penetration(a, b, {}, workspace_).volume ? 1 : 0;
   }
   EXPECT_GT(blends, 50);
@@ -336,7 +335,7 @@ TEST_F(QueryDetails, PatchesSumToTheBlend) {
 TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
   int stopped = 0;
   for (int i = 0; i < 600; ++i) {
-    const PlacedTree a = placed_a(), b = placed_b(0.05 * (i % 60));
+    const PlacedAsset a = placed_a(), b = placed_b(0.05 * (i % 60));
     PenetrationSettings settings;
     settings.pair_budget = 3000;
     const Penetration finished = penetration(a, b, settings, workspace_);
@@ -347,7 +346,7 @@ TEST_F(QueryDetails, OtherLimitsHoldOnTop) {
     EXPECT_GE(answer.volume_max, finished.volume);
     EXPECT_LE(answer.volume_min, answer.volume);
     EXPECT_GE(answer.volume_max, answer.volume);
-    EXPECT_TRUE(answer.translation_gradient.allFinite());
+    EXPECT_TRUE(answer.force.allFinite());
     if (answer.status == QueryStatus::ok) {
       EXPECT_EQ(answer.volume, finished.volume);
     }

@@ -24,10 +24,9 @@ void expect_sum(const Penetration& answer, const ReferenceSum& sum, double lever
   EXPECT_LE(answer.volume_min, sum.volume * (1 + 1e-12));
   EXPECT_GE(answer.volume_max, sum.volume * (1 - 1e-12));
   EXPECT_LE(answer.volume_max - answer.volume_min, 1e-3 * sum.volume + 1e-7);
-  const double force = sum.translation_gradient.norm() + 1e-2 * sum.force_scale;
-  EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(), 1e-4 * force);
-  EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(),
-            1e-4 * lever * sum.force_scale);
+  const double force = sum.force.norm() + 1e-2 * sum.force_scale;
+  EXPECT_LE((answer.force - sum.force).norm(), 1e-4 * force);
+  EXPECT_LE((answer.torque - sum.torque).norm(), 1e-4 * lever * sum.force_scale);
   if (sum.volume > 0) {
     EXPECT_LE((answer.centroid - sum.centroid()).norm(), 1e-5 * lever);
   }
@@ -41,8 +40,8 @@ TEST(Query, MatchesTheSumOverAllPairs) {
     const Asset b = make_random_asset({n / 2 + 1, 0.05, {}, 0}, 11);
     for (const double distance : {0.0, 0.7, 1.4, 1.8, 1.95, 2.4}) {
       for (const Measure measure : {Measure::matched, Measure::inner}) {
-        const PlacedTree pa{a.view(), random_pose(random, 0.3), 1.0};
-        PlacedTree pb{b.view(), random_pose(random, distance), 1.0};
+        const PlacedAsset pa{a.view(), random_pose(random, 0.3), 1.0};
+        PlacedAsset pb{b.view(), random_pose(random, distance), 1.0};
         PenetrationSettings settings;
         settings.measure = measure;
         const Penetration answer = penetration(pa, pb, settings, workspace);
@@ -59,8 +58,8 @@ TEST(Query, NoGrazingPairIsLost) {
   Workspace workspace;
   const Asset many = make_random_asset({300, 0.2, {}, 0}, 12);
   const Asset one = make_random_asset({1, 0.2, {}, 0}, 13);
-  const PlacedTree pa{many.view(), {}, 1.0};
-  PlacedTree pb{one.view(), {}, 0.3};
+  const PlacedAsset pa{many.view(), {}, 1.0};
+  PlacedAsset pb{one.view(), {}, 0.3};
   const testing::WorldSphere own = testing::world_spheres(pb, Measure::matched)[0];
   for (const double depth :
        {1e-3, 1e-2, 3e-2, 6e-2, 0.1, 0.2, 0.4}) {  // where float no longer serves
@@ -83,8 +82,8 @@ TEST(Query, SeparationMatchesAllPairs) {
     const Asset a = make_random_asset({n, 0.2, {}, 0}, 20);
     const Asset b = make_random_asset({n / 2 + 1, 0.05, {}, 0}, 21);
     for (const double distance : {0.0, 1.4, 1.9, 2.0, 2.4, 4.0, 1000.0}) {
-      const PlacedTree pa{a.view(), random_pose(random, 0.3), 1.0};
-      const PlacedTree pb{b.view(), random_pose(random, distance), 1.0};
+      const PlacedAsset pa{a.view(), random_pose(random, 0.3), 1.0};
+      const PlacedAsset pb{b.view(), random_pose(random, distance), 1.0};
       const Separation answer = separation(pa, pb, {}, workspace);
       const testing::ReferenceGap gap = testing::reference_gap(pa, pb);
       SCOPED_TRACE(::testing::Message() << n << " spheres, distance " << distance);
@@ -110,8 +109,8 @@ TEST(Query, HoldsOverScalesAndSizeRatios) {
   for (const double scale_a : {1.0, 1e-6, 1e6}) {
     for (const double ratio : {1.0, 0.02, 1e-2, 1e-4, 1e-6, 1e2, 1e6}) {
       // B touches A's surface region, small B near one of A's spheres.
-      PlacedTree pa{a.view(), random_pose(random, 0.4 * scale_a), scale_a};
-      PlacedTree pb{b.view(), random_pose(random, 1.0), scale_a * ratio / 8};
+      PlacedAsset pa{a.view(), random_pose(random, 0.4 * scale_a), scale_a};
+      PlacedAsset pb{b.view(), random_pose(random, 1.0), scale_a * ratio / 8};
       const auto spheres = testing::world_spheres(pa, Measure::matched);
       const auto own = testing::world_spheres(pb, Measure::matched);
       const testing::WorldSphere& near = spheres[17];
@@ -127,8 +126,7 @@ TEST(Query, HoldsOverScalesAndSizeRatios) {
       EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
       EXPECT_LE(answer.volume_min, sum.volume);
       EXPECT_GE(answer.volume_max, sum.volume);
-      EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
-                1e-4 * sum.force_scale);
+      EXPECT_LE((answer.force - sum.force).norm(), 1e-4 * sum.force_scale);
       const Separation gap = separation(pa, pb, {}, workspace);
       const testing::ReferenceGap want = testing::reference_gap(pa, pb);
       EXPECT_LE(gap.distance_min, std::max(0.0, want.covered) + 1e-12 * scale_a);
@@ -141,14 +139,13 @@ TEST(Query, HoldsFarFromTheOrigin) {
   Workspace workspace;
   const Asset a = make_random_asset({300, 0.2, {1e7, -2e7, 3e7}, 0}, 40);
   const Asset b = make_random_asset({300, 0.2, {-1e7, 0, 1e7}, 0}, 41);
-  const PlacedTree pa{a.view(), {}, 1.0};
-  const PlacedTree pb{b.view(), {{1, 0, 0, 0}, {2e7 + 0.9, -2e7, 2e7}}, 1.0};
+  const PlacedAsset pa{a.view(), {}, 1.0};
+  const PlacedAsset pb{b.view(), {{1, 0, 0, 0}, {2e7 + 0.9, -2e7, 2e7}}, 1.0};
   const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
   ASSERT_GT(sum.volume, 0);
   const Penetration answer = penetration(pa, pb, {}, workspace);
   EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
-  EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
-            1e-4 * sum.force_scale);
+  EXPECT_LE((answer.force - sum.force).norm(), 1e-4 * sum.force_scale);
   EXPECT_LE((answer.centroid - sum.centroid()).norm(), 1e-6 * 1e7 * 1e-2);
 }
 
@@ -158,18 +155,18 @@ TEST(Query, IsSymmetric) {
   const Asset a = make_random_asset({500, 0.2, {}, 0}, 50);
   const Asset b = make_random_asset({200, 0.2, {}, 0}, 51);
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree pa{a.view(), random_pose(random, 0.5), 1.0};
-    const PlacedTree pb{b.view(), random_pose(random, 0.1 * i), i % 2 == 0 ? 1.0 : 0.3};
+    const PlacedAsset pa{a.view(), random_pose(random, 0.5), 1.0};
+    const PlacedAsset pb{b.view(), random_pose(random, 0.1 * i), i % 2 == 0 ? 1.0 : 0.3};
     const Penetration ab = penetration(pa, pb, {}, workspace);
     const Penetration ba = penetration(pb, pa, {}, workspace);
     const double force = reference_sum(pa, pb, Measure::matched).force_scale;
     EXPECT_NEAR(ab.volume, ba.volume, 1e-5 * ab.volume);
     // Action = reaction: the same force turned round, and torques about one point that cancel.
-    EXPECT_LE((ab.translation_gradient + ba.translation_gradient).norm(), 1e-5 * force);
+    EXPECT_LE((ab.force + ba.force).norm(), 1e-5 * force);
     const Eigen::Vector3d to_a(pa.pose.t[0], pa.pose.t[1], pa.pose.t[2]);
     const Eigen::Vector3d to_b(pb.pose.t[0], pb.pose.t[1], pb.pose.t[2]);
-    const Eigen::Vector3d torque_on_a = ba.rotation_gradient + to_a.cross(ba.translation_gradient);
-    const Eigen::Vector3d torque_on_b = ab.rotation_gradient + to_b.cross(ab.translation_gradient);
+    const Eigen::Vector3d torque_on_a = ba.torque + to_a.cross(ba.force);
+    const Eigen::Vector3d torque_on_b = ab.torque + to_b.cross(ab.force);
     EXPECT_LE((torque_on_a + torque_on_b).norm(), 1e-4 * force);
     const Separation sab = separation(pa, pb, {}, workspace);
     const Separation sba = separation(pb, pa, {}, workspace);
@@ -191,18 +188,16 @@ TEST(Query, IsUnchangedByACommonMotion) {
     return Pose{{q.w(), q.x(), q.y(), q.z()}, {t.x(), t.y(), t.z()}};
   };
   for (int i = 0; i < 10; ++i) {
-    const PlacedTree pa{a.view(), random_pose(random, 0.2), 1.0};
-    const PlacedTree pb{b.view(), random_pose(random, 1.0), 1.0};
+    const PlacedAsset pa{a.view(), random_pose(random, 0.2), 1.0};
+    const PlacedAsset pb{b.view(), random_pose(random, 1.0), 1.0};
     const Pose motion = random_pose(random, 5);
     const Eigen::Quaterniond q(motion.q[0], motion.q[1], motion.q[2], motion.q[3]);
     const Penetration here = penetration(pa, pb, {}, workspace);
     const Penetration there = penetration({a.view(), moved(motion, pa.pose), 1.0},
                                           {b.view(), moved(motion, pb.pose), 1.0}, {}, workspace);
     EXPECT_NEAR(here.volume, there.volume, 1e-6 * here.volume);
-    EXPECT_LE((q * here.translation_gradient - there.translation_gradient).norm(),
-              1e-5 * here.translation_gradient.norm());
-    EXPECT_LE((q * here.rotation_gradient - there.rotation_gradient).norm(),
-              1e-4 * here.translation_gradient.norm());
+    EXPECT_LE((q * here.force - there.force).norm(), 1e-5 * here.force.norm());
+    EXPECT_LE((q * here.torque - there.torque).norm(), 1e-4 * here.force.norm());
   }
 }
 
@@ -211,14 +206,14 @@ TEST(Query, GradientsAreThoseOfTheSum) {
   std::mt19937_64 random(8);
   const Asset a = make_random_asset({200, 0.3, {}, 0}, 70);
   const Asset b = make_random_asset({200, 0.3, {0.2, 0.1, 0}, 0}, 71);
-  const PlacedTree pa{a.view(), random_pose(random, 0.1), 1.0};
-  const PlacedTree pb{b.view(), random_pose(random, 0.9), 0.7};
+  const PlacedAsset pa{a.view(), random_pose(random, 0.1), 1.0};
+  const PlacedAsset pb{b.view(), random_pose(random, 0.9), 0.7};
   const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
   ASSERT_GT(sum.volume, 0);
   const double h = 1e-6;
   for (int k = 0; k < 3; ++k) {
     const auto volume_at = [&](double shift, double angle) {
-      PlacedTree moved = pb;
+      PlacedAsset moved = pb;
       moved.pose.t[k] += shift;
       const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, Eigen::Vector3d::Unit(k)));
       const Eigen::Quaterniond q =
@@ -227,16 +222,15 @@ TEST(Query, GradientsAreThoseOfTheSum) {
       moved.pose.q[2] = q.y(), moved.pose.q[3] = q.z();
       return reference_sum(pa, moved, Measure::matched).volume;
     };
-    EXPECT_NEAR((volume_at(h, 0) - volume_at(-h, 0)) / (2 * h), sum.translation_gradient[k],
+    EXPECT_NEAR((volume_at(h, 0) - volume_at(-h, 0)) / (2 * h), -sum.force[k],
                 1e-6 * sum.force_scale);
-    EXPECT_NEAR((volume_at(0, h) - volume_at(0, -h)) / (2 * h), sum.rotation_gradient[k],
+    EXPECT_NEAR((volume_at(0, h) - volume_at(0, -h)) / (2 * h), -sum.torque[k],
                 1e-6 * sum.force_scale);
   }
   Workspace workspace;
   const Penetration answer = penetration(pa, pb, {}, workspace);
-  EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
-            1e-5 * sum.force_scale);
-  EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(), 1e-5 * sum.force_scale);
+  EXPECT_LE((answer.force - sum.force).norm(), 1e-5 * sum.force_scale);
+  EXPECT_LE((answer.torque - sum.torque).norm(), 1e-5 * sum.force_scale);
 }
 
 // Work of the forces and torques along a closed path, by Simpson's rule: none; and over its first
@@ -245,22 +239,22 @@ TEST(Query, EnergyIsConservedOverClosedLoops) {
   Workspace workspace;
   const Asset a = make_random_asset({300, 0.2, {}, 0}, 75);
   const Asset b = make_random_asset({200, 0.2, {0.1, 0, 0}, 0}, 76);
-  const PlacedTree pa{a.view(), {}, 1.0};
+  const PlacedAsset pa{a.view(), {}, 1.0};
   // B on a circle that leaves A and comes back, turning about an axis askew meanwhile.
   const Eigen::Vector3d axis = Eigen::Vector3d(0.3, -0.5, 0.8).normalized();
   const auto at = [&](double phase) {
     const double turn = 2 * M_PI * phase;
     const Eigen::Quaterniond q(Eigen::AngleAxisd(turn, axis));
-    return PlacedTree{b.view(),
-                      {{q.w(), q.x(), q.y(), q.z()},
-                       {0.2 + 1.2 * (1 - std::cos(turn)), 0.7 * std::sin(turn), 0.1}},
-                      0.8};
+    return PlacedAsset{b.view(),
+                       {{q.w(), q.x(), q.y(), q.z()},
+                        {0.2 + 1.2 * (1 - std::cos(turn)), 0.7 * std::sin(turn), 0.1}},
+                       0.8};
   };
   const auto power = [&](double phase) {  // dV / d(phase)
     const double turn = 2 * M_PI * phase;
     const Penetration here = penetration(pa, at(phase), {}, workspace);
     const Eigen::Vector3d velocity(1.2 * std::sin(turn), 0.7 * std::cos(turn), 0);
-    return 2 * M_PI * (here.translation_gradient.dot(velocity) + here.rotation_gradient.dot(axis));
+    return -2 * M_PI * (here.force.dot(velocity) + here.torque.dot(axis));
   };
   constexpr int kSteps = 16'000;  // lenses begin and end with a kink in the force's slope
   double work = 0, first_quarter = 0;
@@ -290,13 +284,12 @@ TEST(Query, HoldsAtSpecialPoses) {
   };
   for (const Pose& pose : poses) {
     for (const double scale : {1.0, 0.1}) {  // the smaller one lies inside
-      const PlacedTree pa{a.view(), {}, 1.0}, pb{a.view(), pose, scale};
+      const PlacedAsset pa{a.view(), {}, 1.0}, pb{a.view(), pose, scale};
       const ReferenceSum sum = reference_sum(pa, pb, Measure::matched);
       const Penetration answer = penetration(pa, pb, {}, workspace);
       EXPECT_NEAR(answer.volume, sum.volume, 1e-5 * sum.volume);
-      EXPECT_LE((answer.translation_gradient - sum.translation_gradient).norm(),
-                1e-4 * sum.force_scale);
-      EXPECT_LE((answer.rotation_gradient - sum.rotation_gradient).norm(), 1e-4 * sum.force_scale);
+      EXPECT_LE((answer.force - sum.force).norm(), 1e-4 * sum.force_scale);
+      EXPECT_LE((answer.torque - sum.torque).norm(), 1e-4 * sum.force_scale);
       EXPECT_EQ(separation(pa, pb, {}, workspace).distance_min, 0);
     }
   }
@@ -308,8 +301,8 @@ TEST(Query, RefusesPosesThatAreNone) {
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double inf = std::numeric_limits<double>::infinity();
-  const PlacedTree good{a.view(), {}, 1.0};
-  std::vector<PlacedTree> bad(9, good);
+  const PlacedAsset good{a.view(), {}, 1.0};
+  std::vector<PlacedAsset> bad(9, good);
   bad[0].pose.q[2] = nan;
   bad[1].pose.t[0] = nan;
   bad[2].pose.t[1] = inf;
@@ -317,15 +310,15 @@ TEST(Query, RefusesPosesThatAreNone) {
   bad[4].scale = 0;
   bad[5].scale = -1;
   bad[6].scale = nan;
-  bad[7].tree = TreeView();
+  bad[7].asset = AssetView();
   bad[8].pose.t[2] = 1e200;
-  for (const PlacedTree& wrong : bad) {
+  for (const PlacedAsset& wrong : bad) {
     for (const auto& answer :
          {query(good, wrong, {}, workspace), query(wrong, good, {}, workspace)}) {
       EXPECT_EQ(answer.penetration.status, QueryStatus::invalid_input);
       EXPECT_TRUE(std::isnan(answer.penetration.volume));
       EXPECT_TRUE(std::isnan(answer.penetration.volume_max));
-      EXPECT_TRUE(answer.penetration.translation_gradient.hasNaN());
+      EXPECT_TRUE(answer.penetration.force.hasNaN());
       EXPECT_EQ(answer.separation.status, QueryStatus::invalid_input);
       EXPECT_TRUE(std::isnan(answer.separation.distance));
       EXPECT_TRUE(std::isnan(answer.separation.distance_max));
@@ -333,17 +326,17 @@ TEST(Query, RefusesPosesThatAreNone) {
     }
   }
   // A quaternion of any other length means its direction.
-  PlacedTree turned = good;
+  PlacedAsset turned = good;
   turned.pose = {{0.5, 0.5, 0.5, 0.5}, {0.2, 0, 0}};
   const Penetration expected = penetration(good, turned, {}, workspace);
   for (const double length : {1e-150, 1e-3, 2.0, 1e150}) {
-    PlacedTree longer = turned;
+    PlacedAsset longer = turned;
     for (double& q : longer.pose.q) q *= length;
     EXPECT_NEAR(penetration(good, longer, {}, workspace).volume, expected.volume,
                 1e-12 * expected.volume)
         << length;
   }
-  PlacedTree far = good;
+  PlacedAsset far = good;
   far.pose.t[0] = 1e50;
   EXPECT_EQ(penetration(good, far, {}, workspace).volume, 0);
   const Separation gap = separation(good, far, {}, workspace);

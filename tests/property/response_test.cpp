@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/field.h>
-#include <ist/response.h>
+#include <ist/contact_law.h>
+#include <ist/shapes.h>
 
 #include <Eigen/Geometry>
 #include <array>
@@ -48,8 +48,8 @@ TEST(Response, AMassComesBackAtTheRestitutionAskedFor) {
     double depth = 0, speed = kSpeed;  // downward
     do {
       const ContactPatch patch = flat_patch(kArea, depth);
-      const ContactForce contact = contact_force(law, {&patch, 1}, {{0, 0, -speed}, {0, 0, 0}},
-                                                 Vector3d::Zero(), kStep, memory);
+      const ContactForce contact =
+          contact_force(law, {&patch, 1}, {{0, 0, -speed}}, Vector3d::Zero(), kStep, memory);
       EXPECT_GE(contact.force.z(), 0);
       speed -= kStep * contact.force.z() / kMass;
       depth += kStep * speed;
@@ -132,7 +132,7 @@ TEST(Response, FrictionNeverGivesMoreThanItHolds) {
       patch.force = patch.area * patch.normal;
       patch.centroid = testing::random_vector(draw);
       const Vector3d origin = testing::random_vector(draw);
-      RelativeMotion motion{10 * testing::random_vector(draw), testing::random_vector(draw)};
+      Motion motion{10 * testing::random_vector(draw), testing::random_vector(draw)};
       const ContactForce with = contact_force(law, {&patch, 1}, motion, origin, kStep, memory);
       ContactLaw smooth = law;
       smooth.friction = 0;
@@ -179,13 +179,13 @@ struct Cycle {
 
 /// The work of the law round `way`, by the trapezoidal rule over `steps` steps of 1/steps s.
 template <class Placed>
-Cycle go_round(const ContactLaw& law, const Placed& a, const TreeView& tree, const Way& way,
+Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, const Way& way,
                int steps, std::size_t patch_count, ContactMemory& memory) {
   Workspace workspace;
   std::vector<ContactPatch> patches(patch_count);
   Cycle cycle;
   ContactForce last;
-  RelativeMotion last_motion;
+  Motion last_motion;
   const double step = 1.0 / steps;
   const auto motion_at = [&](double s) {
     constexpr double kHalf = 1e-6;
@@ -193,17 +193,17 @@ Cycle go_round(const ContactLaw& law, const Placed& a, const TreeView& tree, con
     const Quaterniond q0(before.q[0], before.q[1], before.q[2], before.q[3]);
     const Quaterniond q1(after.q[0], after.q[1], after.q[2], after.q[3]);
     const Eigen::AngleAxisd turn(q1 * q0.conjugate());
-    return RelativeMotion{(Vector3d(after.t) - Vector3d(before.t)) / (2 * kHalf),
-                          turn.axis() * turn.angle() / (2 * kHalf)};
+    return Motion{(Vector3d(after.t) - Vector3d(before.t)) / (2 * kHalf),
+                  turn.axis() * turn.angle() / (2 * kHalf)};
   };
   for (int i = 0; i <= steps; ++i) {
     const double s = i * step;
     const Pose pose = way.at(s);
     const ContactPatches found = contact_patches(a, {tree, pose}, {}, workspace, patches);
-    const RelativeMotion motion = motion_at(s);
+    const Motion motion = motion_at(s);
     const ContactForce now = contact_force(law, std::span(patches).first(found.count), motion,
                                            Vector3d(pose.t), step, memory);
-    const auto power = [](const ContactForce& f, const RelativeMotion& m) {
+    const auto power = [](const ContactForce& f, const Motion& m) {
       return f.force.dot(m.velocity) + f.torque.dot(m.angular_velocity);
     };
     if (i > 0) cycle.work += 0.5 * step * (power(last, last_motion) + power(now, motion));
@@ -237,22 +237,23 @@ TEST(Response, APotentialKeepsEnergyRoundEveryLoop) {
   ContactLaw law;
   law.stiffness = 1000;
   law.area = 0.3;
-  const auto expect_none = [&](const auto& a, const TreeView& tree, const Loop& loop) {
+  const auto expect_none = [&](const auto& a, const AssetView& tree, const Loop& loop) {
     ContactMemory memory;
     const Cycle cycle = go_round(law, a, tree, loop.way, 4000, 1, memory);
     EXPECT_GT(cycle.most, 1e-2) << loop.name;
     EXPECT_LT(std::abs(cycle.work), 2e-4 * cycle.most) << loop.name;
   };
   for (const Loop& loop : kOnPlane) {
-    expect_none(PlacedField{HalfSpaceField{}, {}}, cube().view(), loop);
+    expect_none(PlacedShape{HalfSpaceShape{}, {}}, cube().view(), loop);
   }
-  for (const Loop& loop : kOnCube) expect_none(PlacedTree{cube().view(), {}}, torus().view(), loop);
+  for (const Loop& loop : kOnCube)
+    expect_none(PlacedAsset{cube().view(), {}}, torus().view(), loop);
 }
 
 // Patches with areas of their own lose where areas change; what they give where a contact is
 // divided anew is little.
 TEST(Response, PatchesGiveNextToNothingRoundALoop) {
-  const auto expect_none = [](const auto& a, const TreeView& tree, const Loop& loop) {
+  const auto expect_none = [](const auto& a, const AssetView& tree, const Loop& loop) {
     for (const std::size_t patches : {1u, 8u, 32u}) {
       for (const double damping : {0.0, 1.0}) {
         ContactLaw law;
@@ -267,9 +268,10 @@ TEST(Response, PatchesGiveNextToNothingRoundALoop) {
     }
   };
   for (const Loop& loop : kOnPlane) {
-    expect_none(PlacedField{HalfSpaceField{}, {}}, cube().view(), loop);
+    expect_none(PlacedShape{HalfSpaceShape{}, {}}, cube().view(), loop);
   }
-  for (const Loop& loop : kOnCube) expect_none(PlacedTree{cube().view(), {}}, torus().view(), loop);
+  for (const Loop& loop : kOnCube)
+    expect_none(PlacedAsset{cube().view(), {}}, torus().view(), loop);
 }
 
 }  // namespace

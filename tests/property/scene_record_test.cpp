@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/error.h>
 #include <ist/scene.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <array>
@@ -42,11 +42,11 @@ SceneBody at(std::uint32_t number, const PlacedSolid& solid, bool moves = true) 
 
 /// Bodies of every kind that has a record, some of which touch.
 struct Mixed {
-  std::vector<float> heights = std::vector<float>(12, 0.5f), distances = std::vector<float>(27, -1);
+  std::vector<float> heights = std::vector<float>(12, 0.5f), distances = std::vector<float>(27, 1);
   Scene scene{{.max_bodies = 16, .max_pairs = 200}};
 
   Mixed() {
-    distances[13] = 1;
+    distances[13] = -1;
     SceneRule exact;
     exact.penetration.measure = Measure::exact;
     exact.margin = 0.25;
@@ -56,18 +56,18 @@ struct Mixed {
     scene.set_rule(0, 1, patches);
     scene.add(at(7, {cube().view(), {{1, 0, 0, 0}, {0, 0, 0}}}));
     scene.add(at(3, {cube().view(), {{1, 0.5, 0, 0}, {1.9, 0, 0}}, 0.75}));
-    const auto field = [&](std::uint32_t number, const Field& of) {
+    const auto field = [&](std::uint32_t number, const Shape& of) {
       SceneBody body = at(number, PlacedSolid(of, {{1, 0, 0, 0}, {0.25, 0.5, -0.5}}), false);
       body.group = 1;
       scene.add(body);
     };
-    field(20, HalfSpaceField{{0, 0, 1}, -0.75});
-    field(21, BoxField{{1, 0.5, 2}});
-    field(22, BallField{0.5});
-    field(23, CapsuleField{0.5, 1});
-    field(24, CylinderField{0.5, 1});
-    field(25, HeightField{heights.data(), 4, 3, {1, 1}});
-    field(26, DistanceGridField{distances.data(), {3, 3, 3}, {-1, -1, -1}, 1, 0});
+    field(20, HalfSpaceShape{{0, 0, 1}, -0.75});
+    field(21, BoxShape{{1, 0.5, 2}});
+    field(22, BallShape{0.5});
+    field(23, CapsuleShape{0.5, 1});
+    field(24, CylinderShape{0.5, 1});
+    field(25, HeightFieldShape{heights.data(), 4, 3, {1, 1}});
+    field(26, DistanceGridShape{distances.data(), {3, 3, 3}, {-1, -1, -1}, 1, 0});
     scene.exclude(3, 22);
   }
 };
@@ -88,7 +88,7 @@ std::uint64_t bits_of(Scene& scene) {
 
 TEST(SceneRecord, HoldsEveryKindOfBodyAndWhatMetBefore) {
   Mixed mixed;
-  const std::array<TreeView, 1> assets = {cube().view()};
+  const std::array<AssetView, 1> assets = {cube().view()};
   for (int step = 0; step < 3; ++step) {
     Scene again = Scene::replay(mixed.scene.record(), assets, 3);
     EXPECT_EQ(again.size(), 9u);
@@ -105,12 +105,12 @@ TEST(SceneRecord, AFilterIsWhatItRefuses) {
   mixed.scene.set_filter(
       [](const void*, std::uint32_t a, std::uint32_t b) noexcept { return (a + b) % 2 == 0; },
       nullptr);
-  const std::array<TreeView, 1> assets = {cube().view()};
+  const std::array<AssetView, 1> assets = {cube().view()};
   Scene again = Scene::replay(mixed.scene.record(), assets);
   EXPECT_EQ(bits_of(again), bits_of(mixed.scene));
 }
 
-std::string fault_of(const Bytes& record, std::span<const TreeView> assets) {
+std::string fault_of(const Bytes& record, std::span<const AssetView> assets) {
   try {
     Scene::replay(record, assets);
     return "";
@@ -126,7 +126,7 @@ TEST(SceneRecord, WhatIsMissingIsNamed) {
   std::snprintf(hash, sizeof hash, "%016llx",
                 static_cast<unsigned long long>(cube().view().header().content_hash));
   EXPECT_NE(fault_of(record, {}).find(hash), std::string::npos);
-  SceneBody body = at(30, PlacedSolid(Field(FunctionField{}), Pose{}));
+  SceneBody body = at(30, PlacedSolid(Shape(FunctionShape{}), Pose{}));
   mixed.scene.add(body);
   EXPECT_THROW(mixed.scene.record(), Error);
 }
@@ -134,7 +134,7 @@ TEST(SceneRecord, WhatIsMissingIsNamed) {
 TEST(SceneRecord, NoBytesDoMoreThanRaise) {
   Mixed mixed;
   mixed.scene.step();
-  const std::array<TreeView, 1> assets = {cube().view()};
+  const std::array<AssetView, 1> assets = {cube().view()};
   const Bytes record = mixed.scene.record();
   ASSERT_EQ(fault_of(record, assets), "");
   for (std::size_t size = 0; size < record.size(); ++size)

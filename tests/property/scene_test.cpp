@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/error.h>
 #include <ist/scene.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -28,7 +28,7 @@ using namespace testing;
 using Numbers = std::pair<std::uint32_t, std::uint32_t>;
 
 const Asset& block() {
-  static const Asset asset = bake_surface(closed(box_mesh({-1, -1, -1}, {1, 1, 1}), "block"), 1);
+  static const Asset asset = bake_mesh_only(closed(box_mesh({-1, -1, -1}, {1, 1, 1}), "block"), 1);
   return asset;
 }
 const Asset& ball() {
@@ -67,11 +67,10 @@ std::uint64_t bits_of(const Answer& answer, std::span<const ContactPatch> patche
 }
 /// Of two bodies that have no answer a scene tells where their boxes meet, and else nothing.
 bool is_answered(const Answer& pair) {
-  return pair.pair.overlapping == Overlapping::yes ||
-         (pair.impact.status != ImpactStatus::no_impact &&
-          pair.impact.status < ImpactStatus::invalid_input) ||
-         (pair.pair.overlapping == Overlapping::unknown &&
-          pair.penetration.status == QueryStatus::ok && pair.separation.status == QueryStatus::ok &&
+  return pair.pair.overlapping == YesNo::yes || pair.impact.kind != ImpactKind::no_impact ||
+         pair.impact.status == QueryStatus::budget_exhausted ||
+         (pair.pair.overlapping == YesNo::unknown && pair.penetration.status == QueryStatus::ok &&
+          pair.separation.status == QueryStatus::ok &&
           (pair.penetration.touching || pair.penetration.volume > 0 ||
            pair.separation.distance > 0));
 }
@@ -152,9 +151,9 @@ class Pile {
     const std::uint32_t kind = below(12);
     const double scale = below(3) == 0 ? uniform(0.3, 2) : 1.0;
     if (kind == 0)
-      out.solid = PlacedSolid(Field(HalfSpaceField{{0, 0, 1}, -4}), Pose{});
+      out.solid = PlacedSolid(Shape(HalfSpaceShape{{0, 0, 1}, -4}), Pose{});
     else if (kind == 1)
-      out.solid = PlacedSolid(Field(BoxField{{1, 0.5, 2}}), pose(), scale);
+      out.solid = PlacedSolid(Shape(BoxShape{{1, 0.5, 2}}), pose(), scale);
     else
       out.solid = PlacedSolid(kind < 7 ? block().view() : ball().view(), pose(), scale);
     out.moves = below(3) != 0;
@@ -197,8 +196,8 @@ class AllPairs {
 
  private:
   static bool is_refused(const PlacedSolid& solid) {
-    if (const auto* field = std::get_if<PlacedField>(&solid.placed))
-      if (std::holds_alternative<HalfSpaceField>(field->field) && std::isfinite(field->pose.t[1]))
+    if (const auto* field = std::get_if<PlacedShape>(&solid.placed))
+      if (std::holds_alternative<HalfSpaceShape>(field->shape) && std::isfinite(field->pose.t[1]))
         return false;
     const Pose pose = std::visit([](const auto& placed) { return placed.pose; }, solid.placed);
     for (const double x : pose.t)
@@ -207,7 +206,7 @@ class AllPairs {
   }
   bool asks(const SceneBody& a, const SceneBody& b) const {
     const auto is_field = [](const SceneBody& body) {
-      return std::holds_alternative<PlacedField>(body.solid.placed);
+      return std::holds_alternative<PlacedShape>(body.solid.placed);
     };
     return (a.moves || b.moves) && (a.layers & b.meets) != 0 && (b.layers & a.meets) != 0 &&
            excluded.count({a.number, b.number}) == 0 && !(is_field(a) && is_field(b)) &&
@@ -220,11 +219,11 @@ class AllPairs {
     out.pair.b = b.number;
     if (rule.answer == SceneAnswer::impact) {
       out.impact = time_of_impact(a.solid, b.solid, {a.motion, b.motion}, rule.impact, workspace_);
-      return out.impact.status != ImpactStatus::no_impact;
+      return out.impact.kind != ImpactKind::no_impact || out.impact.status != QueryStatus::ok;
     }
     if (rule.answer == SceneAnswer::overlap) {
-      out.pair.overlapping = overlap(a.solid, b.solid, rule.margin, workspace_);
-      return out.pair.overlapping != Overlapping::no;
+      out.pair.overlapping = overlap(a.solid, b.solid, rule.margin, workspace_).answer;
+      return out.pair.overlapping != YesNo::no;
     }
     if (rule.answer == SceneAnswer::patches) {
       const ContactPatches found =
@@ -251,7 +250,7 @@ class AllPairs {
 };
 
 TEST(Scene, FindsWhatAllPairsHave) {
-  const std::array<TreeView, 2> assets = {block().view(), ball().view()};
+  const std::array<AssetView, 2> assets = {block().view(), ball().view()};
   std::size_t met = 0;
   const char* const wanted = std::getenv("IST_SCENES");  // ./dev soak scenes
   const unsigned scenes = wanted == nullptr ? 40 : static_cast<unsigned>(std::stoul(wanted));

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/overlap.h>
-#include <ist/surface.h>
+#include <ist/query.h>
+#include <ist/raycast.h>
 
 #include <cmath>
 #include <limits>
@@ -32,7 +32,7 @@ Vector3d vector(const exact::Point& p) { return {p.x, p.y, p.z}; }
 struct Body {
   explicit Body(TriangleMesh given) : mesh(given), asset(testing::surface(std::move(given))) {}
 
-  std::vector<exact::FlatTriangle> triangles(const PlacedTree& placed) const {
+  std::vector<exact::FlatTriangle> triangles(const PlacedAsset& placed) const {
     std::vector<exact::FlatTriangle> out;
     const auto world = [&](std::uint32_t v) {
       return point(testing::rotation(placed.pose) * (placed.scale * mesh.vertices[v]) +
@@ -104,7 +104,7 @@ TEST(Surface, PointsAndRaysMatchAllTriangles) {
   for (const Body& body : bodies())
     for (const double scale : {1.0, 0.02, 300.0})
       for (int i = 0; i < 60; ++i) {
-        const PlacedTree placed{body.asset.view(), testing::random_pose(random, scale), scale};
+        const PlacedAsset placed{body.asset.view(), testing::random_pose(random, scale), scale};
         const auto triangles = body.triangles(placed);
         const auto place = [&]() -> Vector3d {
           return testing::position(placed.pose) +
@@ -120,7 +120,7 @@ TEST(Surface, PointsAndRaysMatchAllTriangles) {
         EXPECT_LE((got.point + got.distance * got.gradient - x).norm(), 1e-12 * scale);
         const bool holds = winding(triangles, x) > 0.5;
         EXPECT_EQ(got.distance < 0, holds);
-        EXPECT_EQ(contains(placed, x).inside, holds);
+        EXPECT_EQ(contains(placed, x) == YesNo::yes, holds);
         inside += holds;
 
         const Ray ray{x, Vector3d(uniform(random), uniform(random), uniform(random)) * 7};
@@ -136,9 +136,9 @@ TEST(Surface, PointsAndRaysMatchAllTriangles) {
         EXPECT_NEAR(hit.normal.norm(), 1, 1e-12);
         EXPECT_EQ(hit.normal.dot(ray.direction) > 0, holds);
         Ray limited = ray;
-        limited.longest = 0.999 * want;
+        limited.max_distance = 0.999 * want;
         EXPECT_FALSE(raycast(placed, limited).hit());
-        limited.longest = 1.001 * want;
+        limited.max_distance = 1.001 * want;
         EXPECT_NEAR(raycast(placed, limited).distance, want, 1e-12 * scale);
       }
   EXPECT_GT(hits, 200);
@@ -149,7 +149,7 @@ TEST(Surface, PointsAndRaysMatchAllTriangles) {
 TEST(Surface, NoRaySlipsThrough) {
   const Body cube(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));
   const Body ball(testing::icosphere_mesh(2));
-  const PlacedTree box{cube.asset.view(), {}, 1};
+  const PlacedAsset box{cube.asset.view(), {}, 1};
   for (int i = -3; i <= 3; ++i)
     for (int j = -3; j <= 3; ++j) {
       const double x = i / 4.0, y = j / 4.0;
@@ -166,7 +166,7 @@ TEST(Surface, NoRaySlipsThrough) {
     }
   // From the middle through every vertex and every edge's middle.
   for (const Body* body : {&cube, &ball}) {
-    const PlacedTree placed{body->asset.view(), {}, 1};
+    const PlacedAsset placed{body->asset.view(), {}, 1};
     for (const auto& t : body->mesh.triangles)
       for (int k = 0; k < 3; ++k) {
         const Vector3d p = body->mesh.vertices[t[k]], q = body->mesh.vertices[t[(k + 1) % 3]];
@@ -183,7 +183,7 @@ TEST(Surface, NoRaySlipsThrough) {
 TEST(Surface, PointsOnTheSurface) {
   const Body body(testing::icosphere_mesh(3));
   std::mt19937_64 random(3);
-  const PlacedTree placed{body.asset.view(), testing::random_pose(random, 5), 3};
+  const PlacedAsset placed{body.asset.view(), testing::random_pose(random, 5), 3};
   for (const exact::FlatTriangle& t : body.triangles(placed)) {
     const Vector3d middle = (vector(t.corner[0]) + vector(t.corner[1]) + vector(t.corner[2])) / 3;
     for (const Vector3d& x : {middle, vector(t.corner[0])}) {
@@ -192,7 +192,7 @@ TEST(Surface, PointsOnTheSurface) {
       EXPECT_LE(got.error, 1e-12);
       EXPECT_NEAR(got.gradient.norm(), 1, 1e-12);
       EXPECT_GT(got.gradient.dot(vector(t.normal)), 0);
-      EXPECT_EQ(contains(placed, x).inside, contains(placed, x).inside);
+      EXPECT_EQ(contains(placed, x).answer, contains(placed, x).answer);
     }
   }
 }
@@ -200,7 +200,7 @@ TEST(Surface, PointsOnTheSurface) {
 TEST(Surface, BatchesHaveTheSameBits) {
   const Body body(testing::torus_mesh(0.35, 0.14, 40, 20));
   std::mt19937_64 random(4);
-  const PlacedTree placed{body.asset.view(), testing::random_pose(random, 0.3), 1};
+  const PlacedAsset placed{body.asset.view(), testing::random_pose(random, 0.3), 1};
   std::vector<Vector3d> points;
   std::vector<Ray> rays;
   for (int i = 0; i < 50; ++i) {
@@ -208,14 +208,14 @@ TEST(Surface, BatchesHaveTheSameBits) {
     rays.push_back({points.back(), testing::random_direction(random)});
   }
   std::vector<SurfacePoint> feet(50);
-  std::vector<Containment> inside(50);
+  std::vector<YesNoAnswer> inside(50);
   std::vector<RayHit> hits(50);
   closest_point(placed, points, feet);
   contains(placed, points, inside);
   raycast(placed, rays, hits);
   for (int i = 0; i < 50; ++i) {
     EXPECT_EQ(closest_point(placed, points[i]).distance, feet[i].distance);
-    EXPECT_EQ(contains(placed, points[i]).inside, inside[i].inside);
+    EXPECT_EQ(contains(placed, points[i]).answer, inside[i].answer);
     EXPECT_EQ(raycast(placed, rays[i]).distance, hits[i].distance);
   }
 }
@@ -235,38 +235,38 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
     EXPECT_EQ(foot.status, status);
     EXPECT_TRUE(std::isnan(foot.distance) && std::isnan(foot.gradient[0]));
     EXPECT_EQ(contains(placed, x).status, status);
-    EXPECT_FALSE(contains(placed, x).inside);
+    EXPECT_NE(contains(placed, x), YesNo::yes);
   };
-  const PlacedTree good{body.asset.view(), {}, 1};
+  const PlacedAsset good{body.asset.view(), {}, 1};
   const Vector3d zero = Vector3d::Zero();
-  expect(PlacedTree{bare.view(), {}, 1}, {}, QueryStatus::not_held);
-  expect_point(PlacedTree{bare.view(), {}, 1}, zero, QueryStatus::not_held);
+  expect(PlacedAsset{bare.view(), {}, 1}, {}, QueryStatus::missing_data);
+  expect_point(PlacedAsset{bare.view(), {}, 1}, zero, QueryStatus::missing_data);
   for (const Ray& ray : {Ray{zero, zero}, Ray{zero, {nan, 1, 0}}, Ray{{nan, 0, 0}},
                          Ray{{1e90, 0, 0}}, Ray{zero, {kInfinity, 0, 0}},
                          Ray{zero, Vector3d::UnitX(), 0}, Ray{zero, Vector3d::UnitX(), nan}}) {
     expect(good, ray, QueryStatus::invalid_input);
-    expect(PlacedField{BallField{1}, {}, 1}, ray, QueryStatus::invalid_input);
+    expect(PlacedShape{BallShape{1}, {}, 1}, ray, QueryStatus::invalid_input);
   }
   for (const Vector3d& x :
        {Vector3d(nan, 0, 0), Vector3d(0, kInfinity, 0), Vector3d(0, 0, 1e300)}) {
     expect_point(good, x, QueryStatus::invalid_input);
-    expect_point(PlacedField{BallField{1}, {}, 1}, x, QueryStatus::invalid_input);
+    expect_point(PlacedShape{BallShape{1}, {}, 1}, x, QueryStatus::invalid_input);
   }
-  std::vector<PlacedTree> bad(4, good);
+  std::vector<PlacedAsset> bad(4, good);
   bad[0].pose.q[0] = nan;
   bad[1].scale = -1;
-  bad[2].tree = TreeView();
+  bad[2].asset = AssetView();
   bad[3].pose.t[2] = kInfinity;
-  for (const PlacedTree& wrong : bad) {
+  for (const PlacedAsset& wrong : bad) {
     expect(wrong, {}, QueryStatus::invalid_input);
     expect_point(wrong, zero, QueryStatus::invalid_input);
   }
-  expect_point(PlacedField{BallField{-1}, {}, 1}, zero, QueryStatus::invalid_input);
+  expect_point(PlacedShape{BallShape{-1}, {}, 1}, zero, QueryStatus::invalid_input);
   // Directions of any length, and origins far away.
   for (const double length : {1e-300, 1e-10, 1e200, 1e300}) {
     EXPECT_EQ(raycast(good, Ray{zero, Vector3d(length, 0, 0)}).distance, 0.5) << length;
     EXPECT_EQ(
-        raycast(PlacedField{BallField{0.5}, {}, 1}, Ray{zero, Vector3d(length, 0, 0)}).distance,
+        raycast(PlacedShape{BallShape{0.5}, {}, 1}, Ray{zero, Vector3d(length, 0, 0)}).distance,
         0.5)
         << length;
   }
@@ -282,11 +282,11 @@ TEST(Surface, ShapesAnswerByTheirDistances) {
     for (int i = 0; i < 60; ++i) {
       const std::string kind = name;
       const bool rough = kind == "terrain" || kind == "grid";
-      const PlacedField placed{field, testing::random_pose(random, 0.3), 1.3};
+      const PlacedShape placed{field, testing::random_pose(random, 0.3), 1.3};
       const Vector3d x = testing::position(testing::random_pose(random, 0.1 + 0.02 * i));
       const SurfacePoint foot = closest_point(placed, x);
       if (kind == "mesh") {
-        const PlacedTree tree{testing::torus().view(), placed.pose, placed.scale};
+        const PlacedAsset tree{testing::torus().view(), placed.pose, placed.scale};
         EXPECT_EQ(foot.distance, closest_point(tree, x).distance);
       }
       ASSERT_EQ(foot.status, QueryStatus::ok) << name;
@@ -294,18 +294,18 @@ TEST(Surface, ShapesAnswerByTheirDistances) {
       if (!rough) {
         EXPECT_NEAR(closest_point(placed, foot.point).distance, 0, 1e-9) << name;
       }
-      EXPECT_EQ(contains(placed, x).inside, foot.distance < 0) << name;
+      EXPECT_EQ(contains(placed, x) == YesNo::yes, foot.distance < 0) << name;
       const Ray ray{x, testing::random_direction(random)};
       const RayHit hit = raycast(placed, ray);
       if (rough || kind == "function") {
-        EXPECT_EQ(hit.status, QueryStatus::not_held);
+        EXPECT_EQ(hit.status, QueryStatus::missing_data);
         continue;
       }
       ASSERT_EQ(hit.status, QueryStatus::ok) << name;
       const double end = hit.hit() ? hit.distance : 5;
       for (int k = 1; k < 50; ++k) {
         const Vector3d on = x + end * k / 50.0 * ray.direction.normalized();
-        EXPECT_EQ(contains(placed, on).inside, foot.distance < 0) << name;
+        EXPECT_EQ(contains(placed, on) == YesNo::yes, foot.distance < 0) << name;
       }
       if (!hit.hit()) continue;
       ++hits;
@@ -323,9 +323,9 @@ TEST(Surface, SeparationMatchesAllPairsOfTriangles) {
   for (std::size_t s = 0; s < solids.size(); ++s)
     for (int i = 0; i < 12; ++i) {
       const Body &of_a = solids[s], &of_b = solids[(s + 2) % solids.size()];
-      const PlacedTree a{of_a.asset.view(), testing::random_pose(random, 0.3), 1};
-      const PlacedTree b{of_b.asset.view(), testing::random_pose(random, 0.24 * i),
-                         i % 3 == 0 ? 0.05 : 0.7};
+      const PlacedAsset a{of_a.asset.view(), testing::random_pose(random, 0.3), 1};
+      const PlacedAsset b{of_b.asset.view(), testing::random_pose(random, 0.24 * i),
+                          i % 3 == 0 ? 0.05 : 0.7};
       const auto triangles_a = of_a.triangles(a), triangles_b = of_b.triangles(b);
       exact::NearestPair least;
       for (const exact::FlatTriangle& x : triangles_a)
@@ -409,7 +409,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
       for (double& t : pose.t) t = 0.25 * quarter(random);
     }
     const double scale = i % 5 == 0 ? 0.125 : 1;
-    const PlacedTree a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, scale};
+    const PlacedAsset a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, scale};
     exact::NearestPair least;
     bool cross = false;
     for (const exact::FlatTriangle& x : of_a.triangles(a))
@@ -438,10 +438,10 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
     for (const double part : {0.01, 0.5, 1 - 1e-9, 1 + 1e-9, 3.0}) {
       if (std::abs(part - 1) * want < 1e-13) continue;  // as near, to rounding
       const Separation up_to = separation(a, b, {.max_distance = part * want}, workspace);
-      const Overlapping within = ist::overlap(a, b, part * want, workspace);
+      const YesNoAnswer within = ist::overlap(a, b, part * want, workspace);
       if (part > 1) {
         expect_same_gap(up_to, got, i);
-        EXPECT_EQ(within, Overlapping::yes) << i << ' ' << part;
+        EXPECT_EQ(within, YesNo::yes) << i << ' ' << part;
         continue;
       }
       EXPECT_EQ(up_to.status, QueryStatus::ok);
@@ -449,7 +449,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
       EXPECT_EQ(up_to.distance_min, part * want) << i;
       EXPECT_TRUE(std::isinf(up_to.distance_max)) << i;
       EXPECT_TRUE(std::isnan(up_to.normal[0]) && std::isnan(up_to.point_a[1])) << i;
-      EXPECT_EQ(within, Overlapping::no) << i << ' ' << part;
+      EXPECT_EQ(within, YesNo::no) << i << ' ' << part;
     }
   }
   EXPECT_GT(apart, 500);
@@ -473,7 +473,7 @@ TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
         for (double& t : pose.t) t += any(random) - 0.2 * step * (t > 0 ? 1 : -1);
         for (double& q : pose.q) q += 0.3 * any(random);
         if (i % 20 == 19) pose = testing::random_pose(random, 1.2);
-        const PlacedTree a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, 0.7};
+        const PlacedAsset a{of_a.asset.view(), {}, 1}, b{of_b.asset.view(), pose, 0.7};
         const double most = i % 7 == 3 ? 0.2 : 0;
         const Separation want = separation(a, b, {.max_distance = most}, scratch);
         const Separation got = separation(a, b, {.max_distance = most, .pair_id = id}, kept);
@@ -493,7 +493,7 @@ TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
     const double at = 2e-3 * i, half = 0.7 * at;
     const Pose pose{{std::cos(half), 0, 0.6 * std::sin(half), 0.8 * std::sin(half)},
                     {2.01 * std::cos(at), 2.01 * std::sin(at), 0.1 * at}};
-    const PlacedTree a{ball.asset.view(), {}, 1}, b{ball.asset.view(), pose, 1};
+    const PlacedAsset a{ball.asset.view(), {}, 1}, b{ball.asset.view(), pose, 1};
     expect_same_gap(separation(a, b, {.pair_id = 99}, kept), separation(a, b, {}, scratch), i);
   }
   EXPECT_GT(fewer, 80);
@@ -508,8 +508,8 @@ TEST(Surface, SeparationNeedsNoCapacity) {
   Workspace least(1), most;
   std::mt19937_64 random(11);
   for (const double scale : {0.4, 0.9}) {
-    const PlacedTree a{hollow.asset.view(), {}, 1};
-    const PlacedTree b{ball.asset.view(), testing::random_pose(random, 0), scale};
+    const PlacedAsset a{hollow.asset.view(), {}, 1};
+    const PlacedAsset b{ball.asset.view(), testing::random_pose(random, 0), scale};
     const Separation got = separation(a, b, {}, least);
     EXPECT_EQ(got.status, QueryStatus::ok);
     EXPECT_NEAR(got.distance, 1 - scale, 1e-3 * scale);
@@ -522,14 +522,14 @@ TEST(Surface, SeparationOfWhatIsInside) {
   Workspace workspace;
   const Body box(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));
   const std::vector<Body> solids = bodies();
-  const PlacedTree whole{box.asset.view(), {}, 1}, hollow{solids[3].asset.view(), {}, 1};
-  const PlacedTree small{box.asset.view(), {}, 0.5};
+  const PlacedAsset whole{box.asset.view(), {}, 1}, hollow{solids[3].asset.view(), {}, 1};
+  const PlacedAsset small{box.asset.view(), {}, 0.5};
   EXPECT_EQ(separation(whole, small, {}, workspace).distance_max, 0);
   EXPECT_EQ(separation(small, whole, {}, workspace).distance_max, 0);
   EXPECT_NEAR(separation(hollow, small, {}, workspace).distance, 0.3, 1e-15);
   EXPECT_NEAR(separation(small, hollow, {}, workspace).distance, 0.3, 1e-15);
   for (const double gap : {0.0, 1e-9, 1e-3, 0.5, 1e3, 1e9, 1e30, 1e50}) {
-    const PlacedTree beside{box.asset.view(), {{1, 0, 0, 0}, {2 + gap, 0, 0}}, 1};
+    const PlacedAsset beside{box.asset.view(), {{1, 0, 0, 0}, {2 + gap, 0, 0}}, 1};
     const Separation got = separation(whole, beside, {}, workspace);
     EXPECT_NEAR(got.distance, gap, 4e-16 * (2 + gap)) << gap;
     EXPECT_LE(got.distance_min, gap);

@@ -18,7 +18,7 @@ namespace {
 using namespace testing;
 
 TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
-  const PlacedField floor{HalfSpaceField{}, {}, 1};
+  const PlacedShape floor{HalfSpaceShape{}, {}, 1};
   for (const double speed : {1e-3, 1.0, 1e3}) {
     ImpactSettings settings;
     settings.duration = 10 / speed;
@@ -26,7 +26,7 @@ TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
     const TimeOfImpact found =
         time_of_impact(floor, {cube().view(), at({0.3, 0.2, 2.5}), 1},
                        {{}, straight({0, 0, -speed})}, settings, workspace());
-    EXPECT_EQ(found.status, ImpactStatus::impact);
+    EXPECT_EQ(found.kind, ImpactKind::impact);
     EXPECT_GE(found.time * speed, 2 - 1e-3);
     EXPECT_LE(found.time * speed, 2 - 0.5e-3 + 1e-6);
     EXPECT_GE(found.distance_min, 0.49e-3);
@@ -42,7 +42,7 @@ TEST(TimeOfImpact, OfACubeThatFallsOnAPlane) {
     EXPECT_EQ(turned.point_b, found.point_a);
     EXPECT_EQ(turned.normal, -found.normal);
   }
-  EXPECT_EQ(time_of_impact(floor, floor, {}, {}, workspace()).status, ImpactStatus::not_held);
+  EXPECT_EQ(time_of_impact(floor, floor, {}, {}, workspace()).status, QueryStatus::missing_data);
 }
 
 TEST(TimeOfImpact, OfASpinningRodAndAWall) {
@@ -59,23 +59,23 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
     settings.tolerance = 1e-4;
     const Motion spin{Vector3d::Zero(), {0, -0.5, 0}, Vector3d::Zero()};
     const TimeOfImpact field =
-        time_of_impact(PlacedField{HalfSpaceField{}, {}, 1}, {rod().view(), at({0, 0, d}), 1},
+        time_of_impact(PlacedShape{HalfSpaceShape{}, {}, 1}, {rod().view(), at({0, 0, d}), 1},
                        {{}, spin}, settings, workspace());
     const TimeOfImpact tree =
-        time_of_impact(PlacedTree{wall().view(), at({0, 0, -1}), 1},
+        time_of_impact(PlacedAsset{wall().view(), at({0, 0, -1}), 1},
                        {rod().view(), at({0, 0, d}), 1}, {{}, spin}, settings, workspace());
     const TimeOfImpact box =
-        time_of_impact(PlacedField{BoxField{{9, 9, 1}}, at({0, 0, -1}), 1},
+        time_of_impact(PlacedShape{BoxShape{{9, 9, 1}}, at({0, 0, -1}), 1},
                        {rod().view(), at({0, 0, d}), 1}, {{}, spin}, settings, workspace());
     // Seen from the rod the wall goes round it.
     const TimeOfImpact around = time_of_impact(
-        PlacedTree{wall().view(), at({0, 0, -1}), 1}, {rod().view(), at({0, 0, d}), 1},
+        PlacedAsset{wall().view(), at({0, 0, -1}), 1}, {rod().view(), at({0, 0, d}), 1},
         {{Vector3d::Zero(), {0, 0.5, 0}, {0, 0, 1 + d}}, {}}, settings, workspace());
     const TimeOfImpact field_around =
-        time_of_impact(PlacedField{HalfSpaceField{}, {}, 1}, {rod().view(), at({0, 0, d}), 1},
+        time_of_impact(PlacedShape{HalfSpaceShape{}, {}, 1}, {rod().view(), at({0, 0, d}), 1},
                        {{Vector3d::Zero(), {0, 0.5, 0}, {0, 0, d}}, {}}, settings, workspace());
     for (const TimeOfImpact& found : {field, tree, box, around, field_around}) {
-      EXPECT_EQ(found.status, ImpactStatus::impact);
+      EXPECT_EQ(found.kind, ImpactKind::impact);
       EXPECT_LE(found.time, 2 * low);
       EXPECT_GE(found.time, 2 * low - 2 * 1.1e-4 / std::cos(low));
     }
@@ -85,9 +85,9 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
   settings.duration = 1e5 * 2 * std::numbers::pi;
   settings.tolerance = 1e-4;
   const TimeOfImpact clear =
-      time_of_impact(PlacedField{HalfSpaceField{}, {}, 1}, {rod().view(), at({0, 0, 1.01}), 1},
+      time_of_impact(PlacedShape{HalfSpaceShape{}, {}, 1}, {rod().view(), at({0, 0, 1.01}), 1},
                      {{}, {Vector3d::Zero(), {0, 0, 1}, Vector3d::Zero()}}, settings, workspace());
-  EXPECT_EQ(clear.status, ImpactStatus::no_impact);
+  EXPECT_EQ(clear.kind, ImpactKind::no_impact);
   EXPECT_EQ(clear.time, settings.duration);
 }
 
@@ -97,23 +97,23 @@ TEST(TimeOfImpact, OfPrimitives) {
       Eigen::Quaterniond::FromTwoVectors(Vector3d::Ones().normalized().eval(), Vector3d::UnitX());
   ImpactSettings settings;
   settings.tolerance = 1e-4;
-  const Field shapes[] = {BallField{0.7}, CapsuleField{0.7, 0.4}, CylinderField{0.7, 0.4},
-                          BoxField{{0.7, 0.5, 0.4}}};
-  for (const Field& shape : shapes) {
+  const Shape shapes[] = {BallShape{0.7}, CapsuleShape{0.7, 0.4}, CylinderShape{0.7, 0.4},
+                          BoxShape{{0.7, 0.5, 0.4}}};
+  for (const Shape& shape : shapes) {
     const Eigen::Quaterniond& q = corner_first;
     const Pose start{{q.w(), q.x(), q.y(), q.z()}, {-5, 0, 0}};
-    const TimeOfImpact found = time_of_impact(PlacedField{shape, {}, 1}, {cube().view(), start, 1},
+    const TimeOfImpact found = time_of_impact(PlacedShape{shape, {}, 1}, {cube().view(), start, 1},
                                               {{}, straight({8, 0, 0})}, settings, workspace());
-    EXPECT_EQ(found.status, ImpactStatus::impact) << shape.index();
+    EXPECT_EQ(found.kind, ImpactKind::impact) << shape.index();
     const double want = 5 - 0.7 - std::sqrt(0.75);
     EXPECT_LE(8 * found.time, want - 0.5e-4 + 1e-7);
     EXPECT_GE(8 * found.time, want - 1e-4 - 1e-7);
     EXPECT_LE((found.normal + Vector3d::UnitX()).norm(), 1e-3);
     // Past it, a little further away than the two are wide.
     const TimeOfImpact past =
-        time_of_impact(PlacedField{shape, {}, 1}, {cube().view(), at({-5, 1.21, 0}), 1},
+        time_of_impact(PlacedShape{shape, {}, 1}, {cube().view(), at({-5, 1.21, 0}), 1},
                        {{}, straight({10, 0, 0})}, settings, workspace());
-    EXPECT_EQ(past.status, ImpactStatus::no_impact) << shape.index();
+    EXPECT_EQ(past.kind, ImpactKind::no_impact) << shape.index();
   }
 }
 
@@ -122,44 +122,44 @@ TEST(TimeOfImpact, OfFieldsThatTellNoDirection) {
   settings.tolerance = 0.01;
   settings.duration = 10;
   const std::vector<float> flat(9, 0.25f);
-  HeightField terrain;
+  HeightFieldShape terrain;
   terrain.heights = flat.data();
   terrain.columns = terrain.rows = 3;
   const auto plane = [](const void*, const Vector3d& x) noexcept {
-    return FieldSample{0.25 - x.z(), -Vector3d::UnitZ()};
+    return ShapeSample{x.z() - 0.25, Vector3d::UnitZ()};
   };
-  for (const Field& field : {Field{terrain}, Field{FunctionField{plane, nullptr, 0}}}) {
+  for (const Shape& field : {Shape{terrain}, Shape{FunctionShape{plane, nullptr, 0}}}) {
     const TimeOfImpact found =
-        time_of_impact(PlacedField{field, {}, 1}, {ball().view(), at({1, 1, 3}), 1},
+        time_of_impact(PlacedShape{field, {}, 1}, {ball().view(), at({1, 1, 3}), 1},
                        {{}, straight({0.3, 0, -1})}, settings, workspace());
-    EXPECT_EQ(found.status, ImpactStatus::impact) << field.index();
+    EXPECT_EQ(found.kind, ImpactKind::impact) << field.index();
     EXPECT_NEAR(found.time, 3 - 0.25 - 1, 0.02);
     EXPECT_LE(found.distance_max, settings.tolerance);
     const TimeOfImpact away =
-        time_of_impact(PlacedField{field, {}, 1}, {ball().view(), at({1, 1, 1.4}), 1},
+        time_of_impact(PlacedShape{field, {}, 1}, {ball().view(), at({1, 1, 1.4}), 1},
                        {{}, {{0.3, 0, 0}, {0, 0, 3}, Vector3d::Zero()}}, settings, workspace());
-    EXPECT_EQ(away.status, ImpactStatus::no_impact) << field.index();
-    EXPECT_EQ(time_of_impact(PlacedField{field, {}, 1}, {ball().view(), at({1, 1, 1}), 1}, {},
+    EXPECT_EQ(away.kind, ImpactKind::no_impact) << field.index();
+    EXPECT_EQ(time_of_impact(PlacedShape{field, {}, 1}, {ball().view(), at({1, 1, 1}), 1}, {},
                              settings, workspace())
-                  .status,
-              ImpactStatus::overlapping);
+                  .kind,
+              ImpactKind::overlapping);
   }
 }
 
 /// Solids at many times of their motions.
 class Certified : public ::testing::Test {
  protected:
-  void check(const PlacedTree& a, const PlacedTree& b, const Motions& motions,
+  void check(const PlacedAsset& a, const PlacedAsset& b, const Motions& motions,
              const ImpactSettings& settings) {
     const TimeOfImpact found = time_of_impact(a, b, motions, settings, workspace());
-    ++count_[static_cast<int>(found.status)];
-    const auto at_time = [](const PlacedTree& start, const Motion& motion, double time) {
-      return PlacedTree{start.tree, moved(start.pose, motion, time, start.scale), start.scale};
+    ++count_[static_cast<int>(found.kind)];
+    const auto at_time = [](const PlacedAsset& start, const Motion& motion, double time) {
+      return PlacedAsset{start.asset, moved(start.pose, motion, time, start.scale), start.scale};
     };
     const auto apart = [&](double time) {
       return distance(corners(at_time(a, motions.a, time)), corners(at_time(b, motions.b, time)));
     };
-    if (found.status == ImpactStatus::overlapping) {
+    if (found.kind == ImpactKind::overlapping) {
       EXPECT_EQ(found.time, 0);
       EXPECT_GT(penetration(a, b, {.measure = Measure::exact}, workspace()).volume, 0);
       return;
@@ -174,7 +174,7 @@ class Certified : public ::testing::Test {
     const double gap = apart(found.time);
     EXPECT_GE(gap, found.distance_min * (1 - 1e-9));
     EXPECT_LE(gap, found.distance_max * (1 + 1e-9));
-    if (found.status == ImpactStatus::impact) {
+    if (found.kind == ImpactKind::impact) {
       EXPECT_LE(gap, settings.tolerance);
       // Of a pair that comes to the tolerance; another may be nearer by a part of it.
       const double between = (found.point_b - found.point_a).norm();
@@ -194,18 +194,19 @@ TEST_F(Certified, NothingTouchesBeforeTheTime) {
   settings.tolerance = 1e-3;
   const Asset* const assets[] = {&cube(), &torus(), &ball(), &rod()};
   for (int i = 0; i < 120; ++i) {
-    const PlacedTree a{assets[i % 4]->view(), random_pose(random, 0.2), 1};
-    const PlacedTree b{assets[i / 4 % 4]->view(), random_pose(random, 1.9), i % 3 == 0 ? 0.3 : 1.0};
+    const PlacedAsset a{assets[i % 4]->view(), random_pose(random, 0.2), 1};
+    const PlacedAsset b{assets[i / 4 % 4]->view(), random_pose(random, 1.9),
+                        i % 3 == 0 ? 0.3 : 1.0};
     Motions motions{random_motion(random, i % 2 == 0 ? 0.3 : 0, i % 5 == 0 ? 0 : 3),
                     random_motion(random, 1, i % 3 == 0 ? 8 : 1)};
     motions.b.velocity -= Vector3d(b.pose.t[0], b.pose.t[1], b.pose.t[2]);
     SCOPED_TRACE(i);
     check(a, b, motions, settings);
   }
-  EXPECT_GT(count_[static_cast<int>(ImpactStatus::impact)], 25);
-  EXPECT_GT(count_[static_cast<int>(ImpactStatus::no_impact)], 25);
-  EXPECT_GT(count_[static_cast<int>(ImpactStatus::overlapping)], 3);
-  EXPECT_EQ(count_[static_cast<int>(ImpactStatus::unresolved)], 0);
+  EXPECT_GT(count_[static_cast<int>(ImpactKind::impact)], 25);
+  EXPECT_GT(count_[static_cast<int>(ImpactKind::no_impact)], 25);
+  EXPECT_GT(count_[static_cast<int>(ImpactKind::overlapping)], 3);
+  EXPECT_EQ(count_[static_cast<int>(ImpactKind::unresolved)], 0);
 }
 
 TEST(TimeOfImpact, OfCoverBallsIsEarlierAndSaysSo) {
@@ -219,7 +220,7 @@ TEST(TimeOfImpact, OfCoverBallsIsEarlierAndSaysSo) {
     Motions towards = motions;
     towards.b.velocity -= 2 * Vector3d(pose.t[0], pose.t[1], pose.t[2]);
     const auto ask = [&](const Asset& a, const Asset& b) {
-      return time_of_impact(PlacedTree{a.view(), {}, 1}, {b.view(), pose, 1}, towards, settings,
+      return time_of_impact(PlacedAsset{a.view(), {}, 1}, {b.view(), pose, 1}, towards, settings,
                             workspace());
     };
     const TimeOfImpact exact = ask(torus(), ball());
@@ -227,8 +228,8 @@ TEST(TimeOfImpact, OfCoverBallsIsEarlierAndSaysSo) {
          {ask(torus_of_spheres(), ball()), ask(torus(), ball_of_spheres()),
           ask(torus_of_spheres(), ball_of_spheres())}) {
       EXPECT_LE(coarse.time, exact.time);
-      if (coarse.status == ImpactStatus::no_impact) continue;
-      EXPECT_EQ(coarse.status, ImpactStatus::unresolved);
+      if (coarse.kind == ImpactKind::no_impact) continue;
+      EXPECT_EQ(coarse.kind, ImpactKind::unresolved);
       EXPECT_GE(coarse.distance_max, settings.tolerance);
       EXPECT_LE(coarse.distance_max, 0.6);
       ++unresolved;
@@ -259,9 +260,9 @@ TEST(TimeOfImpact, NoBulletPasses) {
       Motion motion = straight(speed * way);
       motion.angular_velocity = random_vector([&] { return 3 * normal(random); });
       const TimeOfImpact found =
-          time_of_impact(PlacedTree{wall().view(), {}, 1}, {ball().view(), start, 0.005},
+          time_of_impact(PlacedAsset{wall().view(), {}, 1}, {ball().view(), start, 0.005},
                          {{}, motion}, {}, workspace());
-      EXPECT_EQ(found.status, ImpactStatus::impact) << speed << " " << i;
+      EXPECT_EQ(found.kind, ImpactKind::impact) << speed << " " << i;
       const Vector3d centre = from + motion.velocity * found.time;
       const double height = way.z() > 0 ? -centre.z() : centre.z() - 1;
       const double rounding = 1e-15 * speed;
@@ -288,11 +289,11 @@ TEST(TimeOfImpact, NoBulletPassesAThinWall) {
         Motion motion = straight(size * (speed + 6 * scale) * way);
         motion.angular_velocity = random_vector([&] { return 10 * normal(random); });
         const TimeOfImpact found =
-            time_of_impact(PlacedTree{sheet.view(), {}, size},
+            time_of_impact(PlacedAsset{sheet.view(), {}, size},
                            {torus().view(), start, size * scale}, {{}, motion}, {}, workspace());
         // What the rounding of so long a way hides is said, never passed over.
         const bool told = 1e-15 * speed < 1e-4 * scale;
-        EXPECT_EQ(found.status, told ? ImpactStatus::impact : ImpactStatus::unresolved)
+        EXPECT_EQ(found.kind, told ? ImpactKind::impact : ImpactKind::unresolved)
             << scale << " " << speed << " " << size;
         EXPECT_GT(found.time, 0);
         EXPECT_LT(found.time, 0.45);

@@ -39,27 +39,27 @@ const Asset& bare_ring() {
   return asset;
 }
 const Asset& bare_blob_surface() {
-  static const Asset asset = bake_surface(closed(icosphere_mesh(3), "ball"), 1);
+  static const Asset asset = bake_mesh_only(closed(icosphere_mesh(3), "ball"), 1);
   return asset;
 }
 
 class WantedErrors : public ::testing::Test {
  protected:
-  Penetration ask(const PlacedTree& a, const PlacedTree& b, double error) {
+  Penetration ask(const PlacedAsset& a, const PlacedAsset& b, double error) {
     return penetration(a, b, {.relative_error = error}, workspace_);
   }
-  Penetration exact(const PlacedTree& a, const PlacedTree& b) {
+  Penetration exact(const PlacedAsset& a, const PlacedAsset& b) {
     return penetration(a, b, {.measure = Measure::exact}, workspace_);
   }
-  PlacedTree ring_at_rest() { return {ring().view(), random_pose(random_, 0), 1}; }
+  PlacedAsset ring_at_rest() { return {ring().view(), random_pose(random_, 0), 1}; }
   /// At some depth, one after another.
-  PlacedTree blob_at(int i, double scale = 1) {
+  PlacedAsset blob_at(int i, double scale = 1) {
     return {blob().view(), random_pose(random_, 0.05 + 0.04 * (i % 20)), scale};
   }
-  static WantedError wanted(const PlacedTree& a, const PlacedTree& b, double error,
+  static WantedError wanted(const PlacedAsset& a, const PlacedAsset& b, double error,
                             bool has_exact = true) {
     const RelativePose pose = *relative_pose(a, b);
-    const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
+    const DetailChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
     return {a, b, pose, {.relative_error = error}, chain, has_exact};
   }
 
@@ -69,8 +69,7 @@ class WantedErrors : public ::testing::Test {
 
 bool same(const Penetration& x, const Penetration& y) {
   return x.volume == y.volume && x.volume_min == y.volume_min && x.volume_max == y.volume_max &&
-         x.translation_gradient == y.translation_gradient &&
-         x.rotation_gradient == y.rotation_gradient && x.status == y.status;
+         x.force == y.force && x.torque == y.torque && x.status == y.status;
 }
 
 TEST_F(WantedErrors, SharesSumToOneAndHaveTheirSlope) {
@@ -103,7 +102,7 @@ TEST_F(WantedErrors, SharesSumToOneAndHaveTheirSlope) {
 TEST_F(WantedErrors, LessErrorIsNeverCheaper) {
   for (const bool has_exact : {true, false})
     for (const double scale : {1.0, 0.3, 0.1}) {
-      const PlacedTree a = ring_at_rest(), b = blob_at(0, scale);
+      const PlacedAsset a = ring_at_rest(), b = blob_at(0, scale);
       for (double overlap = 1e-9; overlap < 1; overlap *= 1.1) {
         std::array<double, DetailChain::kMost> most = {};
         most.fill(-1);
@@ -124,34 +123,33 @@ TEST_F(WantedErrors, GradientsAreThoseOfTheVolume) {
   int mixed = 0;
   for (int i = 0; i < 60; ++i) {
     const double scale = i % 3 == 2 ? 0.12 : 1;
-    const PlacedTree a = ring_at_rest(), b = blob_at(i, scale);
+    const PlacedAsset a = ring_at_rest(), b = blob_at(i, scale);
     const double error = kErrors[i % 4];
     const Penetration here = ask(a, b, error);
     if (!(here.volume > 0)) continue;
     mixed += here.volume != exact(a, b).volume ? 1 : 0;
-    const double step = 2e-4 * scale, force = here.translation_gradient.norm();
+    const double step = 2e-4 * scale, force = here.force.norm();
     const Vector3d along = Vector3d::Random().normalized();
     const auto volume = [&](const Vector3d& shift, const Vector3d& turn) {
-      PlacedTree moved = b;
-      moved.pose = Motion{b.pose, shift, turn}.at(1);
+      PlacedAsset moved = b;
+      moved.pose = Sweep{b.pose, shift, turn}.at(1);
       return ask(a, moved, error).volume;
     };
     const Vector3d none = Vector3d::Zero();
     const double pushed = (volume(step * along, none) - volume(-step * along, none)) / (2 * step);
-    EXPECT_NEAR(pushed, here.translation_gradient.dot(along), 5e-3 * force) << i << ' ' << error;
+    EXPECT_NEAR(pushed, -here.force.dot(along), 5e-3 * force) << i << ' ' << error;
     const double turned = (volume(none, 1e-3 * along) - volume(none, -1e-3 * along)) / 2e-3;
-    EXPECT_NEAR(turned, here.rotation_gradient.dot(along), 5e-3 * force * scale)
-        << i << ' ' << error;
+    EXPECT_NEAR(turned, -here.torque.dot(along), 5e-3 * force * scale) << i << ' ' << error;
   }
   EXPECT_GT(mixed, 15);
 }
 
 // An eighth of the step, a small part of the largest change: a jump would not shrink.
 TEST_F(WantedErrors, NothingJumpsAlongAPath) {
-  const PlacedTree a{ring().view(), {}, 1};
+  const PlacedAsset a{ring().view(), {}, 1};
   for (const double scale : {1.0, 0.12})
     for (const double error : kErrors) {
-      PlacedTree b{blob().view(), random_pose(random_, 0), scale};
+      PlacedAsset b{blob().view(), random_pose(random_, 0), scale};
       const Vector3d from(0.35 + 0.14 + 0.45 * scale, 0.02, 0.01), to(0.3, -0.05, 0.03);
       const auto largest_changes = [&](int steps) {
         double volume = 0, force = 0, torque = 0;
@@ -163,9 +161,8 @@ TEST_F(WantedErrors, NothingJumpsAlongAPath) {
           EXPECT_EQ(now.status, QueryStatus::ok);
           if (i > 0) {
             volume = std::max(volume, std::abs(now.volume - before.volume));
-            force =
-                std::max(force, (now.translation_gradient - before.translation_gradient).norm());
-            torque = std::max(torque, (now.rotation_gradient - before.rotation_gradient).norm());
+            force = std::max(force, (now.force - before.force).norm());
+            torque = std::max(torque, (now.torque - before.torque).norm());
           }
           before = now;
         }
@@ -181,7 +178,7 @@ TEST_F(WantedErrors, NearlyAllPosesErrByLess) {
   for (const double error : kErrors) {
     std::vector<double> over;
     for (int i = 0; i < 240; ++i) {
-      const PlacedTree a = ring_at_rest(), b = blob_at(i, i % 2 == 0 ? 1 : 0.2);
+      const PlacedAsset a = ring_at_rest(), b = blob_at(i, i % 2 == 0 ? 1 : 0.2);
       const double truth = exact(a, b).volume;
       const Penetration answer = ask(a, b, error);
       EXPECT_EQ(answer.status, QueryStatus::ok);
@@ -197,10 +194,10 @@ TEST_F(WantedErrors, NearlyAllPosesErrByLess) {
 // The other way round of two solids, up to what the sums differ by.
 TEST_F(WantedErrors, FewTrianglesAndSurfacesAloneAreExact) {
   for (int i = 0; i < 20; ++i) {
-    const PlacedTree a{cube().view(), random_pose(random_, 0), 1};
-    const PlacedTree b{slab().view(), random_pose(random_, 0.1 * i), 1};
+    const PlacedAsset a{cube().view(), random_pose(random_, 0), 1};
+    const PlacedAsset b{slab().view(), random_pose(random_, 0.1 * i), 1};
     EXPECT_TRUE(same(ask(a, b, 0.05), exact(a, b)));
-    const PlacedTree ball{bare_blob_surface().view(), random_pose(random_, 0.1 * i), 0.3};
+    const PlacedAsset ball{bare_blob_surface().view(), random_pose(random_, 0.1 * i), 0.3};
     EXPECT_TRUE(same(ask(ball, a, 0.05), exact(ball, a)));
     ContactPatch patches[4];
     const ContactPatches found =
@@ -211,7 +208,7 @@ TEST_F(WantedErrors, FewTrianglesAndSurfacesAloneAreExact) {
 
 TEST_F(WantedErrors, OtherMeasuresDoNotHeedIt) {
   for (int i = 0; i < 10; ++i) {
-    const PlacedTree a = ring_at_rest(), b = blob_at(i);
+    const PlacedAsset a = ring_at_rest(), b = blob_at(i);
     for (const Measure measure : {Measure::exact, Measure::inner}) {
       PenetrationSettings settings{.measure = measure};
       const Penetration without = penetration(a, b, settings, workspace_);
@@ -227,7 +224,7 @@ TEST_F(WantedErrors, OtherMeasuresDoNotHeedIt) {
 TEST_F(WantedErrors, AMissIsSaid) {
   int missed = 0, met = 0;
   for (int i = 0; i < 60; ++i) {
-    const PlacedTree a{bare_ring().view(), random_pose(random_, 0), 1}, b = blob_at(i);
+    const PlacedAsset a{bare_ring().view(), random_pose(random_, 0), 1}, b = blob_at(i);
     for (const double error : {1e-6, 0.02}) {
       const Penetration answer = ask(a, b, error), all = penetration(a, b, {}, workspace_);
       if (answer.status == QueryStatus::error_exceeded) {
@@ -246,7 +243,7 @@ TEST_F(WantedErrors, AMissIsSaid) {
         ++met;
       }
     }
-    const PlacedTree full{ring().view(), a.pose, 1};
+    const PlacedAsset full{ring().view(), a.pose, 1};
     const Penetration budgeted =
         penetration(full, b, {.pair_budget = 1, .relative_error = 1e-6}, workspace_);
     EXPECT_EQ(budgeted.status == QueryStatus::error_exceeded, budgeted.volume > 0) << i;
@@ -269,7 +266,7 @@ TEST_F(WantedErrors, PolygonisedMeshesSayWhereTheyExceedIt) {
   for (const Asset* asset : {&packed}) {
     int asked = 0;
     for (int i = 0; i < 40; ++i) {
-      const PlacedTree a{asset->view(), random_pose(random_, 0), 1}, b = blob_at(i, 0.8);
+      const PlacedAsset a{asset->view(), random_pose(random_, 0), 1}, b = blob_at(i, 0.8);
       const Penetration truth = exact(a, b);
       if (!(truth.volume > 0)) continue;
       const double half_width = (truth.volume_max - truth.volume_min) / 2;
@@ -300,7 +297,7 @@ TEST_F(WantedErrors, PredictionsOfTheBakeDecide) {
     seal(bytes);
     return Asset(bytes, "predicting");
   };
-  const PlacedTree at{blob().view(), random_pose(random_, 0), 1};
+  const PlacedAsset at{blob().view(), random_pose(random_, 0), 1};
   double before = 0;
   for (const double times : {0.1, 1.0, 10.0, 1000.0}) {
     const Asset asset = predicting(ring(), times);
@@ -313,7 +310,7 @@ TEST_F(WantedErrors, PredictionsOfTheBakeDecide) {
   // A level answers alone where the next coarser one's median error, a third of the predicted one,
   // is small enough to confirm it: by the middles of the classes, between which 1/error is linear.
   const Asset asset = predicting(ring(), 1);
-  const PlacedTree a{asset.view(), {}, 1};
+  const PlacedAsset a{asset.view(), {}, 1};
   const double error = 3 * 5e-3;
   const WantedError levels = wanted(a, a, error, false);
   double from = 1e-12;
@@ -333,7 +330,7 @@ TEST_F(WantedErrors, PatchesSumToTheBlend) {
   ContactPatch patches[6];
   int blends = 0, exact_ones = 0;
   for (int i = 0; i < 320; ++i) {
-    const PlacedTree a = ring_at_rest(), b = blob_at(i, i % 3 == 2 ? 0.12 : 1);
+    const PlacedAsset a = ring_at_rest(), b = blob_at(i, i % 3 == 2 ? 0.12 : 1);
     const PenetrationSettings settings{.relative_error = i % 4 == 3 ? 1e-5 : kErrors[i % 4]};
     const Penetration whole = penetration(a, b, settings, workspace_);
     const ContactPatches found = contact_patches(a, b, settings, workspace_, patches);
@@ -351,11 +348,14 @@ TEST_F(WantedErrors, PatchesSumToTheBlend) {
       EXPECT_NEAR(patch.area, patch.force.norm(), 1e-6);
     }
     EXPECT_NEAR(volume, whole.volume, 1e-12 * whole.volume);
-    EXPECT_LE((force + whole.translation_gradient).norm(), 1e-12 * (pull + 1e-300));
-    EXPECT_LE((torque + whole.rotation_gradient).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
+    EXPECT_LE((force - whole.force).norm(), 1e-12 * (pull + 1e-300));
+    EXPECT_LE((torque - whole.torque).norm(), 1e-12 * (turn + 2 * pull + 1e-300));
     const bool is_exact = whole.volume == exact(a, b).volume;
     exact_ones += is_exact && whole.volume > 0 ? 1 : 0;
-    blends += !is_exact && whole.volume != penetration(a, b, {.spheres_only = true}, workspace_).volume ? 1 : 0;
+    blends +=
+        !is_exact && whole.volume != penetration(a, b, {.spheres_only = true}, workspace_).volume
+            ? 1
+            : 0;
   }
   EXPECT_GT(blends, 40);
   EXPECT_GT(exact_ones, 20);
@@ -383,7 +383,7 @@ const Asset& puck(bool with_mesh = true) {
 // Flush faces, coaxial rings, copies in place, and all of them moved a little.
 TEST_F(WantedErrors, FlushAndCoincidentSolidsKeepTheWord) {
   struct Mate {
-    PlacedTree a, b, bare_a;
+    PlacedAsset a, b, bare_a;
     Vector3d along;
   };
   const Pose up = pose_of(Quaterniond::Identity(), {0.05, 0, 0.4});
@@ -403,13 +403,13 @@ TEST_F(WantedErrors, FlushAndCoincidentSolidsKeepTheWord) {
   for (std::size_t k = 0; k < mates.size(); ++k)
     for (const double aside : {0.0, 1e-9, 1e-6, 1e-3, 0.01, 0.02, 0.04, 0.08})
       for (const double error : kErrors) {
-        PlacedTree a = mates[k].a, b = mates[k].b, bare = mates[k].bare_a;
+        PlacedAsset a = mates[k].a, b = mates[k].b, bare = mates[k].bare_a;
         const double scale = k % 2 == 0 ? 1.0 : 0.37;
         a.scale = bare.scale = b.scale = scale;
         for (int i = 0; i < 3; ++i) b.pose.t[i] = scale * (b.pose.t[i] + aside * mates[k].along[i]);
         const double truth = exact(a, b).volume;
-        const double solid = scale * scale * scale * std::min(a.tree.volume(), b.tree.volume());
-        for (const PlacedTree& one : {a, bare}) {
+        const double solid = scale * scale * scale * std::min(a.asset.volume(), b.asset.volume());
+        for (const PlacedAsset& one : {a, bare}) {
           const Penetration answer = ask(one, b, error);
           EXPECT_LE(answer.volume_max, solid * (1 + 1e-12));
           EXPECT_GE(answer.volume_max, answer.volume);
@@ -430,8 +430,8 @@ TEST_F(WantedErrors, FlushAndCoincidentSolidsKeepTheWord) {
 TEST_F(WantedErrors, OtherLimitsHoldOnTop) {
   int stopped = 0;
   for (int i = 0; i < 600; ++i) {
-    PlacedTree a = ring_at_rest(), b = blob_at(i, i % 3 == 2 ? 0.12 : 1);
-    if (i % 2 == 1) a.tree = torus().view(), b.tree = coarse_torus().view();  // of one level
+    PlacedAsset a = ring_at_rest(), b = blob_at(i, i % 3 == 2 ? 0.12 : 1);
+    if (i % 2 == 1) a.asset = torus().view(), b.asset = coarse_torus().view();  // of one level
     PenetrationSettings settings{.pair_budget = i % 5 == 0 ? 300u : 0,
                                  .relative_error = kErrors[i % 4]};
     const Penetration finished = penetration(a, b, settings, workspace_);
@@ -441,7 +441,7 @@ TEST_F(WantedErrors, OtherLimitsHoldOnTop) {
     EXPECT_GE(answer.volume_max, finished.volume * (1 - 1e-12)) << i;
     EXPECT_LE(answer.volume_min, answer.volume);
     EXPECT_GE(answer.volume_max, answer.volume);
-    EXPECT_TRUE(answer.translation_gradient.allFinite());
+    EXPECT_TRUE(answer.force.allFinite());
     if (answer.status == QueryStatus::ok) {
       EXPECT_TRUE(same(answer, finished)) << i;
     }

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/error.h>
-#include <ist/overlap.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <new>
@@ -46,7 +45,7 @@ class Answers {
         for (std::size_t i = 0; i < contact.count; ++i) bits_.add(patches[i]);
       }
     for (const bool spheres : {false, true}) add(separation(a, b, {0, spheres}, workspace));
-    bits_.add(static_cast<std::uint64_t>(overlap(a, b, workspace)));
+    bits_.add(static_cast<std::uint64_t>(overlap(a, b, workspace).answer));
   }
 
   std::uint64_t bits() const { return bits_.value(); }
@@ -65,12 +64,12 @@ class Answers {
 
 class WorkspaceCapacity : public ::testing::Test {
  protected:
-  void expect_enough(const PlacedTree& a, const PlacedTree& b) {
+  void expect_enough(const PlacedAsset& a, const PlacedAsset& b) {
     Workspace enough(workspace_capacity(a, b)), little(64);
     std::mt19937_64 random(3);
     const double reach = std::min(a.scale, b.scale);
     for (int i = 0; i < 8; ++i) {
-      PlacedTree moved = b;
+      PlacedAsset moved = b;
       if (i > 0) moved.pose = testing::random_pose(random, i < 4 ? 0.0 : 0.1 * reach * i);
       const Answers found(a, moved, enough);
       EXPECT_EQ(found.stopped(), 0) << i;
@@ -98,9 +97,9 @@ TEST_F(WorkspaceCapacity, ServesEveryPose) {
 
 TEST_F(WorkspaceCapacity, ServesFields) {
   const Asset ball = testing::make_random_asset({.spheres = 30'000}, 4);
-  const PlacedTree tree{ball.view(), {}, 1};
+  const PlacedAsset tree{ball.view(), {}, 1};
   for (const double scale : {0.3, 1.0, 10.0}) {
-    const PlacedField placed{BoxField{{1, 1, 1}}, {}, scale};
+    const PlacedShape placed{BoxShape{{1, 1, 1}}, {}, scale};
     EXPECT_EQ(workspace_capacity(placed, tree), workspace_capacity(tree, placed));
     Workspace enough(workspace_capacity(placed, tree));
     EXPECT_EQ(Answers(placed, tree, enough).stopped(), 0);
@@ -112,7 +111,7 @@ TEST_F(WorkspaceCapacity, IsSmallForSmallTreesAndKnowsPosesNot) {
   const Asset small = testing::make_random_asset({.spheres = 500}, 5);
   const Asset large = testing::make_random_asset({.spheres = 20'000}, 6);
   const Pose far = {{0, 1, 0, 0}, {7, 8, 9}};
-  const PlacedTree one{small.view(), {}, 1}, other{large.view(), {}, 1};
+  const PlacedAsset one{small.view(), {}, 1}, other{large.view(), {}, 1};
   EXPECT_LT(20 * bytes_of(workspace_capacity(one, one)) / 3, bytes_of(1 << 20));
   EXPECT_LT(workspace_capacity(other, other), 1u << 18);
   EXPECT_EQ(workspace_capacity({large.view(), far, 2}, {small.view(), {}, 1}),
@@ -125,11 +124,11 @@ TEST_F(WorkspaceCapacity, IsSmallForSmallTreesAndKnowsPosesNot) {
 
 TEST_F(WorkspaceCapacity, RefusesWhatNoQueryTakes) {
   const Asset asset = testing::make_random_asset({.spheres = 30}, 7);
-  const PlacedTree tree{asset.view(), {}, 1};
-  const PlacedField ball{BallField{1}, {}, 1};
-  EXPECT_THROW(workspace_capacity(tree, PlacedTree{}), Error);
-  EXPECT_THROW(workspace_capacity(tree, PlacedTree{asset.view(), {}, 0}), Error);
-  EXPECT_THROW(workspace_capacity(tree, PlacedField{ball.field, {}, -1}), Error);
+  const PlacedAsset tree{asset.view(), {}, 1};
+  const PlacedShape ball{BallShape{1}, {}, 1};
+  EXPECT_THROW(workspace_capacity(tree, PlacedAsset{}), Error);
+  EXPECT_THROW(workspace_capacity(tree, PlacedAsset{asset.view(), {}, 0}), Error);
+  EXPECT_THROW(workspace_capacity(tree, PlacedShape{ball.shape, {}, -1}), Error);
   EXPECT_THROW(workspace_capacity(ball, ball), Error);
 }
 

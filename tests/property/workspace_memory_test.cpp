@@ -55,7 +55,7 @@ std::vector<std::uint64_t> answers(const Asset& x, const Asset& y, Held held) {
   ContactPatch patches[16];
   std::vector<OutlineSegment> segments(4000);
   for (int i = 0; i < 60; ++i) {
-    const PlacedTree a{x.view(), {}, 1}, b{y.view(), testing::random_pose(random, 0.1 * i), 1};
+    const PlacedAsset a{x.view(), {}, 1}, b{y.view(), testing::random_pose(random, 0.1 * i), 1};
     testing::AnswerBits bits;
     for (const Measure measure : {Measure::matched, Measure::inner, Measure::exact}) {
       PenetrationSettings settings;
@@ -120,7 +120,7 @@ TEST(WorkspaceMemory, NoQueryWritesBeyondIt) {
                      &guard});
       PenetrationSettings settings;
       settings.measure = Measure::exact;
-      const PlacedTree placed{knot.view(), {}, 1};
+      const PlacedAsset placed{knot.view(), {}, 1};
       const Penetration answer = penetration(placed, placed, settings, workspace);
       EXPECT_LE(answer.volume_min, knot.view().volume());
       EXPECT_GE(answer.volume_max, knot.view().volume());

@@ -124,13 +124,7 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
         batch.cut_for(most_pairs);
         return batch.run(rows, settings.measure, 0, settings.pair_budget);
       },
-      [to](const auto& found) {
-        write(found, to);
-        for (std::size_t i = 0; i < found.size(); ++i) {
-          put(to.force, i, Eigen::Vector3d(-found[i].translation_gradient));
-          put(to.torque, i, Eigen::Vector3d(-found[i].rotation_gradient));
-        }
-      });
+      [to](const auto& found) { write(found, to); });
 }
 
 void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,

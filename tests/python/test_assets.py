@@ -78,7 +78,7 @@ def test_a_bake_scales_each_axis_and_mirrors(factors, knot_mesh):
     made = ist.bake(given, max_spheres=50, scale=factors)
     assert made.to_bytes() == ist.bake(scaled, max_spheres=50).to_bytes()
     assert all(i.violations == 0 for i in ist.check(made, given, scale=factors))
-    assert ist.bake_surface(given, scale=factors).volume == made.volume
+    assert ist.bake_mesh_only(given, scale=factors).volume == made.volume
     assert ist.close_mesh(given, scale=factors).report.volume == pytest.approx(made.volume)
     with pytest.raises(ist.Error, match="another mesh"):
         ist.check(made, given)
@@ -115,39 +115,39 @@ def test_views_hold_their_owner_and_are_read_only(cube):
 
 def test_a_surface_alone_answers_no_query_of_spheres(cube):
     closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
-    alone = ist.bake_surface(closed)
+    alone = ist.bake_mesh_only(closed)
     assert (alone.sphere_count, alone.mesh_triangles, alone.mesh_state) == (0, 4, "own")
-    assert alone.mesh_error == 0 and alone.counted_twice == 0
+    assert alone.mesh_error == 0 and alone.self_overlap_volume == 0
     assert alone.volume == pytest.approx(1 / 6, abs=1e-15)
     assert all(one.violations == 0 for one in ist.check(alone, closed))
     assert len(alone.spheres()) == 0
-    vertices, triangles = alone.surface()
+    vertices, triangles = alone.mesh()
     facets = {tuple(sorted(map(tuple, vertices[t]))) for t in triangles}
     assert facets == {tuple(sorted(map(tuple, TETRAHEDRON[0][t]))) for t in TETRAHEDRON[1]}
     assert np.linalg.det(vertices[triangles]).sum() == pytest.approx(1)  # six times the volume
     again = ist.Asset.from_bytes(alone.to_bytes())
     one = [1, 0, 0, 0, 0, 0, 0]
-    with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
+    with pytest.raises(ist.Error, match="is a mesh alone, without spheres"):
         ist.penetration(again, cube, one)
-    with pytest.raises(ist.Error, match="is a surface alone, without spheres"):
+    with pytest.raises(ist.Error, match="is a mesh alone, without spheres"):
         ist.separation(again, cube, one, inner_spheres=True)
     found = ist.penetration(again, cube, [one])
-    assert found.status[0] == ist.QueryStatus.not_held and np.isnan(found.volume[0])
+    assert found.status[0] == ist.QueryStatus.missing_data and np.isnan(found.volume[0])
     assert np.isnan(ist.separation(cube, again, [one], inner_spheres=True).distance[0])
     assert ist.separation(cube, again, [1, 0, 0, 0, 3, 0, 0]).distance > 0  # of the meshes
 
 
-@pytest.mark.parametrize("surface, state", [("all", "own"), ("none", "none")])
-def test_surface_says_what_is_kept(surface, state):
+@pytest.mark.parametrize("keep_mesh, state", [(True, "own"), (False, "none")])
+def test_keep_mesh_says_what_is_kept(keep_mesh, state):
     closed = ist.close_mesh(ist.Mesh(*TETRAHEDRON))
-    assert ist.bake(closed, max_spheres=5, surface=surface).mesh_state == state
-    for wrong in ("some", 0.1, "1%"):
-        with pytest.raises(ist.Error, match=f"surface: '{wrong}' is not one of all, none"):
-            ist.bake(closed, max_spheres=5, surface=wrong)
+    assert ist.bake(closed, max_spheres=5, keep_mesh=keep_mesh).mesh_state == state
+    for wrong in ("some", 0.1):
+        with pytest.raises(TypeError, match="keep_mesh"):
+            ist.bake(closed, max_spheres=5, keep_mesh=wrong)
 
 
 def test_fields_hold_their_arrays(cube):
-    terrain = ist.HeightField(np.full((3, 3), 0.25, np.float32), spacing=(4, 4))
+    terrain = ist.HeightFieldShape(np.full((3, 3), 0.25, np.float32), spacing=(4, 4))
     gc.collect()
     assert ist.penetration(terrain, cube, [1, 0, 0, 0, 4, 4, 0.5]).volume > 0
 
@@ -346,11 +346,11 @@ def expect_same_columns(one, other):
 
 def test_shapes_and_meshes_pickle(cube):
     heights = np.random.default_rng(1).uniform(0, 1, (4, 5)).astype(np.float32)
-    inside = np.ones((3, 3, 3), np.float32)
-    for shape in (ist.HalfSpaceField([0, 0, 2], 0.5), ist.BoxField([1, 2, 3]), ist.BallField(2),
-                  ist.CapsuleField(1, 2), ist.CylinderField(1, 2),
-                  ist.HeightField(heights, spacing=(0.5, 0.5), lowest=0),
-                  ist.DistanceGridField(inside, origin=[-1, -1, -1], spacing=1.0)):
+    inside = np.full((3, 3, 3), -1, np.float32)
+    for shape in (ist.HalfSpaceShape([0, 0, 2], 0.5), ist.BoxShape([1, 2, 3]), ist.BallShape(2),
+                  ist.CapsuleShape(1, 2), ist.CylinderShape(1, 2),
+                  ist.HeightFieldShape(heights, spacing=(0.5, 0.5), lowest=0),
+                  ist.DistanceGridShape(inside, origin=[-1, -1, -1], spacing=1.0)):
         again = pickle.loads(pickle.dumps(shape))
         assert repr(again) == repr(shape)
         assert ist.penetration(again, cube, [1, 0, 0, 0, 0.2, 0.1, 0]).volume == ist.penetration(

@@ -16,7 +16,7 @@ def at(x):
 
 
 def test_pairs_and_their_numbers():
-    asset = ist.bake_surface(CUBE)
+    asset = ist.bake_mesh_only(CUBE)
     report = ist.clash([CUBE, asset, (CUBE.vertices, CUBE.triangles)], [at(0), at(0.75), at(1.75)],
                        names=["a", "b", "c"], tolerance=0.1)
     assert report["schema"] == "ist.clash/1" and report["parts"] == 3 and report["faults"] == []

@@ -133,8 +133,8 @@ def test_patches_are_written_where_they_are_wanted(solids, arguments):
 @pytest.fixture(scope="module")
 def some_fields():
     heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)
-    return [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
-            ist.HeightField(heights, lowest=-0.5, highest=0.5), ist.CapsuleField(0.5, 0.3)], heights
+    return [ist.HalfSpaceShape(), ist.BoxShape([1, 2, 0.5]), ist.BallShape(1),
+            ist.HeightFieldShape(heights, lowest=-0.5, highest=0.5), ist.CapsuleShape(0.5, 0.3)], heights
 
 
 @pytest.mark.parametrize("measure", ["matched", "inner"])
@@ -178,7 +178,7 @@ def test_what_cannot_be_answered_is_not_held(solids, some_fields):
 
 def test_wrong_solids_are_named(solids):
     with pytest.raises(ist.Error, match=r"GPU: solid 1 is an asset without spheres: bake it with"):
-        ist.Solids([solids[0], ist.bake_surface(ist.sample_mesh("cube"))], device="cuda")
+        ist.Solids([solids[0], ist.bake_mesh_only(ist.sample_mesh("cube"))], device="cuda")
 
 
 def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):

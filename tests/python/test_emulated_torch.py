@@ -83,7 +83,7 @@ def gradients(overlap, solids, poses, scales, **settings):
 
 @pytest.fixture
 def solids(gear, knot, cube):
-    return [gear, ist.HalfSpaceField(), knot, ist.BoxField([0.5, 0.7, 0.6]), cube, gear]
+    return [gear, ist.HalfSpaceShape(), knot, ist.BoxShape([0.5, 0.7, 0.6]), cube, gear]
 
 
 @pytest.mark.parametrize("pairs", [None, [(3, 0), (0, 2), (1, 4), (5, 0), (1, 2), (4, 2)], [(1, 0)], [(0, 1), (2, 0), (2, 3)],

@@ -552,8 +552,8 @@ def test_a_scale_of_each_axis_is_baked(tmp_path):
 
 
 def test_solids_that_no_measure_serves_collide_as_hulls(tmp_path, capfd):
-    ist.bake(ist.sample_mesh("cube"), max_spheres=100, surface="none").save(tmp_path / "spheres.ist")
-    ist.bake_surface(ist.sample_mesh("cube")).save(tmp_path / "mesh.ist")
+    ist.bake(ist.sample_mesh("cube"), max_spheres=100, keep_mesh=False).save(tmp_path / "spheres.ist")
+    ist.bake_mesh_only(ist.sample_mesh("cube")).save(tmp_path / "mesh.ist")
     ground = '<geom type="sdf" mesh="cube" pos="0 0 -.03"><plugin instance="j"/></geom>'
     spec = mujoco.MjSpec.from_string(CUBE.format(ground=ground, height=.0295).replace("<asset>", f"""<extension>
       <plugin plugin="ist.solid"><instance name="i"><config key="file" value="{tmp_path}/spheres.ist"/></instance>

@@ -13,7 +13,7 @@ def stub_of(name):
 
 STUB = stub_of("__init__.pyi")
 GPU_STUB = stub_of("gpu.pyi")
-ENUMS = (ist.QueryStatus, ist.Overlapping, ist.ImpactStatus)
+ENUMS = (ist.QueryStatus, ist.YesNo, ist.ImpactKind)
 
 
 def public(module):

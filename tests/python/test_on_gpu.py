@@ -135,9 +135,9 @@ def test_budgets_are_those_of_the_cpu(solids, assets, pairs):
 
 def test_fields_are_those_of_the_cpu(solids, pairs):
     heights = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 8)).astype(np.float32)
-    fields = [ist.HalfSpaceField(), ist.BoxField([1, 2, 0.5]), ist.BallField(1),
-              ist.CapsuleField(0.5, 0.3), ist.HeightField(heights, lowest=-0.5, highest=0.5),
-              ist.CylinderField(0.4, 0.6)]
+    fields = [ist.HalfSpaceShape(), ist.BoxShape([1, 2, 0.5]), ist.BallShape(1),
+              ist.CapsuleShape(0.5, 0.3), ist.HeightFieldShape(heights, lowest=-0.5, highest=0.5),
+              ist.CylinderShape(0.4, 0.6)]
     there = ist.Solids([*fields, *solids], device="cuda")
     arguments = pairs(3000)
     arguments["a"] = np.random.default_rng(4).integers(0, 6, 3000).astype(np.uint32)

@@ -31,7 +31,7 @@ def test_what_is_drawn_is_where_it_is(cube, knot_mesh):
     assert len(outline) == 0 and lines == []
     placed = 3 * knot_mesh.vertices * [-1, -1, 1] + [8, 0, 0]
     drawn = np.concatenate([box["vertices"], knot["vertices"]])
-    world = np.concatenate([cube.surface()[0], placed])
+    world = np.concatenate([cube.mesh()[0], placed])
     # The page has a middle and a unit of its own.
     unit = np.linalg.norm(world[0] - world[-1]) / np.linalg.norm(drawn[0] - drawn[-1])
     assert world - world[0] == pytest.approx(unit * (drawn - drawn[0]), abs=1e-5 * unit)
@@ -50,15 +50,15 @@ def test_overlaps_have_their_outline_and_volume(cube):
     found = ist.overlap_outline(cube, cube, half).segments
     assert len(outline) == len(found) > 0
     assert "iframe" in ist.plot(cube)._repr_html_()
-    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=300, surface="none")
+    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=300, keep_mesh=False)
     solids, outline, lines = scene_of(ist.plot([cube, bare], [apart, half]))
     assert len(outline) == 0 and lines[0].endswith(", by spheres")
     assert len(solids[1]["vertices"]) == 0 and len(solids[1]["spheres"]) == bare.sphere_count
-    surface = ist.bake_surface(ist.sample_mesh("cube"))
+    surface = ist.bake_mesh_only(ist.sample_mesh("cube"))
     solids, outline, lines = scene_of(ist.plot([cube, surface], [apart, half]))
     assert lines == ["overlap of 0 and 1: 0.28125 u³, exact"] and len(solids[1]["vertices"]) > 0
     solids, outline, lines = scene_of(ist.plot([bare, surface], [apart, half]))
-    assert len(outline) == 0 and "is a surface alone, without spheres" in lines[0]
+    assert len(outline) == 0 and "is a mesh alone, without spheres" in lines[0]
 
 
 def test_the_page_needs_no_other_file(cube, tmp_path):
@@ -80,7 +80,7 @@ def test_wrong_places_are_named(cube, poses, scales, error, text):
 
 
 def test_what_cannot_be_drawn_is_named(cube):
-    with pytest.raises(TypeError, match=r"solids\[1\]: a BallField; wanted an Asset"):
-        ist.plot([cube, ist.BallField(1)])
+    with pytest.raises(TypeError, match=r"solids\[1\]: a BallShape; wanted an Asset"):
+        ist.plot([cube, ist.BallShape(1)])
     with pytest.raises(ValueError, match="nothing to draw"):
         ist.plot([])

@@ -14,7 +14,7 @@ AWAY = [1, 0, 0, 0, 100, 0, 0]
 
 def test_boxes_overlap_by_their_volume(cube):
     side = cube.bounds().upper[0] - cube.bounds().lower[0]
-    floor = ist.HalfSpaceField(offset=cube.bounds().lower[2] + 0.25 * side)
+    floor = ist.HalfSpaceShape(offset=cube.bounds().lower[2] + 0.25 * side)
     found = ist.penetration(floor, cube, IDENTITY)
     assert found.volume == pytest.approx(0.25 * side**3, rel=0.02)
     assert found.force == pytest.approx([0, 0, side**2], rel=0.03, abs=0.05 * side**2)
@@ -33,8 +33,8 @@ def test_distances_up_to_a_limit(gear, knot, random_poses):
     assert np.array_equal(found.point_a[~farther], gaps.point_a[~farther])
     assert (found.status == ist.QueryStatus.ok).all()
     within = ist.overlap(gear, knot, poses, margin=limit * (1 + 1e-9))
-    assert np.array_equal(within == ist.Overlapping.yes, gaps.distance <= limit)
-    assert (within != ist.Overlapping.unknown).all()
+    assert np.array_equal(within == ist.YesNo.yes, gaps.distance <= limit)
+    assert (within != ist.YesNo.unknown).all()
     for call in (lambda: ist.separation(gear, knot, poses, max_distance=-1),
                  lambda: ist.overlap(gear, knot, poses, margin=float("nan"))):
         with pytest.raises(ValueError, match="wanted 0 or more"):
@@ -60,7 +60,7 @@ def test_a_batch_is_its_single_queries(gear, knot, random_poses):
         assert np.array_equal(ist.contact_patches(gear, knot, pose, max_patches=4).id,
                               contacts.id[i])
     assert (many.volume > 0).sum() > 30 and (gaps.distance > 0).any()
-    assert ((meet == ist.Overlapping.yes) <= (many.volume > 0)).all()
+    assert ((meet == ist.YesNo.yes) <= (many.volume > 0)).all()
     lone = contacts.penetration
     assert np.allclose(contacts.force.sum(axis=1), lone.force, atol=1e-9)
     assert np.array_equal(contacts.count > 0, lone.volume > 0)
@@ -132,8 +132,8 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(poses_a=np.zeros((4, 7))), ValueError, "poses_a: 4 rows"),
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(spheres_only="maybe"), TypeError, "spheres_only: a str; wanted True or False"),
-    (dict(a=3), TypeError, "a: a int; wanted an Asset or a Field"),
-    (dict(a=ist.BallField(2), b=ist.BallField(1)), TypeError, "a, b: two Fields"),
+    (dict(a=3), TypeError, "a: a int; wanted an Asset or a Shape"),
+    (dict(a=ist.BallShape(2), b=ist.BallShape(1)), TypeError, "a, b: two Fields"),
 ])
 def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
     with pytest.raises(error, match=text):
@@ -215,47 +215,47 @@ def test_fields_meet_assets(cube):
     centre = cube.mass_properties().centre_of_mass
     grid = np.linspace(-2 * side, 2 * side, 33)
     z, y, x = np.meshgrid(grid, grid, grid, indexing="ij")
-    ball = ist.DistanceGridField((side - np.sqrt(x**2 + y**2 + z**2)).astype(np.float32),
+    ball = ist.DistanceGridShape((np.sqrt(x**2 + y**2 + z**2) - side).astype(np.float32),
                                  origin=np.full(3, grid[0]), spacing=grid[1] - grid[0])
     pose = np.concatenate(([1, 0, 0, 0], -centre))
-    for field in (ist.HalfSpaceField(offset=side), ist.BoxField([side, side, side]),
-                  ist.BallField(side), ist.CapsuleField(side, side), ist.CylinderField(side, side),
+    for field in (ist.HalfSpaceShape(offset=side), ist.BoxShape([side, side, side]),
+                  ist.BallShape(side), ist.CapsuleShape(side, side), ist.CylinderShape(side, side),
                   ball):
         assert ist.penetration(field, cube, pose).volume == pytest.approx(cube.volume, rel=1e-2)
-        assert ist.overlap(field, cube, pose) == ist.Overlapping.yes
+        assert ist.overlap(field, cube, pose) == ist.YesNo.yes
     with pytest.raises(ValueError, match=r"half_extents: shape \(2,\); wanted \(3,\)"):
-        ist.BoxField([1, 2])
+        ist.BoxShape([1, 2])
     with pytest.raises(ValueError, match=r"heights: shape \(4,\); wanted \(rows, columns\)"):
-        ist.HeightField(np.zeros(4))
+        ist.HeightFieldShape(np.zeros(4))
     for refused, text in (
-            (lambda: ist.BallField(-1), "radius=-1.0; wanted > 0"),
-            (lambda: ist.BoxField([-1, 1, 1]), "half_extents="),
-            (lambda: ist.HalfSpaceField([0, 0, 0]), "normal="),
-            (lambda: ist.HalfSpaceField(offset=np.nan), "offset=nan"),
-            (lambda: ist.CapsuleField(1, -1), "half_height=-1.0"),
-            (lambda: ist.CylinderField(1, np.inf), "half_height=inf"),
-            (lambda: ist.HeightField(np.zeros((1, 1))), r"heights: shape \(1, 1\)"),
-            (lambda: ist.HeightField([[0, 1], [np.nan, 2]]), "heights: number 2 is nan, not finite"),
-            (lambda: ist.HeightField([[0, 1], [2, 3]], highest=2), "heights: number 3 is 3.0, not from"),
-            (lambda: ist.HeightField(np.zeros((2, 2)), spacing=(0, 1)), "spacing="),
-            (lambda: ist.DistanceGridField(np.full((2, 2, 2), np.inf), origin=(0, 0, 0), spacing=1),
+            (lambda: ist.BallShape(-1), "radius=-1.0; wanted > 0"),
+            (lambda: ist.BoxShape([-1, 1, 1]), "half_extents="),
+            (lambda: ist.HalfSpaceShape([0, 0, 0]), "normal="),
+            (lambda: ist.HalfSpaceShape(offset=np.nan), "offset=nan"),
+            (lambda: ist.CapsuleShape(1, -1), "half_height=-1.0"),
+            (lambda: ist.CylinderShape(1, np.inf), "half_height=inf"),
+            (lambda: ist.HeightFieldShape(np.zeros((1, 1))), r"heights: shape \(1, 1\)"),
+            (lambda: ist.HeightFieldShape([[0, 1], [np.nan, 2]]), "heights: number 2 is nan, not finite"),
+            (lambda: ist.HeightFieldShape([[0, 1], [2, 3]], highest=2), "heights: number 3 is 3.0, not from"),
+            (lambda: ist.HeightFieldShape(np.zeros((2, 2)), spacing=(0, 1)), "spacing="),
+            (lambda: ist.DistanceGridShape(np.full((2, 2, 2), np.inf), origin=(0, 0, 0), spacing=1),
              "distances: number 0 is inf"),
-            (lambda: ist.DistanceGridField(np.zeros((2, 2, 2)), origin=(0, 0, 0), spacing=-1), "spacing=-1")):
+            (lambda: ist.DistanceGridShape(np.zeros((2, 2, 2)), origin=(0, 0, 0), spacing=-1), "spacing=-1")):
         with pytest.raises(ValueError, match=text):
             refused()
-    assert repr(ist.BoxField([1, 2, 3])) == "ist.BoxField(half_extents=[1, 2, 3])"
+    assert repr(ist.BoxShape([1, 2, 3])) == "ist.BoxShape(half_extents=[1, 2, 3])"
 
 
 def test_normals_and_quaternions_of_any_length_are_normalised(cube):
     pose = np.array([0.5, 0.5, 0.5, 0.5, 0.1, 0.2, 0.3])
-    plane = ist.HalfSpaceField([0, 0, 1], 0.25)
+    plane = ist.HalfSpaceShape([0, 0, 1], 0.25)
     expected = ist.penetration(plane, cube, pose).volume
     assert expected > 0
     for length in (1e-100, 0.5, 2, 1e100):
         longer = pose * [length] * 7
         longer[4:] = pose[4:]
         assert ist.penetration(plane, cube, longer).volume == pytest.approx(expected, rel=1e-12)
-        other = ist.HalfSpaceField([0, 0, length], 0.25 * length)
+        other = ist.HalfSpaceShape([0, 0, length], 0.25 * length)
         assert ist.penetration(other, cube, pose).volume == pytest.approx(expected, rel=1e-12)
 
 
@@ -365,19 +365,19 @@ def test_answers_show_what_they_are(cube):
     many = ist.penetration(cube, cube, [IDENTITY, AWAY, [0] * 7])
     assert repr(many) == "<ist.Penetration of 3 rows: 2 ok, 1 invalid_input>"
     assert "2 ok" in repr(ist.contact_patches(cube, cube, [IDENTITY, AWAY]))
-    assert ist.overlap(cube, cube, AWAY) is ist.Overlapping.no
-    assert ist.time_of_impact(cube, cube, AWAY, AWAY).status is ist.ImpactStatus.no_impact
+    assert ist.overlap(cube, cube, AWAY) is ist.YesNo.no
+    assert ist.time_of_impact(cube, cube, AWAY, AWAY).kind is ist.ImpactKind.no_impact
     assert repr(cube).startswith("<ist.Asset: ") and "spheres" in cube._repr_html_()
 
 
 def test_pictures_and_corrections(cube, knot):
-    vertices, triangles = cube.surface()
+    vertices, triangles = cube.mesh()
     assert triangles.max() < len(vertices) and triangles.shape == (12, 3)
     corners = vertices[triangles]
     volume = np.einsum("ij,ij->", np.cross(corners[:, 0], corners[:, 1]), corners[:, 2]) / 6
     assert len(vertices) == 8 and volume == pytest.approx(cube.volume, rel=1e-12)
     with pytest.raises(ist.Error, match="holds no mesh"):
-        ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none").surface()
+        ist.bake(ist.sample_mesh("cube"), max_spheres=20, keep_mesh=False).mesh()
     side = cube.bounds().upper[0] - cube.bounds().lower[0]
     pose = [1, 0, 0, 0, 1.001 * side, 0, 0]
     whole = ist.penetration(cube, cube, pose, spheres_only=True)
@@ -390,22 +390,22 @@ def test_pictures_and_corrections(cube, knot):
     assert ist.without_protrusion(deep, cube, cube, IDENTITY).volume == deep.volume
     with pytest.raises(ValueError, match="whole: shape"):
         ist.without_protrusion(whole, cube, cube, [pose])
-    fit = ist.pair_fit(cube, cube)
-    assert fit.fits and fit.ratio == 1 and fit.grain_a == fit.grain_b > 0
-    unlike = ist.pair_fit(cube, cube, scale=100)
+    fit = ist.size_match(cube, cube)
+    assert fit.fits and fit.ratio == 1 and fit.feature_size_a == fit.feature_size_b > 0
+    unlike = ist.size_match(cube, cube, scale=100)
     assert unlike.needs_mesh and unlike.has_mesh and unlike.fits
     inside = [1, 0, 0, 0, 0, 0, 0]
     by_meshes, by_spheres = (ist.penetration(cube, cube, inside, scales=100, spheres_only=only).volume
                              for only in (False, True))
     assert by_meshes == pytest.approx(cube.volume, rel=1e-12) != pytest.approx(by_spheres, rel=1e-3)
     with pytest.raises(ValueError, match="scale: 0.0"):
-        ist.pair_fit(cube, cube, scale=0)
+        ist.size_match(cube, cube, scale=0)
 
 
 @pytest.fixture(scope="module")
 def thread():
     """(bolt, nut): surfaces alone."""
-    return [ist.bake_surface(ist.close_mesh(ist.sample_mesh(name), name=name))
+    return [ist.bake_mesh_only(ist.close_mesh(ist.sample_mesh(name), name=name))
             for name in ("bolt", "nut")]
 
 
@@ -484,12 +484,12 @@ def test_exact_gradients_are_differences(gear, knot, random_poses):
 def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
     bolt, nut = thread
     bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
-                    surface="none", device="cpu")
+                    keep_mesh=False, device="cpu")
     poses = random_poses(3, 1)
     for a, b, measure in ((bolt, nut, "matched"), (cube, bare, "exact"), (bare, cube, "exact"),
-                          (ist.BallField(1), cube, "exact")):
+                          (ist.BallShape(1), cube, "exact")):
         found = ist.penetration(a, b, poses, measure=measure, scale_gradients=True)
-        assert (found.status == ist.QueryStatus.not_held).all()
+        assert (found.status == ist.QueryStatus.missing_data).all()
         for name in ("volume", "volume_min", "volume_max", "force", "torque", "pose_gradient",
                      "pose_gradient_a", "scale_gradient", "scale_gradient_a"):
             assert np.isnan(getattr(found, name)).all(), name
@@ -501,11 +501,11 @@ def test_what_is_not_held_is_no_zero(thread, cube, random_poses):
             ("b: has no mesh, which measure='exact' needs",
              lambda: ist.penetration(cube, bare, pose, measure="exact")),
             ("a: has no mesh", lambda: ist.penetration(bare, cube, pose, measure="exact")),
-            ("a: a Field has no mesh",
-             lambda: ist.penetration(ist.BallField(1), cube, pose, measure="exact")),
-            ("b: is a surface alone", lambda: ist.penetration(bolt, nut, pose)),
-            ("b: is a surface alone", lambda: ist.contact_patches(cube, nut, pose)),
-            ("a: is a surface alone", lambda: ist.separation(nut, cube, pose, inner_spheres=True))):
+            ("a: a Shape has no mesh",
+             lambda: ist.penetration(ist.BallShape(1), cube, pose, measure="exact")),
+            ("b: is a mesh alone", lambda: ist.penetration(bolt, nut, pose)),
+            ("b: is a mesh alone", lambda: ist.contact_patches(cube, nut, pose)),
+            ("a: is a mesh alone", lambda: ist.separation(nut, cube, pose, inner_spheres=True))):
         with pytest.raises(ist.Error, match=text):
             ask()
 
@@ -519,23 +519,23 @@ def test_rays_and_points(cube):
     assert hits.distance == pytest.approx([half[0], 2 * half[1], half[2]], rel=1e-6)
     assert hits.normal == pytest.approx(np.array([[-1, 0, 0], [0, 1, 0], [0, 0, 1]]))
     assert ist.raycast(cube, None, origins[0], [-1, 0, 0]).distance == np.inf
-    assert ist.raycast(cube, None, origins[0], [1, 0, 0], longest=0.5 * half[0]).distance == np.inf
+    assert ist.raycast(cube, None, origins[0], [1, 0, 0], max_distance=0.5 * half[0]).distance == np.inf
     feet = ist.closest_point(cube, None, origins)
     assert feet.distance == pytest.approx([half[0], 2 * half[1], -half.min()], rel=1e-6)
     assert (ist.contains(cube, None, origins) == [0, 0, 1]).all()
     pose = [1, 0, 0, 0, 1, 2, 3]
     moved = ist.closest_point(cube, pose, origins[0] * 2 + [1, 2, 3], scale=2)
     assert moved.distance == pytest.approx(2 * half[0], rel=1e-6)
-    ball = ist.BallField(2)
+    ball = ist.BallShape(2)
     assert ist.raycast(ball, None, [0, 0, 5], [0, 0, -1]).distance == pytest.approx(3)
     assert ist.closest_point(ball, None, [0, 0, 5]).distance == pytest.approx(3)
     assert ist.contains(ball, None, [[0, 0, 1], [np.nan, 0, 0]]).tolist() == [1, 2]
-    with pytest.raises(ValueError, match="origins, directions, longest: not finite, of length 0"):
+    with pytest.raises(ValueError, match="origins, directions, max_distance: not finite, of length 0"):
         ist.raycast(cube, None, origins[0], [0, 0, 0])
     assert (ist.raycast(cube, None, origins, [0, 0, 0]).status == ist.QueryStatus.invalid_input).all()
     with pytest.raises(ValueError, match="origins: shape"):
         ist.raycast(cube, None, [1, 2], [1, 0, 0])
-    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, surface="none")
+    bare = ist.bake(ist.sample_mesh("cube"), max_spheres=20, keep_mesh=False)
     with pytest.raises(ist.Error, match="has no mesh"):
         ist.contains(bare, None, middle)
 
@@ -549,7 +549,7 @@ def test_outlines_are_closed_curves(thread, cube):
     assert whole.volume == ist.penetration(bolt, nut, pose, measure="exact").volume
     patches = ist.contact_patches(bolt, nut, pose, max_patches=16, measure="exact")  # divided
     assert patches.volume.sum() == pytest.approx(whole.volume, rel=1e-12) and patches.count > count > 0
-    again = np.cross(patches.point - pose[4:], patches.force) + patches.twist[:, None] * patches.normal
+    again = np.cross(patches.point - pose[4:], patches.force) + patches.torsion[:, None] * patches.normal
     assert again == pytest.approx(patches.torque, abs=1e-11)
     for patch in range(count):  # one segment begins where another ends
         begin, end = np.moveaxis(found.segments[found.patch == patch], 1, 0)
@@ -571,9 +571,9 @@ def test_outlines_are_closed_curves(thread, cube):
         ist.overlap_outline(bolt, nut, [np.nan, 0, 0, 0, 0, 0, 0])
 
     bare = ist.bake(ist.close_mesh(ist.sample_mesh("cube"), name="bare"), max_spheres=50,
-                    surface="none", device="cpu")
+                    keep_mesh=False, device="cpu")
     for text, a, b in (("b: has no mesh", cube, bare), ("a: has no mesh", bare, cube),
-                       ("a: a Field has no mesh", ist.BallField(1), cube)):
+                       ("a: a Shape has no mesh", ist.BallShape(1), cube)):
         with pytest.raises(ist.Error, match=text):
             ist.overlap_outline(a, b, IDENTITY)
     with pytest.raises(ValueError, match="poses: 2 rows; an outline is that of one pose"):
@@ -582,13 +582,14 @@ def test_outlines_are_closed_curves(thread, cube):
 
 def test_impacts_come_in_time(cube):
     side = cube.bounds().upper[0] - cube.bounds().lower[0]
-    wall = ist.HalfSpaceField(normal=(1, 0, 0), offset=0)  # x ≤ 0
+    wall = ist.HalfSpaceShape(normal=(1, 0, 0), offset=0)  # x ≤ 0
     start = np.tile([1, 0, 0, 0, 10 * side, 0, 0], (3, 1))
     end = start.copy()
     end[:, 4] = [-10 * side, 5 * side, np.nan]
     found = ist.time_of_impact(wall, cube, start, end, duration=2)
-    assert found.status.tolist() == [ist.ImpactStatus.impact, ist.ImpactStatus.no_impact,
-                                     ist.ImpactStatus.invalid_input]
+    assert found.kind.tolist() == [ist.ImpactKind.impact, ist.ImpactKind.no_impact,
+                                   ist.ImpactKind.no_impact]
+    assert found.status.tolist() == [0, 0, ist.QueryStatus.invalid_input]
     lower = cube.bounds().lower[0]
     assert found.time[0] == pytest.approx((10 * side + lower) / (10 * side), rel=1e-2)
     assert found.normal[0] == pytest.approx([1, 0, 0], abs=1e-6)
@@ -608,7 +609,7 @@ def test_limits_are_taken(gear, knot, random_poses):
 
 
 def test_a_field_may_be_either_solid(gear):
-    ball, pose = ist.BallField(5.0), np.array([0.9, 0.1, 0.2, -0.1, 0.3, 0.2, 0.5])
+    ball, pose = ist.BallShape(5.0), np.array([0.9, 0.1, 0.2, -0.1, 0.3, 0.2, 0.5])
     first = ist.penetration(ball, gear, IDENTITY, poses_a=pose)
     second = ist.penetration(gear, ball, pose, poses_a=IDENTITY)
     assert first.volume == second.volume > 0
@@ -619,18 +620,18 @@ def test_a_field_may_be_either_solid(gear):
 
 
 def test_constructors_name_the_argument():
-    for make, text in ((lambda: ist.BoxField(half=[1, 1, 1]),
-                        "BoxField(): there is no argument 'half'; it takes half_extents"),
-                       (lambda: ist.BallField("x"), "radius: a str; wanted a number"),
-                       (lambda: ist.BallField(1, 2), "BallField(): 2 arguments without a name"),
-                       (lambda: ist.HeightField([[1, 0], [0, 0]], [1, 1]), "all others by name"),
-                       (lambda: ist.DistanceGridField([[[0, 0], [0, 0]]] * 2, spacing=1),
+    for make, text in ((lambda: ist.BoxShape(half=[1, 1, 1]),
+                        "BoxShape(): there is no argument 'half'; it takes half_extents"),
+                       (lambda: ist.BallShape("x"), "radius: a str; wanted a number"),
+                       (lambda: ist.BallShape(1, 2), "BallShape(): 2 arguments without a name"),
+                       (lambda: ist.HeightFieldShape([[1, 0], [0, 0]], [1, 1]), "all others by name"),
+                       (lambda: ist.DistanceGridShape([[[0, 0], [0, 0]]] * 2, spacing=1),
                         "the argument 'origin' is missing"),
                        (lambda: ist.Mesh([]), "Mesh(): the argument 'triangles' is missing")):
         with pytest.raises(TypeError, match=re.escape(text)):
             make()
-    for make in (lambda: ist.HalfSpaceField([0, 0, 0]), lambda: ist.BoxField([-1, 1, 1]),
-                 lambda: ist.HeightField([[1.0]]), lambda: ist.HeightField([[1, float("nan")]] * 2)):
+    for make in (lambda: ist.HalfSpaceShape([0, 0, 0]), lambda: ist.BoxShape([-1, 1, 1]),
+                 lambda: ist.HeightFieldShape([[1.0]]), lambda: ist.HeightFieldShape([[1, float("nan")]] * 2)):
         with pytest.raises(ValueError):
             make()
 
@@ -645,7 +646,7 @@ def test_a_scene_asks_what_pairs_are_asked(gear, knot):
     scene.set_rule(measure="exact", margin=0.1 * side)
     for solid, pose in zip(solids, poses):
         scene.add(solid, pose)
-    floor = scene.add(ist.HalfSpaceField(offset=-side), number=40, moves=False, layers=2, meets=0)
+    floor = scene.add(ist.HalfSpaceShape(offset=-side), number=40, moves=False, layers=2, meets=0)
     assert floor == 40 and len(scene) == 13
     step = scene.step()
     assert len(step) > 3 and step.begins.all() and step.refused.size == 0
@@ -679,7 +680,7 @@ def test_a_recorded_scene_is_asked_again_to_the_same_bits(gear, knot):
     size = (gear.bounds().upper - gear.bounds().lower).max()
     for i, solid in enumerate((gear, knot, gear)):
         scene.add(solid, [1, 0.1 * i, 0, 0, 0.4 * i * size, 0, 0], number=10 - i)
-    scene.add(ist.HalfSpaceField(), moves=False, group=1)
+    scene.add(ist.HalfSpaceShape(), moves=False, group=1)
     scene.step()
     scene.step([[1, 0, 0.2, 0, 0.3 * size, 0, 0]], numbers=[9])
     record = scene.record()

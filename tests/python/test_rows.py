@@ -64,7 +64,7 @@ def alone(solids, arguments, i, query, **settings):
     (ist.penetration, dict(pair_budget=60), dict(volume=3, centroid=1, force=2, torque=3)),
     (ist.separation, {}, dict(distance=1, distance_min=1, distance_max=1)),
     (ist.contact_patches, dict(max_patches=4),
-     dict(count=0, id=0, volume=3, area=2, depth=1, centroid=1, normal=0, force=2, torque=3, point=1, twist=3)),
+     dict(count=0, id=0, volume=3, area=2, depth=1, centroid=1, normal=0, force=2, torque=3, point=1, torsion=3)),
 ])
 def test_rows_are_their_pairs(device, there, solids, arguments, query, settings, columns):
     if query is ist.separation:
@@ -81,7 +81,7 @@ def test_rows_are_their_pairs(device, there, solids, arguments, query, settings,
                 assert np.array_equal(ours, theirs), name
                 continue
             size = max(1.0, np.abs(theirs).max()) if power > 1 else 2.0
-            if name in ("point", "normal", "twist"):  # of contacts whose forces do not cancel
+            if name in ("point", "normal", "torsion"):  # of contacts whose forces do not cancel
                 ours, theirs = (x[one.area > 0.1 * one.volume ** (2 / 3)] for x in (ours, theirs))
             assert np.abs(np.subtract(ours, theirs, dtype=float)).max(initial=0) <= 1e-4 * size, name
     assert met > 20 and (back(found.status) == 0).all()
@@ -107,7 +107,7 @@ def test_one_index_serves_all_rows(device, there, solids, arguments):
 
 
 def test_a_row_spoils_only_itself(device, there, solids, arguments):
-    held = ist.Solids([*solids, ist.BallField(1.0), ist.HalfSpaceField()], device=device)
+    held = ist.Solids([*solids, ist.BallShape(1.0), ist.HalfSpaceShape()], device=device)
     arguments["poses"][3, 5] = np.nan
     arguments["scales_a"][7] = -1
     arguments["a"][11], arguments["b"][11] = 3, 4
@@ -119,8 +119,8 @@ def test_a_row_spoils_only_itself(device, there, solids, arguments):
 
 
 def test_solids_say_what_they_are(device, solids):
-    held = ist.Solids([*solids, ist.BallField(1.0)], device=device)
-    assert len(held) == 4 and held.fields == [3] and held.device == dict(cpu="cpu", cuda="cuda:0")[device]
+    held = ist.Solids([*solids, ist.BallShape(1.0)], device=device)
+    assert len(held) == 4 and held.shapes == [3] and held.device == dict(cpu="cpu", cuda="cuda:0")[device]
     assert (held.bytes > 0) == (device == "cuda")
     assert repr(held) == f"<ist.Solids of 4 on {held.device}>"
     assert len(list(held)) == 4
@@ -176,7 +176,7 @@ def test_both_solids_are_on_one_device(solids, arguments):
 
 def test_every_query_takes_unlike_rows(solids, arguments):
     """Those of the CPU alone, and shapes."""
-    held = ist.Solids([*solids, ist.HalfSpaceField()])
+    held = ist.Solids([*solids, ist.HalfSpaceShape()])
     arguments["a"][:6] = 3
     a, b, poses = (arguments.pop(name) for name in ("a", "b", "poses"))
     poses_to = poses[::-1]
@@ -184,8 +184,8 @@ def test_every_query_takes_unlike_rows(solids, arguments):
     meet = ist.overlap(held[a], held[b], poses, **by)
     times = ist.time_of_impact(held[a], held[b], poses, poses_to, **by)
     whole = ist.penetration(held[a], held[b], poses, spheres_only=True, scale_gradients=True, **by)
-    assert {0, 1} <= set(meet.tolist()) and len(set(times.status.tolist())) > 1
-    everything = [*solids, ist.HalfSpaceField()]
+    assert {0, 1} <= set(meet.tolist()) and len(set(times.kind.tolist())) > 1
+    everything = [*solids, ist.HalfSpaceShape()]
     for i in range(60):
         one = {name: x[i] for name, x in by.items()}
         pair = everything[a[i]], everything[b[i]], poses[i]
@@ -214,7 +214,7 @@ def test_wrong_solids_are_named(solids):
     for device in ("gpu", "cuda:x", "cuda:", 0):
         with pytest.raises(ValueError, match=f"device: '{device}'; one of 'cpu', 'cuda'"):
             ist.Solids(solids, device=device)
-    with pytest.raises(TypeError, match=r"solids\[1\]: a int; wanted an Asset or a Field"):
+    with pytest.raises(TypeError, match=r"solids\[1\]: a int; wanted an Asset or a Shape"):
         ist.Solids([solids[0], 3])
 
 
@@ -263,7 +263,7 @@ def test_answers_are_counted_and_indexed(cube):
 
 
 def test_solids_and_their_rows_pickle(cube):
-    solids = ist.Solids([cube, ist.BallField(.3)])
+    solids = ist.Solids([cube, ist.BallShape(.3)])
     first, second = pickle.loads(pickle.dumps((solids[0], solids[np.array([1, 0])])))
     poses = np.tile([1.0, 0, 0, 0, .4, 0, 0], (2, 1))
     found = ist.penetration(first, second, poses)
@@ -277,7 +277,7 @@ def test_meshes_and_reports_show_what_they_are():
     assert repr(mesh) == "<ist.Mesh of 8 vertices, 12 triangles>"
     assert repr(closed) == "<ist.ClosedMesh 'die' of 8 vertices, 12 triangles>"
     assert repr(closed.report).startswith("ist.MeshReport(vertices=8, triangles=12, components=1")
-    asset = ist.bake_surface(closed)
+    asset = ist.bake_mesh_only(closed)
     assert "volume=1" in repr(asset.mass_properties()) and "radius=" in repr(asset.bounds())
     with pytest.raises(TypeError, match=r"poses: a Asset; several solids are a list: plot\(\[a, b\]\)"):
         ist.plot(asset, asset)

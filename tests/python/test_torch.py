@@ -85,7 +85,7 @@ def test_exact_passes_autograds_own_check_tightly(gear, knot):
 
 def test_exact_of_a_field_is_nan(cube):
     poses = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0]] * 2, dtype=torch.float64, requires_grad=True)
-    volume = overlap([ist.HalfSpaceField(), cube], poses, measure="exact")
+    volume = overlap([ist.HalfSpaceShape(), cube], poses, measure="exact")
     assert torch.isnan(volume).all()
     volume.sum().backward()
     assert torch.isnan(poses.grad).any()
@@ -101,7 +101,7 @@ def test_scale_gradients_are_differences(gear, knot, cube, scenes):
 
 
 def test_fields_stand_first(cube):
-    floor = ist.HalfSpaceField()
+    floor = ist.HalfSpaceShape()
     poses = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [1.0, 0, 0, 0, 0, 0, 0]], dtype=torch.float64,
                          requires_grad=True)
     volume = overlap([floor, cube], poses)
@@ -198,7 +198,7 @@ def test_distances_of_what_overlaps_or_is_no_number(cube):
     found = separation([cube, cube, cube], poses)
     assert found[0] == 0 and found[1:].isnan().all()
     assert torch.autograd.grad(separation([cube, cube], poses[:2]).sum(), poses)[0].abs().max() == 0
-    floor = ist.HalfSpaceField([0, 0, 1])
+    floor = ist.HalfSpaceShape([0, 0, 1])
     high = torch.tensor([[1.0, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 0, 2]], requires_grad=True)
     gap = separation([floor, cube], high)
     assert gap.item() == pytest.approx(1.5)

@@ -49,7 +49,7 @@ def test_overlaps_are_those_of_the_cpu(solids, random_poses):
 
 def test_fields_stand_first(solids, random_poses):
     poses = torch.from_numpy(random_poses(500, 0.8).reshape(100, 5, 7))
-    solids = [solids[0], ist.HalfSpaceField(), solids[1], ist.BoxField([0.5, 0.7, 0.6]), solids[2]]
+    solids = [solids[0], ist.HalfSpaceShape(), solids[1], ist.BoxShape([0.5, 0.7, 0.6]), solids[2]]
     scales = torch.linspace(0.7, 1.3, 500, dtype=torch.float64).reshape(100, 5)
     for s in (None, scales):
         ours = gradients(solids, poses.clone(), s, "cuda")

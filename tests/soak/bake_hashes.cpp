@@ -7,7 +7,7 @@
 #include <xxhash.h>
 
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <chrono>
 #include <cinttypes>

@@ -144,7 +144,7 @@ class Chunk {
   void move() {
     struct Moving {
       const TestSolid *a, *b;
-      PlacedTree at_a, at_b;
+      PlacedAsset at_a, at_b;
       Point velocity = Point::Zero(), spin = Point::Zero();
       bool carried = false;
     };
@@ -167,7 +167,7 @@ class Chunk {
       if (one_in(60)) one_in(2) ? align(*m.a, *m.b, m.at_a, m.at_b) : scatter(m.at_a, m.at_b);
       const Eigen::Quaterniond turn(Eigen::AngleAxisd(
           m.spin.norm(), m.spin.norm() > 0 ? Point(m.spin.normalized()) : Point(Point::UnitX())));
-      const auto step = [&](PlacedTree& placed, const Point& velocity) {
+      const auto step = [&](PlacedAsset& placed, const Point& velocity) {
         const double *q = placed.pose.q, *t = placed.pose.t;
         set(placed.pose, turn * Eigen::Quaterniond(q[0], q[1], q[2], q[3]),
             Point(t[0], t[1], t[2]) + velocity);
@@ -182,7 +182,7 @@ class Chunk {
   void run(bool degenerate) {
     for (std::size_t i = 0; i < kChunk; ++i) {
       const TestSolid &a = pick(), &b = degenerate && one_in(2) ? a : pick();
-      PlacedTree at_a{a.asset.view(), {}, 1}, at_b{b.asset.view(), {}, 1};
+      PlacedAsset at_a{a.asset.view(), {}, 1}, at_b{b.asset.view(), {}, 1};
       degenerate ? align(a, b, at_a, at_b) : scatter(at_a, at_b);
       look_at(at_a, at_b);
       if (degenerate) look_at_known(a, at_a);
@@ -200,7 +200,7 @@ class Chunk {
   }
 
   /// Anywhere that they may meet, at any scale.
-  void scatter(PlacedTree& a, PlacedTree& b) {
+  void scatter(PlacedAsset& a, PlacedAsset& b) {
     b.scale = std::pow(10, one_in(4) ? uniform(-4, 1) : uniform(-0.3, 0.3)) * testing::size_of(a) /
               testing::size_of(b);
     const double reach = (testing::size_of(a) + testing::size_of(b)) / 2;
@@ -212,7 +212,7 @@ class Chunk {
 
   /// Faces, edges and corners in common, or next to that: by turns of a cube, or by parts of a
   /// whole turn, and by differences of vertices and parts of them.
-  void align(const TestSolid& a, const TestSolid& b, PlacedTree& at_a, PlacedTree& at_b) {
+  void align(const TestSolid& a, const TestSolid& b, PlacedAsset& at_a, PlacedAsset& at_b) {
     const auto vertex = [&](const TestSolid& of) {
       return of.vertices[random_() % of.vertices.size()];
     };
@@ -240,7 +240,7 @@ class Chunk {
     }
   }
 
-  void look_at(const PlacedTree& a, const PlacedTree& b) {
+  void look_at(const PlacedAsset& a, const PlacedAsset& b) {
     const Penetration p = testing::exactly(a, b, workspace_);
     const testing::ExactCheck check = testing::check_exactly(a, b, workspace_);
     const bool finished = p.status == QueryStatus::ok && check.complete;
@@ -252,11 +252,11 @@ class Chunk {
     ++(check.crossings > 0 ? tally_.crossing : p.volume > 0 ? tally_.contained : tally_.apart);
     tally_.unfinished += !finished;
     tally_.inconsistent += !check.consistent;
-    tally_.not_numbers += !(std::isfinite(p.volume_min) && std::isfinite(p.volume_max) &&
-                            p.centroid.allFinite() && p.translation_gradient.allFinite() &&
-                            p.rotation_gradient.allFinite() && std::isfinite(gap));
-    const auto whole = [](const PlacedTree& placed) {
-      return placed.tree.volume() * std::pow(placed.scale, 3);
+    tally_.not_numbers +=
+        !(std::isfinite(p.volume_min) && std::isfinite(p.volume_max) && p.centroid.allFinite() &&
+          p.force.allFinite() && p.torque.allFinite() && std::isfinite(gap));
+    const auto whole = [](const PlacedAsset& placed) {
+      return placed.asset.volume() * std::pow(placed.scale, 3);
     };
     tally_.disordered +=
         !(0 <= p.volume_min && p.volume_min <= p.volume && p.volume <= p.volume_max &&
@@ -272,7 +272,7 @@ class Chunk {
       show(a, b, p, q, check);
   }
 
-  void compare(const PlacedTree& a, const PlacedTree& b, std::uint32_t id) {
+  void compare(const PlacedAsset& a, const PlacedAsset& b, std::uint32_t id) {
     PenetrationSettings settings;
     settings.measure = Measure::exact;
     std::uint64_t bits[2];
@@ -306,7 +306,7 @@ class Chunk {
   }
 
   /// A solid on itself, in any place and turn of both: its own volume.
-  void look_at_known(const TestSolid& a, PlacedTree at_a) {
+  void look_at_known(const TestSolid& a, PlacedAsset at_a) {
     if (!one_in(4)) return;
     const Penetration p = testing::exactly(at_a, at_a, workspace_);
     const double truth = a.asset.view().volume();
@@ -315,16 +315,16 @@ class Chunk {
     show(at_a, at_a, p, p, {});
   }
 
-  void show(const PlacedTree& a, const PlacedTree& b, const Penetration& p, const Penetration& q,
+  void show(const PlacedAsset& a, const PlacedAsset& b, const Penetration& p, const Penetration& q,
             const testing::ExactCheck& check) {
-    const auto number = [&](const PlacedTree& placed) {
+    const auto number = [&](const PlacedAsset& placed) {
       const auto found = std::find_if(solids_.begin(), solids_.end(), [&](const TestSolid& solid) {
-        return &solid.asset.view().header() == &placed.tree.header();
+        return &solid.asset.view().header() == &placed.asset.header();
       });
       return static_cast<int>(found - solids_.begin());
     };
     std::fprintf(stderr, "solids %d, %d:", number(a), number(b));
-    for (const PlacedTree* placed : {&a, &b}) {
+    for (const PlacedAsset* placed : {&a, &b}) {
       for (const double x : placed->pose.q) std::fprintf(stderr, " %.17g", x);
       for (const double x : placed->pose.t) std::fprintf(stderr, " %.17g", x);
       std::fprintf(stderr, " %.17g;", placed->scale);

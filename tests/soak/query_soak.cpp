@@ -101,8 +101,8 @@ class Chunk {
     return std::uniform_real_distribution<double>(from, to)(random_);
   }
 
-  PlacedTree placed(const Asset& asset) {
-    PlacedTree tree{asset.view(), {}, 1};
+  PlacedAsset placed(const Asset& asset) {
+    PlacedAsset tree{asset.view(), {}, 1};
     if (one_in(16)) tree.scale = std::pow(10, uniform(-3, 3));
     if (!one_in(64)) tree.pose = testing::random_pose(random_, uniform(0, 3));  // else coincident
     if (one_in(512)) tree.pose.t[random_() % 3] = std::numeric_limits<double>::quiet_NaN();
@@ -124,8 +124,8 @@ class Chunk {
   void ask() {
     const std::size_t which_a = random_() % assets_.size();
     const std::size_t which_b = random_() % assets_.size();
-    const PlacedTree a = placed(assets_[which_a]);
-    PlacedTree b = placed(assets_[which_b]);
+    const PlacedAsset a = placed(assets_[which_a]);
+    PlacedAsset b = placed(assets_[which_b]);
     if (one_in(64)) {  // a copy, all but at the same place
       b = a;
       b.pose.t[random_() % 3] += std::pow(10, uniform(-9, 0));
@@ -182,8 +182,7 @@ class Chunk {
       return;
     }
     if (!std::isfinite(p.volume) || !std::isfinite(p.volume_min) || !std::isfinite(p.volume_max) ||
-        !p.centroid.allFinite() || !p.translation_gradient.allFinite() ||
-        !p.rotation_gradient.allFinite())
+        !p.centroid.allFinite() || !p.force.allFinite() || !p.torque.allFinite())
       ++tally.not_numbers;
     if (!(0 <= p.volume_min && p.volume_min <= p.volume && p.volume <= p.volume_max))
       ++tally.disordered;
@@ -219,7 +218,7 @@ class Chunk {
       ++worker_.tally.patches_lost;
   }
 
-  void look_at_finished(const Penetration& stopped, const PlacedTree& a, const PlacedTree& b,
+  void look_at_finished(const Penetration& stopped, const PlacedAsset& a, const PlacedAsset& b,
                         PenetrationSettings settings) {
     settings.max_visits = 0;
     const Penetration finished = penetration(a, b, settings, worker_.large);

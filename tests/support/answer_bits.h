@@ -19,9 +19,9 @@ class AnswerBits {
   void add(const Eigen::Vector3d& x) { XXH3_64bits_update(&state_, x.data(), 3 * sizeof(double)); }
   void add(const Penetration& p) {
     for (const double x : {p.volume, p.volume_min, p.volume_max}) add(x);
-    for (const Eigen::Vector3d* const x :
-         {&p.centroid, &p.translation_gradient, &p.rotation_gradient})
-      add(*x);
+    add(p.centroid);
+    // Hashes are of the volume's gradients, which have the other sign.
+    for (const Eigen::Vector3d* const x : {&p.force, &p.torque}) add(Eigen::Vector3d(-*x));
     add(std::uint64_t{p.node_visits} << 32 | p.sphere_pairs);
     add(static_cast<std::uint64_t>(p.status));
   }
@@ -35,7 +35,10 @@ class AnswerBits {
     for (const double x : {t.time, t.distance_min, t.distance_max}) add(x);
     for (const Eigen::Vector3d* const x : {&t.point_a, &t.point_b, &t.normal}) add(*x);
     add(std::uint64_t{t.node_visits} << 32 | t.surface_pairs);
-    add(static_cast<std::uint64_t>(t.status));
+    // The table of hashes has one number for both.
+    constexpr std::uint64_t kStatus[] = {0, 4, 5, 6};
+    add(t.status == QueryStatus::ok ? static_cast<std::uint64_t>(t.kind)
+                                    : kStatus[static_cast<std::uint32_t>(t.status)]);
   }
   void add(const ContactPatch& patch) {
     add(patch.id);

@@ -58,8 +58,8 @@ class AlignedBytes {
   std::byte& operator[](std::size_t i) { return data_[i]; }
   std::span<const std::byte> span() const { return {data_, size_}; }
   AssetStatus status() const {
-    TreeView view;
-    const AssetStatus status = TreeView::from_bytes(span(), view);
+    AssetView view;
+    const AssetStatus status = AssetView::from_bytes(span(), view);
     if (view.empty() != (status != AssetStatus::ok))
       throw std::logic_error("a view that does not fit its status");
     return status;

@@ -14,10 +14,11 @@ inline PackingSettings of_size(std::size_t spheres, unsigned threads = 0) {
   return settings;
 }
 
-/// `surface`: whether the asset holds its surface.
-inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres, bool surface = true) {
+/// `keep_mesh`: whether the asset holds its mesh.
+inline Asset baked(TriangleMesh mesh, const char* name, std::size_t spheres,
+                   bool keep_mesh = true) {
   PackingSettings settings = of_size(spheres);
-  settings.keep_mesh = surface;
+  settings.keep_mesh = keep_mesh;
   return bake(close_mesh(std::move(mesh), name), settings);
 }
 

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include <ist/gpu_query.h>
-#include <ist/pose.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 namespace ist::testing {
 
@@ -80,8 +80,8 @@ struct BatchColumns {
       out[i].volume_min = least[i];
       out[i].volume_max = most[i];
       out[i].centroid = vector(centroid, i);
-      out[i].translation_gradient = vector(push, i);
-      out[i].rotation_gradient = vector(turn, i);
+      out[i].force = vector(push, i);
+      out[i].torque = vector(turn, i);
       out[i].status = status[i];
       out[i].node_visits = visits[i];
       out[i].sphere_pairs = spheres[i];

@@ -23,7 +23,7 @@
 #include <vector>
 
 #include <ist/mesh.h>
-#include <ist/pose.h>
+#include <ist/types.h>
 
 #include "support/mesh_contacts.h"
 

@@ -23,9 +23,9 @@ inline btTransform at_place(const btVector3& place) {
 }
 
 /// A cube of side 1 about the origin.
-inline const TreeView& cube() {
+inline const AssetView& cube() {
   static const Asset asset = baked(cube_mesh(), "cube", 4000);
-  static const TreeView view = asset.view();
+  static const AssetView view = asset.view();
   return view;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include <cstring>
 

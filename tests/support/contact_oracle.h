@@ -59,7 +59,7 @@ struct Body {
     protrusion = scale * std::ldexp(header.protrusion, header.exponent);
   }
 
-  PlacedTree at(const Pose& pose) const { return {asset->view(), pose, scale}; }
+  PlacedAsset at(const Pose& pose) const { return {asset->view(), pose, scale}; }
   double volume() const { return asset->view().volume() * std::pow(scale, 3); }
   /// [u] of a ball with the mean volume of the matched spheres
   double leaf_radius() const {
@@ -141,7 +141,7 @@ class ContactJudge {
  public:
   ContactVerdict judge(const ContactCase& c) {
     const Body &a = *c.a, &b = *c.b;
-    const PlacedTree place_a = a.at({}), place_b = b.at(c.pose_b);
+    const PlacedAsset place_a = a.at({}), place_b = b.at(c.pose_b);
     const Penetration inner =
         penetration(place_a, place_b, {.measure = Measure::inner}, workspace_);
     const Penetration matched = penetration(place_a, place_b, {}, workspace_);
@@ -180,7 +180,7 @@ class ContactJudge {
   ForceAngles angles(const ContactCase& c) {
     const Penetration found = penetration(c.a->at({}), c.b->at(c.pose_b), {}, workspace_);
     return {
-        degrees_between(-found.translation_gradient, c.exit),
+        degrees_between(found.force, c.exit),
         degrees_between(fcl_contacts(c.a->fcl, {}, c.b->fcl, c.pose_b).push_b, c.exit),
         degrees_between(bullet_.contacts(c.a->bullet, {}, c.b->bullet, c.pose_b).push_b, c.exit),
         found};
@@ -208,7 +208,7 @@ inline ContactCase case_of(const OracleRow& row, Model& a, Model& b) {
   c.pose_b = row.pose;
   c.held = row.volume > 0 && row.surface_distance > 0;
   c.surface_distance = row.surface_distance;
-  if (c.cross()) c.exit = -row.translation_gradient.normalized();
+  if (c.cross()) c.exit = row.force.normalized();
   return c;
 }
 

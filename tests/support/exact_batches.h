@@ -68,8 +68,8 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
   Workspace workspace;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const BatchPair& pair = pairs[i];
-    const PlacedTree a = {assets[pair.a].view(), pair.pose_a, pair.scale_a};
-    const PlacedTree b = {assets[pair.b].view(), pair.pose_b, pair.scale_b};
+    const PlacedAsset a = {assets[pair.a].view(), pair.pose_a, pair.scale_a};
+    const PlacedAsset b = {assets[pair.b].view(), pair.pose_b, pair.scale_b};
     const Penetration cpu = exactly(a, b, workspace), &gpu = answers[i];
     EXPECT_EQ(gpu.status, cpu.status) << i;
     if (gpu.status != QueryStatus::ok) continue;
@@ -78,9 +78,9 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
     worst.met += cpu.volume > 0 ? 1 : 0;
     worst.volume = std::max(worst.volume, std::abs(gpu.volume - cpu.volume) / (size2 * size));
     worst.push =
-        std::max(worst.push, (gpu.translation_gradient - cpu.translation_gradient).norm() / size2);
+        std::max(worst.push, (gpu.force - cpu.force).norm() / size2);
     worst.turn = std::max(worst.turn,
-                          (gpu.rotation_gradient - cpu.rotation_gradient).norm() / (size2 * most));
+                          (gpu.torque - cpu.torque).norm() / (size2 * most));
     if (cpu.volume > 1e-6 * size2 * size)
       worst.centre = std::max(worst.centre, (gpu.centroid - cpu.centroid).norm() / size);
     EXPECT_LE(gpu.volume_min, cpu.volume_max) << i;

@@ -16,10 +16,10 @@
 namespace ist::testing {
 
 inline Asset surface(TriangleMesh mesh, const char* name = "mesh") {
-  return bake_surface(close_mesh(std::move(mesh), name), 1);
+  return bake_mesh_only(close_mesh(std::move(mesh), name), 1);
 }
 
-inline Penetration exactly(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) {
+inline Penetration exactly(const PlacedAsset& a, const PlacedAsset& b, Workspace& workspace) {
   PenetrationSettings settings;
   settings.measure = Measure::exact;
   return penetration(a, b, settings, workspace);
@@ -40,8 +40,8 @@ struct ExactCheck {
 inline double gap_bound(const ExactCheck& check) { return 2e-17 * (100 + check.crossings); }
 
 /// No two points of a placed solid are further apart.
-inline double size_of(const PlacedTree& placed) {
-  return 2 * placed.scale * placed.tree.header().ball_radius;
+inline double size_of(const PlacedAsset& placed) {
+  return 2 * placed.scale * placed.asset.header().ball_radius;
 }
 
 /// A query that also reports how far the surface of its overlap is from closed.
@@ -82,10 +82,10 @@ class GapQuery : public ExactQuery {
   }
 };
 
-inline ExactCheck check_exactly(const PlacedTree& a, const PlacedTree& b, Workspace& workspace) {
+inline ExactCheck check_exactly(const PlacedAsset& a, const PlacedAsset& b, Workspace& workspace) {
   const std::optional<RelativePose> pose = relative_pose(a, b);
-  const auto mesh = [](const PlacedTree& placed) {
-    const AssetHeader& asset = placed.tree.header();
+  const auto mesh = [](const PlacedAsset& placed) {
+    const AssetHeader& asset = placed.asset.header();
     return MeshTree(asset, *at<MeshHeader>(asset, asset.mesh));
   };
   const MeshTree mesh_a = mesh(a), mesh_b = mesh(b);

@@ -101,8 +101,8 @@ class Boxes {
     const OrientedBox b{shift, size_b_ / size_a_ * kHalfB, q.toRotationMatrix()};
     return overlap_volume(a, b) * std::pow(size_a_, 3);
   }
-  PlacedTree a() const { return {a_.view(), {}, 1}; }
-  PlacedTree b(const Pose& pose) const { return {b_.view(), pose, 1}; }
+  PlacedAsset a() const { return {a_.view(), {}, 1}; }
+  PlacedAsset b(const Pose& pose) const { return {b_.view(), pose, 1}; }
   double volume_b() const { return b_.view().volume(); }
 
   Claim soundness() const {

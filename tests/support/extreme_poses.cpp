@@ -9,13 +9,12 @@ namespace {
 /// How far answers lie from the double sum over all pairs of spheres.
 class SumErrors {
  public:
-  void add(const PlacedTree& a, const PlacedTree& b) {
+  void add(const PlacedAsset& a, const PlacedAsset& b) {
     const ReferenceSum sum = reference_sum(a, b, Measure::matched);
     const Penetration got = penetration(a, b, {.spheres_only = true}, workspace_);
     if (got.status != QueryStatus::ok) volume_.add(kNoPromise);
     volume_.add(sum.volume > 0 ? std::abs(got.volume / sum.volume - 1) : got.volume);
-    if (sum.force_scale > 0)
-      force_.add((got.translation_gradient - sum.translation_gradient).norm() / sum.force_scale);
+    if (sum.force_scale > 0) force_.add((got.force - sum.force).norm() / sum.force_scale);
   }
   void append_to(std::vector<Claim>& claims) const {
     claims.push_back({"volume error against the double sum over all pairs", volume_.value(), 1e-5});
@@ -78,7 +77,7 @@ std::vector<Claim> of_touching_faces() {
       const Eigen::Quaterniond q(
           Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vector3d::UnitX()));
       const Pose pose{{q.w(), q.x(), q.y(), q.z()}, {1, shift, 0}};
-      const PlacedTree a{cube.view(), {}, 1}, b{cube.view(), pose, 1};
+      const PlacedAsset a{cube.view(), {}, 1}, b{cube.view(), pose, 1};
       inner.add(penetration(a, b, {.measure = Measure::inner}, workspace).volume);
       matched.add(penetration(a, b, {}, workspace).volume);
       const Separation gap = separation(a, b, {}, workspace);
@@ -96,12 +95,12 @@ std::vector<Claim> of_coincident_copies() {
   Worst high, force, distance;
   for (const char* const name : {"cube", "gear", "bolt"}) {
     const Asset asset = baked(close_mesh(make_sample(name), name), 4000);
-    const PlacedTree a{asset.view(), {}, 1};
+    const PlacedAsset a{asset.view(), {}, 1};
     const Penetration got = penetration(a, a, {}, workspace);
     const double area = std::pow(asset.view().volume(), 2.0 / 3);
     if (got.status != QueryStatus::ok || !got.centroid.allFinite()) high.add(kNoPromise);
     high.add(std::abs(got.volume / asset.view().volume() - 1));
-    force.add(got.translation_gradient.norm() / area);
+    force.add(got.force.norm() / area);
     distance.add(separation(a, a, {}, workspace).distance_max);
   }
   return {{"volume against the solid's own (cube, gear, bolt; 4,000 spheres)", high.value(), 0.1},
@@ -123,7 +122,7 @@ std::vector<Claim> of_half_turns() {
           Eigen::Quaterniond(0, 0, 0, -1), Eigen::Quaterniond(0, s, s, 0),
           Eigen::Quaterniond(-0.0, s, 0, -s)}) {
       const Vector3d shift(uniform(random), uniform(random), uniform(random));
-      const PlacedTree b = boxes.b(boxes.pose(q, shift));
+      const PlacedAsset b = boxes.b(boxes.pose(q, shift));
       sums.add(boxes.a(), b);
       errors.push_back(
           std::abs(penetration(boxes.a(), b, {}, workspace).volume / boxes.exact(q, shift) - 1));
@@ -146,8 +145,7 @@ std::vector<Claim> of_loose_quaternions() {
     const Penetration want = penetration(boxes.a(), boxes.b(sound), {}, workspace);
     const Penetration got = penetration(boxes.a(), boxes.b(loose), {}, workspace);
     difference.add(std::abs(got.volume / want.volume - 1));
-    force.add((got.translation_gradient - want.translation_gradient).norm() /
-              want.translation_gradient.norm());
+    force.add((got.force - want.force).norm() / want.force.norm());
   }
   return {{"change of volume", difference.value(), 1e-6}, {"change of force", force.value(), 1e-5}};
 }
@@ -166,12 +164,11 @@ std::vector<Claim> of_uniform_scales() {
       for (const double s : {1e-6, 1e-3, 0.3, 7.0, 1e3, 1e6}) {
         Pose scaled = pose;
         for (double& t : scaled.t) t *= s;
-        const PlacedTree a{boxes.a_.view(), {}, s}, b{boxes.b_.view(), scaled, s};
+        const PlacedAsset a{boxes.a_.view(), {}, s}, b{boxes.b_.view(), scaled, s};
         const Penetration got = penetration(a, b, {}, workspace);
         if (want.volume > 0) {
           volume.add(std::abs(got.volume / (want.volume * s * s * s) - 1));
-          force.add((got.translation_gradient / (s * s) - want.translation_gradient).norm() /
-                    want.translation_gradient.norm());
+          force.add((got.force / (s * s) - want.force).norm() / want.force.norm());
         } else {
           volume.add(got.volume);
         }

@@ -1,4 +1,4 @@
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "support/extreme_boxes.h"
 

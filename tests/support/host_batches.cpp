@@ -225,7 +225,7 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                    to.force.data(),
                    to.torque.data(),
                    to.point.data(),
-                   to.twist.data()};
+                   to.torsion.data()};
   batch.rooms = room.data();
   batch.most_bins = solids_.most_bins();
   const auto memory = std::make_unique<gpu::PatchMemory>();

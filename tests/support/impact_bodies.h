@@ -66,9 +66,9 @@ inline Motion straight(const Vector3d& velocity) {
 }
 
 /// The corners of all triangles of an asset's mesh at a pose, three in a row.
-inline std::vector<Vector3d> corners(const PlacedTree& placed) {
-  const ImpactSide side(placed.tree);
-  const AssetHeader& header = placed.tree.header();
+inline std::vector<Vector3d> corners(const PlacedAsset& placed) {
+  const ImpactSide side(placed.asset);
+  const AssetHeader& header = placed.asset.header();
   const Eigen::Isometry3d to_world = to_isometry(placed.pose);
   std::vector<Vector3d> all;
   for (std::uint32_t block = 0; block < side.mesh()->count; ++block) {

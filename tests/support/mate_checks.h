@@ -149,7 +149,7 @@ class MateChecks {
     // Where turns round the places of faces, a face along the side that is taken may lie either
     // way.
     if (apart_everywhere(t) && turns_exactly())
-      need((p.translation_gradient + q.translation_gradient).norm() <= 1e-11 * faces,
+      need((p.force + q.force).norm() <= 1e-11 * faces,
            "gradients that change when A and B are exchanged");
     need(p.touching == q.touching, "touching that changes when A and B are exchanged");
     if (truth.volume > room) need(!p.touching && p.contact_area == 0, "touching inside each other");
@@ -206,7 +206,7 @@ class MateChecks {
   void show(const char* what, double aside, const Penetration& p, const Penetration& q,
             const ExactCheck& check, const InCommon& truth) const {
     std::fprintf(stderr, "%s: %s\n ", what, name(aside).c_str());
-    for (const PlacedTree* placed : {&placed_b_, &placed_a_}) {
+    for (const PlacedAsset* placed : {&placed_b_, &placed_a_}) {
       for (const double x : placed->pose.q) std::fprintf(stderr, " %.17g", x);
       for (const double x : placed->pose.t) std::fprintf(stderr, " %.17g", x);
       std::fprintf(stderr, ";");
@@ -217,9 +217,8 @@ class MateChecks {
                  "gradients %g %g %g; %g %g %g\n",
                  static_cast<int>(p.status), check.consistent, check.crossings, check.gap, p.volume,
                  p.volume_min, p.volume_max, q.volume, truth.volume, p.touching, q.touching,
-                 p.contact_area, q.contact_area, truth.area, p.translation_gradient[0],
-                 p.translation_gradient[1], p.translation_gradient[2], q.translation_gradient[0],
-                 q.translation_gradient[1], q.translation_gradient[2]);
+                 p.contact_area, q.contact_area, truth.area, p.force[0], p.force[1], p.force[2],
+                 q.force[0], q.force[1], q.force[2]);
   }
 
   RandomMates mates_;
@@ -236,7 +235,7 @@ class MateChecks {
   double smaller_ = 0;
   Pose world_;
   bool exact_ = true;  ///< A lies at the origin, and B as the mate says
-  PlacedTree placed_a_, placed_b_;
+  PlacedAsset placed_a_, placed_b_;
   Workspace workspace_;
 };
 

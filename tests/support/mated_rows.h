@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/pose.h>
+#include <ist/types.h>
 
 #include "support/oracle_rows.h"
 

@@ -122,8 +122,7 @@ NutRun run_nut(const MassProperties& nut, double stiffness, double rate, double 
     const Eigen::Vector3d spin = body.velocity_of_turning();
     const double stored = stiffness * contact.volume;
     const double lifted = nut.mass * kGravity * (body.height() - start);
-    body.step(-stiffness * contact.translation_gradient, -stiffness * contact.rotation_gradient,
-              kGravity, tick);
+    body.step(stiffness * contact.force, stiffness * contact.torque, kGravity, tick);
     kinetic = body.kinetic();
     const double energy = (before + kinetic) / 2 + lifted + stored;
     if (run.ticks == 0) first = energy;

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "bake/backend/make_backend.h"
 #include "packing/calibrate/calibration.h"

@@ -23,9 +23,9 @@ inline const Asset& oracle_asset(const std::string& mesh, std::size_t spheres) {
 }
 
 /// A row's solids as it places them.
-inline std::pair<PlacedTree, PlacedTree> placed(const OracleRow& row, std::size_t spheres) {
-  return {PlacedTree{oracle_asset(row.mesh_a, spheres).view(), Pose{}, 1.0},
-          PlacedTree{oracle_asset(row.mesh_b, spheres).view(), row.pose, row.scale_b}};
+inline std::pair<PlacedAsset, PlacedAsset> placed(const OracleRow& row, std::size_t spheres) {
+  return {PlacedAsset{oracle_asset(row.mesh_a, spheres).view(), Pose{}, 1.0},
+          PlacedAsset{oracle_asset(row.mesh_b, spheres).view(), row.pose, row.scale_b}};
 }
 
 }  // namespace ist::testing

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/pose.h>
+#include <ist/types.h>
 
 #include "support/shared_data.h"
 
@@ -28,8 +28,8 @@ struct OracleRow {
   double fraction_of_smaller = 0;
   double surface_distance = 0;  ///< of the surfaces: > 0 for `contain`
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
-  Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
 
   /// Of the solids: 0 where they meet or one holds the other.
   double solid_distance() const { return volume > 0 ? 0 : surface_distance; }
@@ -87,8 +87,8 @@ inline std::vector<OracleRow> read_oracle_rows(const std::string& key) {
     row.fraction_of_smaller = truth("frac_of_smaller");
     row.surface_distance = truth("surface_distance");
     row.centroid = {truth("cx"), truth("cy"), truth("cz")};
-    row.translation_gradient = {truth("dVdtx"), truth("dVdty"), truth("dVdtz")};
-    row.rotation_gradient = {truth("dVdrx"), truth("dVdry"), truth("dVdrz")};
+    row.force = -Eigen::Vector3d(truth("dVdtx"), truth("dVdty"), truth("dVdtz"));
+    row.torque = -Eigen::Vector3d(truth("dVdrx"), truth("dVdry"), truth("dVdrz"));
     rows.push_back(row);
   }
   return rows;

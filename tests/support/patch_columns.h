@@ -18,7 +18,7 @@ struct PatchColumns {
   std::uint32_t most;
   std::vector<std::uint32_t> count;
   std::vector<std::uint64_t> id;
-  std::vector<double> centroid, normal, area, depth, volume, force, torque, point, twist;
+  std::vector<double> centroid, normal, area, depth, volume, force, torque, point, torsion;
 
   std::vector<PatchedPair> rows(const std::vector<Penetration>& wholes) const {
     const auto vector = [](const std::vector<double>& from, std::size_t i) {
@@ -30,7 +30,7 @@ struct PatchColumns {
       for (std::size_t k = i * most; k < i * most + count[i]; ++k)
         out[i].patches.push_back({id[k], vector(centroid, k), vector(normal, k), area[k], depth[k],
                                   volume[k], vector(force, k), vector(torque, k), vector(point, k),
-                                  twist[k]});
+                                  torsion[k]});
     }
     return out;
   }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/pose.h>
+#include <ist/types.h>
 
 #include "bake/asset/asset_writer.h"
 #include "bake/cluster/tree_builder.h"

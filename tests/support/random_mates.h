@@ -11,7 +11,7 @@
 #include <vector>
 
 #include <ist/mesh.h>
-#include <ist/pose.h>
+#include <ist/types.h>
 
 // Random mates of extruded profiles, whose volumes and contact areas follow from plane geometry.
 

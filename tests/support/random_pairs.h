@@ -78,9 +78,9 @@ class RandomPairs {
   std::mt19937_64 random_;
 };
 
-inline std::pair<PlacedTree, PlacedTree> placed(const BatchPair& pair) {
-  return {PlacedTree{batch_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
-          PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
+inline std::pair<PlacedAsset, PlacedAsset> placed(const BatchPair& pair) {
+  return {PlacedAsset{batch_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+          PlacedAsset{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}};
 }
 
 /// NaN is like NaN.

@@ -23,9 +23,9 @@ struct WorldSphere {
 
 /// Every sphere of a placed tree, read from the asset's tables and not from its tree; of the
 /// matched measure those of a level of detail.
-inline std::vector<WorldSphere> world_spheres(const PlacedTree& placed, Measure measure,
+inline std::vector<WorldSphere> world_spheres(const PlacedAsset& placed, Measure measure,
                                               std::uint32_t detail = 0) {
-  const AssetHeader& header = placed.tree.header();
+  const AssetHeader& header = placed.asset.header();
   const bool inner = measure == Measure::inner;
   const Sphere* spheres =
       inner ? at<Sphere>(header, header.inner_spheres) : matched_spheres(header, detail);
@@ -52,15 +52,15 @@ struct ReferenceSum {
   double volume = 0;
   std::size_t lenses = 0;
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();
-  Eigen::Vector3d translation_gradient = Eigen::Vector3d::Zero();
-  Eigen::Vector3d rotation_gradient = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
   double force_scale = 0;  ///< Σ |gradient| of single lenses: what cancels in the sum
 
   Eigen::Vector3d centroid() const { return moment / volume; }
 };
 
 /// The sum that `penetration` answers, over all pairs in double: no tree, no frame but the world.
-inline ReferenceSum reference_sum(const PlacedTree& a, const PlacedTree& b, Measure measure,
+inline ReferenceSum reference_sum(const PlacedAsset& a, const PlacedAsset& b, Measure measure,
                                   std::uint32_t detail_a = 0, std::uint32_t detail_b = 0) {
   const auto spheres_a = world_spheres(a, measure, detail_a);
   const auto spheres_b = world_spheres(b, measure, detail_b);
@@ -80,8 +80,8 @@ inline ReferenceSum reference_sum(const PlacedTree& a, const PlacedTree& b, Meas
       sum.moment += volume * ((l.cap_a * i.centre + l.cap_b * j.centre) / (l.cap_a + l.cap_b));
       if (d > 0) {
         const Eigen::Vector3d force = l.derivative() / d * between;
-        sum.translation_gradient += force;
-        sum.rotation_gradient += (j.centre - origin).cross(force);
+        sum.force -= force;
+        sum.torque -= (j.centre - origin).cross(force);
         sum.force_scale += force.norm();
       }
     }
@@ -94,7 +94,7 @@ struct ReferenceGap {
   double covered = std::numeric_limits<double>::infinity();   ///< min |xi − xj| − ci − cj
 };
 
-inline ReferenceGap reference_gap(const PlacedTree& a, const PlacedTree& b) {
+inline ReferenceGap reference_gap(const PlacedAsset& a, const PlacedAsset& b) {
   const auto spheres_a = world_spheres(a, Measure::inner);
   const auto spheres_b = world_spheres(b, Measure::inner);
   ReferenceGap gap;

@@ -50,8 +50,7 @@ RingRun run_ring(double stiffness, double rate, double seconds, Ask ask) {
         stiffness / 2 * contact.volume * contact.volume + spring / 2 * stretch.squaredNorm();
     const double pressure = stiffness * contact.volume;
     const double before = kinetic;
-    body.step(-pressure * contact.translation_gradient - spring * stretch,
-              -pressure * contact.rotation_gradient, 0, 1 / rate);
+    body.step(pressure * contact.force - spring * stretch, pressure * contact.torque, 0, 1 / rate);
     kinetic = body.kinetic();
     if (contact.volume > 0) {
       ++run.touching;

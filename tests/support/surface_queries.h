@@ -8,8 +8,8 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 
 #include "support/baked.h"
 #include "support/random_assets.h"
@@ -53,7 +53,7 @@ inline Pose pose_of(const Quaterniond& q, const Vector3d& t) {
 }
 
 /// A motion of a body from a pose on: along `v` and about `w`, by s.
-struct Motion {
+struct Sweep {
   Pose start;
   Vector3d v = Vector3d::Zero(), w = Vector3d::Zero();
   Pose at(double s) const {
@@ -74,16 +74,14 @@ struct Work {
 };
 
 /// By Simpson's rule from s = 0 to 1.
-inline Work work_of(const Ask& ask, const Motion& motion, int steps) {
+inline Work work_of(const Ask& ask, const Sweep& motion, int steps) {
   Work work;
   for (int i = 0; i <= 2 * steps; ++i) {
     const double weight = (i == 0 || i == 2 * steps ? 1.0 : i % 2 == 1 ? 4.0 : 2.0) / (6.0 * steps);
     const Penetration p = ask(motion.at(0.5 * i / steps));
     work.most = std::max(work.most, p.volume);
-    work.done +=
-        weight * (p.translation_gradient.dot(motion.v) + p.rotation_gradient.dot(motion.w));
-    work.moved += weight * (p.translation_gradient.norm() * motion.v.norm() +
-                            p.rotation_gradient.norm() * motion.w.norm());
+    work.done -= weight * (p.force.dot(motion.v) + p.torque.dot(motion.w));
+    work.moved += weight * (p.force.norm() * motion.v.norm() + p.torque.norm() * motion.w.norm());
   }
   work.change = ask(motion.at(1)).volume - ask(motion.at(0)).volume;
   return work;
@@ -95,16 +93,16 @@ inline Vector3d random_direction(std::mt19937_64& random) {
 }
 
 /// Terrain of `points` heights a side, a quarter apart.
-inline HeightField terrain_of(const std::vector<float>& heights, std::uint32_t points) {
+inline HeightFieldShape terrain_of(const std::vector<float>& heights, std::uint32_t points) {
   return {heights.data(), points, points, {0.25, 0.25}};
 }
 
 /// A grid of `points` distances a side, from −1 to 1.
-inline DistanceGridField grid_of(const std::vector<float>& distances, std::uint32_t points) {
+inline DistanceGridShape grid_of(const std::vector<float>& distances, std::uint32_t points) {
   return {distances.data(), {points, points, points}, Vector3d::Constant(-1), 2.0 / (points - 1)};
 }
 
-inline std::vector<std::pair<const char*, Field>> fields() {
+inline std::vector<std::pair<const char*, Shape>> fields() {
   static const std::vector<float> heights = [] {
     std::vector<float> h;
     for (int j = 0; j < 9; ++j)
@@ -118,22 +116,22 @@ inline std::vector<std::pair<const char*, Field>> fields() {
       for (int j = 0; j < 21; ++j)
         for (int i = 0; i < 21; ++i)
           d.push_back(
-              static_cast<float>(0.5 - 0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm()));
+              static_cast<float>(0.1 * Vector3d(i - 10.0, j - 10.0, k - 10.0).norm() - 0.5));
     return d;
   }();
-  HeightField terrain = terrain_of(heights, 9);
+  HeightFieldShape terrain = terrain_of(heights, 9);
   terrain.lowest = -0.11, terrain.highest = 0.11;
-  FunctionField function;
+  FunctionShape function;
   function.sample = [](const void*, const Vector3d& x) noexcept {
     const double d = x.norm();
-    return FieldSample{0.5 - d, d > 0 ? Vector3d(-x / d) : Vector3d::Zero().eval()};
+    return ShapeSample{d - 0.5, d > 0 ? Vector3d(x / d) : Vector3d::Zero().eval()};
   };
-  return {{"half-space", HalfSpaceField{Vector3d(0.6, 0, 0.8), 0.1}},
-          {"box", BoxField{Vector3d(0.5, 0.4, 0.3)}},
-          {"thin box", BoxField{Vector3d(0.5, 0.4, 0.01)}},
-          {"ball", BallField{0.5}},
-          {"capsule", CapsuleField{0.3, 0.4}},
-          {"cylinder", CylinderField{0.4, 0.3}},
+  return {{"half-space", HalfSpaceShape{Vector3d(0.6, 0, 0.8), 0.1}},
+          {"box", BoxShape{Vector3d(0.5, 0.4, 0.3)}},
+          {"thin box", BoxShape{Vector3d(0.5, 0.4, 0.01)}},
+          {"ball", BallShape{0.5}},
+          {"capsule", CapsuleShape{0.3, 0.4}},
+          {"cylinder", CylinderShape{0.4, 0.3}},
           {"terrain", terrain},
           {"grid", grid_of(distances, 21)},
           {"function", function}};

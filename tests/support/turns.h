@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include <ist/pose.h>
+#include <ist/types.h>
 
 namespace ist::testing {
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "support/float_traps.h"
 
@@ -35,15 +35,15 @@ std::vector<std::unique_ptr<Solid>> all_kinds() {
 
 TEST(AnalyticSolid, DistancesInClosedForm) {
   const auto ball = ist::make_ball({1, 2, 3}, 2);
-  EXPECT_DOUBLE_EQ(ball->signed_distance({1, 2, 3}), 2);
-  EXPECT_DOUBLE_EQ(ball->signed_distance({4, 6, 3}), -3);
+  EXPECT_DOUBLE_EQ(ball->signed_distance({1, 2, 3}), -2);
+  EXPECT_DOUBLE_EQ(ball->signed_distance({4, 6, 3}), 3);
   const auto box = ist::make_box({0, 0, 0}, {1, 2, 3});
-  EXPECT_DOUBLE_EQ(box->signed_distance({0, 0, 0}), 1);
-  EXPECT_DOUBLE_EQ(box->signed_distance({0.9, 1.5, -2}), 0.1);
-  EXPECT_DOUBLE_EQ(box->signed_distance({4, 6, 0}), -5);
+  EXPECT_DOUBLE_EQ(box->signed_distance({0, 0, 0}), -1);
+  EXPECT_DOUBLE_EQ(box->signed_distance({0.9, 1.5, -2}), -0.1);
+  EXPECT_DOUBLE_EQ(box->signed_distance({4, 6, 0}), 5);
   const auto torus = ist::make_torus({0, 0, 1}, 2, 0.5);
-  EXPECT_DOUBLE_EQ(torus->signed_distance({0, 2, 1}), 0.5);
-  EXPECT_DOUBLE_EQ(torus->signed_distance({0, 0, 1}), -1.5);
+  EXPECT_DOUBLE_EQ(torus->signed_distance({0, 2, 1}), -0.5);
+  EXPECT_DOUBLE_EQ(torus->signed_distance({0, 0, 1}), 1.5);
 }
 
 TEST(AnalyticSolid, DistancesAreLipschitzAndNeverBeyondTheSurface) {
@@ -62,7 +62,7 @@ TEST(AnalyticSolid, DistancesAreLipschitzAndNeverBeyondTheSurface) {
       if ((at_p > 0) != (at_q > 0)) {
         ASSERT_LE(std::abs(at_p), (p - q).norm());
       }
-      if (at_p > 0) {
+      if (at_p < 0) {
         ASSERT_TRUE(solid->bounds().contains(p));
       }
     }

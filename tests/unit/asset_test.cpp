@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -69,10 +69,10 @@ TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
   asset = std::move(taken);
   EXPECT_EQ(asset.view().sphere_count(), 40u);
   EXPECT_TRUE(taken.view().empty());  // NOLINT(bugprone-use-after-move)
-  EXPECT_EQ(TreeView().header().sphere_count, 0u);
-  EXPECT_EQ(TreeView().header().detail_count, 0u);
+  EXPECT_EQ(AssetView().header().sphere_count, 0u);
+  EXPECT_EQ(AssetView().header().detail_count, 0u);
 
-  const PlacedTree placed{asset.view(), {}, 1};
+  const PlacedAsset placed{asset.view(), {}, 1};
   Workspace workspace;
   Workspace other = std::move(workspace);
   // NOLINTNEXTLINE(bugprone-use-after-move)
@@ -86,7 +86,7 @@ TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
   penetration_batch({&pair, 1}, {}, {&workspace, 1}, {&answer, 1});
   EXPECT_EQ(answer.status, QueryStatus::invalid_input);
   EXPECT_EQ(penetration(placed, placed, {}, other).status, QueryStatus::ok);
-  const PlacedTree nothing{TreeView(), {}, 1};
+  const PlacedAsset nothing{AssetView(), {}, 1};
   EXPECT_EQ(penetration(placed, nothing, {}, other).status, QueryStatus::invalid_input);
   EXPECT_EQ(without_protrusion({}, placed, nothing).volume, 0);
 }

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <atomic>
 #include <chrono>

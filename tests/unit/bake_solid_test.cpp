@@ -6,8 +6,8 @@
 
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
 #include "support/baked.h"
 #include "support/test_meshes.h"
@@ -121,13 +121,13 @@ TEST(BakeSolid, BakesFunctions) {
         const Vector3d p = 5 * x;
         const double wave = std::sin(p.x()) * std::cos(p.y()) + std::sin(p.y()) * std::cos(p.z()) +
                             std::sin(p.z()) * std::cos(p.x());
-        return std::min((0.8 - std::abs(wave)) / (5 * std::sqrt(3.0)), 1 - x.norm());
+        return std::max((std::abs(wave) - 0.8) / (5 * std::sqrt(3.0)), x.norm() - 1);
       },
       box);
   const Asset asset = bake(*gyroid, testing::of_size(300), {}, {.cells = 24});
   EXPECT_GT(asset.view().header().coverage, 0.3);
   expect_sound(check(asset, *gyroid));
-  const auto ball = make_function_solid([](const Vector3d& x) { return 1 - x.norm(); }, box);
+  const auto ball = make_function_solid([](const Vector3d& x) { return x.norm() - 1; }, box);
   EXPECT_EQ(bake(*ball, testing::of_size(20)).view().header().volume_error > 0, true);
 }
 
@@ -141,14 +141,14 @@ TEST(BakeSolid, RefusesFunctionsThatAreNoDistances) {
       EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
     }
   };
-  refused([](const Vector3d& x) { return 2 - 2 * x.norm(); }, box,
+  refused([](const Vector3d& x) { return 2 * x.norm() - 2; }, box,
           "not 1-Lipschitz: its slope is ");
-  refused([](const Vector3d& x) { return x.x() > 0.3 ? 0.1 : -0.1; }, box,
+  refused([](const Vector3d& x) { return x.x() > 0.3 ? -0.1 : 0.1; }, box,
           "not 1-Lipschitz: its slope is ");
   refused([](const Vector3d&) { return std::nan(""); }, box, "not finite");
-  refused([](const Vector3d&) { return -0.01; }, box, "does not resolve it");
-  refused([](const Vector3d& x) { return 2 - x.norm(); }, box, "beyond its bounds");
-  refused([](const Vector3d& x) { return 1 - x.norm(); }, {}, "no solid");
+  refused([](const Vector3d&) { return 0.01; }, box, "does not resolve it");
+  refused([](const Vector3d& x) { return x.norm() - 2; }, box, "beyond its bounds");
+  refused([](const Vector3d& x) { return x.norm() - 1; }, {}, "no solid");
   EXPECT_THROW(make_function_solid({}, box), Error);
 }
 

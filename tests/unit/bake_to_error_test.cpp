@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/query.h>
+#include <ist/types.h>
 #include <time.h>
 
 #include <algorithm>
@@ -119,7 +119,7 @@ TEST(BakeToError, AMetTargetHoldsAtOtherPoses) {
                          result.asset.bytes().begin() + sizeof(AssetHeader)));
   EXPECT_EQ(plain.view().predicted_errors().poses, 0u);
   EXPECT_FALSE(plain.view().predicted_errors().target_met());
-  EXPECT_EQ(TreeView().predicted_errors().poses, 0u);
+  EXPECT_EQ(AssetView().predicted_errors().poses, 0u);
 }
 
 TEST(BakeToError, PredictsByClassOfOverlap) {

@@ -1,7 +1,7 @@
 #include "cuda/banded/banded_loop.h"
 
 #include <gtest/gtest.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include <memory>
 #include <vector>

@@ -14,7 +14,7 @@ using bullet::Shape;
 
 struct Solid {
   const char* name;
-  TreeView tree;
+  AssetView tree;
 };
 
 /// Of 0.1 to 0.2 m.

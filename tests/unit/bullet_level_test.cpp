@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include "bullet/partner.h"
 #include "support/bullet_world.h"
@@ -69,8 +69,8 @@ TEST(BulletLevel, ClosedMeshesTellTheDistancesOfTheirSolids) {
     for (int i = 0; i < 2000; ++i) {
       const Eigen::Vector3d x(draw(random), draw(random), 0.5 * draw(random));
       const SurfacePoint truth = closest_point({asset.view(), {}}, x);
-      const FieldSample told = near.at(x);
-      ASSERT_NEAR(told.distance, -truth.distance, 1e-9) << name << " " << x.transpose();
+      const ShapeSample told = near.at(x);
+      ASSERT_NEAR(told.distance, truth.distance, 1e-9) << name << " " << x.transpose();
       ASSERT_NEAR(told.gradient.norm(), 1, 1e-9);
       EXPECT_NEAR(near.at(x + 1e-6 * told.gradient).distance, told.distance + 1e-6, 1e-8);
     }
@@ -92,19 +92,19 @@ TEST(BulletLevel, AnOpenMeshIsASlab) {
     const double beside = std::hypot(std::max(out.x(), 0.0), std::max(out.y(), 0.0));
     const double under = std::max({0.0, x.z(), -0.3 - x.z()});
     const double expected =
-        beside + under > 0 ? -std::hypot(beside, under) : std::min(-x.z(), x.z() + 0.3);
+        beside + under > 0 ? std::hypot(beside, under) : std::max(x.z(), -0.3 - x.z());
     ASSERT_NEAR(near.at(x).distance, expected, 1e-6) << x.transpose();
   }
   near.gather(shape, {-0.1f, -0.1f, -0.25f}, {0.1f, 0.1f, -0.2f}, 0.3);  // a box under it
-  EXPECT_NEAR(near.at({0, 0, -0.22}).distance, 0.08, 1e-6);
+  EXPECT_NEAR(near.at({0, 0, -0.22}).distance, -0.08, 1e-6);
   // The mesh covers all that is under this box: one plane tells the distances.
   near.gather(shape, {-0.4, -0.4, -0.5}, {0.4, 0.4, 0.5}, 0.3);
   for (int i = 0; i < 500; ++i) {
     const Eigen::Vector3d x(0.25 * draw(random), 0.25 * draw(random), 0.3 * draw(random));
-    const double depth = -x.z(), expected = std::min(depth, 0.3 - depth);
-    const FieldSample told = near.at(x);
+    const double depth = -x.z(), expected = -std::min(depth, 0.3 - depth);
+    const ShapeSample told = near.at(x);
     ASSERT_NEAR(told.distance, expected, 1e-12) << x.transpose();
-    EXPECT_NEAR(told.gradient.z(), depth < 0.15 ? -1 : 1, 1e-12);
+    EXPECT_NEAR(told.gradient.z(), depth < 0.15 ? 1 : -1, 1e-12);
   }
 }
 

@@ -57,7 +57,7 @@ std::vector<btVector3> corners(double half) {
 
 double distance_to_box(const Eigen::Vector3d& x, double half) {
   const Eigen::Vector3d d = x.cwiseAbs().array() - half;
-  return d.maxCoeff() <= 0 ? -d.maxCoeff() : -d.cwiseMax(0).norm();
+  return d.maxCoeff() <= 0 ? d.maxCoeff() : d.cwiseMax(0).norm();
 }
 
 TEST(BulletPartners, HullsTellTrueDistances) {
@@ -69,7 +69,7 @@ TEST(BulletPartners, HullsTellTrueDistances) {
   std::uniform_real_distribution<double> draw(-1, 1);
   for (int i = 0; i < 1000; ++i) {
     const Eigen::Vector3d x(draw(random), draw(random), draw(random));
-    const FieldSample sample = hull.at(x);
+    const ShapeSample sample = hull.at(x);
     EXPECT_NEAR(sample.distance, distance_to_box(x, 0.5), 1e-9);
     EXPECT_NEAR(sample.gradient.norm(), 1, 1e-9);
     // Along the gradient the distance grows at a rate of 1.
@@ -82,13 +82,13 @@ TEST(BulletPartners, ConesTellTrueDistances) {
   const btConeShapeZ cone(0.4, 1.0);
   const auto partner = bullet::Partner::of(cone);
   ASSERT_TRUE(partner.has_value());
-  const PlacedField placed = partner->placed(btTransform::getIdentity(), {}, {}, 1);
-  const auto& field = std::get<FunctionField>(placed.field);
+  const PlacedShape placed = partner->placed(btTransform::getIdentity(), {}, {}, 1);
+  const auto& field = std::get<FunctionShape>(placed.shape);
   std::mt19937 random(4);
   std::uniform_real_distribution<double> draw(-1, 1);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3d x(draw(random), draw(random), draw(random));
-    const FieldSample sample = field.sample(field.context, x);
+    const ShapeSample sample = field.sample(field.context, x);
     // The nearest of many points of mantle and base, in the half-plane of x.
     const double out = x.head<2>().norm();
     double nearest = 10;
@@ -98,7 +98,7 @@ TEST(BulletPartners, ConesTellTrueDistances) {
                           std::hypot(out - 0.4 * t, x.z() - (0.5 - t))});
     }
     const bool inside = x.z() > -0.5 && out < 0.4 * (0.5 - x.z());
-    EXPECT_NEAR(sample.distance, inside ? nearest : -nearest, 1e-3) << x.transpose();
+    EXPECT_NEAR(sample.distance, inside ? -nearest : nearest, 1e-3) << x.transpose();
     EXPECT_NEAR(sample.gradient.norm(), 1, 1e-9);
     EXPECT_NEAR(field.sample(field.context, x + 1e-6 * sample.gradient).distance,
                 sample.distance + 1e-6, 1e-9);

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <random>
 
-#include <ist/error.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 
 #include "numerics/roots.h"
 #include "packing/calibrate/host_calibration.h"

@@ -4,8 +4,8 @@
 #include <limits>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "support/test_meshes.h"
 

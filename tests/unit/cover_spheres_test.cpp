@@ -10,8 +10,8 @@
 #include <cmath>
 #include <random>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "spheres/shared_count.h"
 #include "support/test_meshes.h"
@@ -65,7 +65,7 @@ TEST(CoverSpheres, HoldEveryPointOfTheSolidAndReachNoFurtherThanSaid) {
     for (int i = 0; i < 20'000; ++i) {
       const Vector3d x = box.min() + box.sizes().cwiseProduct(
                                          Vector3d(share(random), share(random), share(random)));
-      const double depth = solid->signed_distance(x);
+      const double depth = -solid->signed_distance(x);
       if (depth > 0) {
         ++inside;
         ASSERT_TRUE(held(x, cover.spheres)) << x.transpose();
@@ -97,7 +97,7 @@ TEST(CoverSpheres, TheProofFailsWithoutASphereThatIsNeeded) {
     ++failed;
     EXPECT_GT(proof.gap, 0);
     EXPECT_FALSE(held(proof.where, fewer));
-    EXPECT_GT(solid->signed_distance(proof.where), -1e-9);
+    EXPECT_LT(solid->signed_distance(proof.where), 1e-9);
   }
   EXPECT_GT(failed, cover.spheres.size() / 2);
 }
@@ -385,7 +385,7 @@ TEST(CoverCapsules, SeveralHoldEveryPointOfTheSolid) {
         const Vector3d x =
             box.min() +
             Vector3d(share(random), share(random), share(random)).cwiseProduct(box.sizes());
-        if (solid->signed_distance(x) <= 0) continue;
+        if (solid->signed_distance(x) >= 0) continue;
         EXPECT_TRUE(std::any_of(capsules.begin(), capsules.end(),
                                 [&](const CoverCapsule& c) { return away(x, c) <= c.radius; }));
       }

@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include <ist/error.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 
 #include "support/on_host.h"
 #include "support/test_meshes.h"

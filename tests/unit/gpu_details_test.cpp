@@ -25,8 +25,8 @@ Penetration by_cpu(const BatchPair& pair, std::uint32_t budget) {
   PenetrationSettings settings;
   settings.spheres_only = true;
   settings.pair_budget = budget;
-  return penetration(PlacedTree{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
-                     PlacedTree{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b},
+  return penetration(PlacedAsset{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+                     PlacedAsset{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b},
                      settings, workspace);
 }
 
@@ -37,10 +37,10 @@ struct Off {
   void look(const Penetration& gpu, const Penetration& cpu, double size) {
     ASSERT_EQ(gpu.status, cpu.status);
     const double scale = std::max(cpu.volume, 1e-5 * size * size * size);
-    const double area = std::max(std::cbrt(scale * scale), cpu.translation_gradient.norm());
+    const double area = std::max(std::cbrt(scale * scale), cpu.force.norm());
     volume = std::max(volume, std::abs(gpu.volume - cpu.volume) / scale);
-    push = std::max(push, (gpu.translation_gradient - cpu.translation_gradient).norm() / area);
-    turn = std::max(turn, (gpu.rotation_gradient - cpu.rotation_gradient).norm() / (area * size));
+    push = std::max(push, (gpu.force - cpu.force).norm() / area);
+    turn = std::max(turn, (gpu.torque - cpu.torque).norm() / (area * size));
     if (cpu.volume >= scale) centre = std::max(centre, (gpu.centroid - cpu.centroid).norm() / size);
   }
   void expect_small(const char* what) const {
@@ -88,8 +88,8 @@ TEST(GpuDetails, QuickLooksAreTheCpus) {
     const AssetHeader& header_a = detailed_assets()[pair.a].view().header();
     const AssetHeader& header_b = detailed_assets()[pair.b].view().header();
     const auto pose =
-        relative_pose(PlacedTree{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
-                      PlacedTree{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b});
+        relative_pose(PlacedAsset{detailed_assets()[pair.a].view(), pair.pose_a, pair.scale_a},
+                      PlacedAsset{detailed_assets()[pair.b].view(), pair.pose_b, pair.scale_b});
     const QuickLook cpu = quick_look(
         SphereTree(header_a, matched_tree(header_a, header_a.detail_count)),
         SphereTree(header_b, matched_tree(header_b, header_b.detail_count)), pose->a_from_b, true);
@@ -133,7 +133,7 @@ TEST(GpuDetails, OracleRowsUnderABudgetAreTheCpus) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const auto [a, b] = placed(rows[i], kSpheres);
       off.look(answers[i], penetration(a, b, settings, workspace),
-               std::cbrt(b.tree.volume()) * b.scale);
+               std::cbrt(b.asset.volume()) * b.scale);
       changed += answers[i].volume != whole[i].volume ? 1 : 0;
     }
     EXPECT_TRUE(budget == 0 ? changed == 0 : changed > 10) << changed;

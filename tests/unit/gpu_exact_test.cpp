@@ -44,7 +44,7 @@ TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
 TEST(GpuExact, WhatCannotBeAskedSaysSo) {
   std::vector<GpuSolid> solids = exact_solids();
   solids.emplace_back(batch_assets()[0].view());  // keeps no mesh
-  solids.emplace_back(Field(BallField{1}));
+  solids.emplace_back(Shape(BallShape{1}));
   std::vector<BatchPair> pairs = exact_pairs(35, 5);
   pairs[0].b = 5;
   pairs[1].a = 0;
@@ -54,7 +54,7 @@ TEST(GpuExact, WhatCannotBeAskedSaysSo) {
   HostBatch batch(solids);
   const std::vector<Penetration> exact = batch.run(pairs, Measure::exact);
   const std::vector<Penetration> by_spheres = batch.run(pairs, Measure::matched);
-  constexpr QueryStatus kNot = QueryStatus::not_held, kInvalid = QueryStatus::invalid_input;
+  constexpr QueryStatus kNot = QueryStatus::missing_data, kInvalid = QueryStatus::invalid_input;
   for (const auto& [i, status] : {std::pair{0, kNot}, {1, kNot}, {2, kInvalid}, {3, kInvalid}}) {
     EXPECT_EQ(exact[static_cast<std::size_t>(i)].status, status);
     EXPECT_TRUE(std::isnan(exact[static_cast<std::size_t>(i)].volume));

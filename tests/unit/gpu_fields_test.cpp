@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "cuda/query/disc_part.h"
 #include "query/base/turned_over.h"
@@ -24,22 +24,22 @@ namespace ist::testing {
 namespace {
 
 /// All that a GPU knows.
-std::vector<std::pair<const char*, Field>> batch_fields() {
-  std::vector<std::pair<const char*, Field>> out = fields();
-  std::erase_if(out, [](const auto& f) { return std::holds_alternative<FunctionField>(f.second); });
+std::vector<std::pair<const char*, Shape>> batch_fields() {
+  std::vector<std::pair<const char*, Shape>> out = fields();
+  std::erase_if(out, [](const auto& f) { return std::holds_alternative<FunctionShape>(f.second); });
   return out;
 }
 
 /// Trees and fields as the solids of a batch.
-std::vector<GpuSolid> with_fields(std::vector<GpuSolid> trees, const std::vector<Field>& fields) {
-  for (const Field& field : fields) trees.emplace_back(field);
+std::vector<GpuSolid> with_fields(std::vector<GpuSolid> trees, const std::vector<Shape>& fields) {
+  for (const Shape& field : fields) trees.emplace_back(field);
   return trees;
 }
 
 /// batch_solids() and batch_fields(): field f is solid kFirstField + f.
 constexpr std::uint32_t kFirstField = 4;
 std::vector<GpuSolid> mixed_solids() {
-  std::vector<Field> all;
+  std::vector<Shape> all;
   for (const auto& [name, field] : batch_fields()) all.push_back(field);
   EXPECT_EQ(batch_solids().size(), kFirstField);
   return with_fields(batch_solids(), all);
@@ -57,13 +57,13 @@ std::vector<BatchPair> pairs_with(std::uint32_t field, std::size_t count, unsign
   return out;
 }
 
-Penetration by_cpu(const Field& field, const BatchPair& pair, Measure measure) {
+Penetration by_cpu(const Shape& field, const BatchPair& pair, Measure measure) {
   static Workspace workspace;
   PenetrationSettings settings;
   settings.measure = measure;
-  return penetration(PlacedField{field, pair.pose_a, pair.scale_a},
-                     PlacedTree{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b}, settings,
-                     workspace);
+  return penetration(PlacedShape{field, pair.pose_a, pair.scale_a},
+                     PlacedAsset{batch_assets()[pair.b].view(), pair.pose_b, pair.scale_b},
+                     settings, workspace);
 }
 
 /// By how much an answer is off: parts of the volume, and of the surface or lever that go with the
@@ -73,11 +73,10 @@ struct FieldOff {
 
   void look(const Penetration& gpu, const Penetration& cpu, double size) {
     const double volume_scale = std::max(cpu.volume, 1e-6 * size * size * size);
-    const double area =
-        std::max(std::cbrt(volume_scale * volume_scale), cpu.translation_gradient.norm());
+    const double area = std::max(std::cbrt(volume_scale * volume_scale), cpu.force.norm());
     volume = std::max(volume, std::abs(gpu.volume - cpu.volume) / volume_scale);
-    push = std::max(push, (gpu.translation_gradient - cpu.translation_gradient).norm() / area);
-    turn = std::max(turn, (gpu.rotation_gradient - cpu.rotation_gradient).norm() / (area * size));
+    push = std::max(push, (gpu.force - cpu.force).norm() / area);
+    turn = std::max(turn, (gpu.torque - cpu.torque).norm() / (area * size));
     if (cpu.volume > volume_scale / 2)
       centre = std::max(centre, (gpu.centroid - cpu.centroid).norm() / size);
   }
@@ -97,7 +96,7 @@ TEST(GpuFields, AnswersAreTheCpus) {
         ASSERT_EQ(answers[i].status, QueryStatus::ok);
         off.look(answers[i], cpu, pairs[i].scale_b);
         met += cpu.volume > 0 ? 1 : 0;
-        crossed += cpu.translation_gradient.norm() > 0 ? 1 : 0;
+        crossed += cpu.force.norm() > 0 ? 1 : 0;
       }
     }
     std::printf("%-15s volume %.1e push %.1e turn %.1e centroid %.1e; %zu met, %zu crossed\n",
@@ -113,8 +112,8 @@ TEST(GpuFields, AnswersAreTheCpus) {
 /// Centres of balls on planes, edges and corners of the field.
 TEST(GpuFields, AlignedSolidsToo) {
   static const std::vector<float> flat(81, 0.0f);
-  const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.5, 0.5)}, terrain_of(flat, 9),
-                                     HalfSpaceField{}};
+  const std::vector<Shape> fields = {BoxShape{Eigen::Vector3d(0.5, 0.5, 0.5)}, terrain_of(flat, 9),
+                                     HalfSpaceShape{}};
   HostBatch batch(with_fields({cube().view(), batch_assets()[3].view()}, fields));
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < fields.size(); ++f) {
@@ -137,8 +136,8 @@ TEST(GpuFields, AlignedSolidsToo) {
     const BatchPair& pair = pairs[i];
     const Asset& body = pair.b == 0 ? cube() : batch_assets()[3];
     const Penetration cpu =
-        penetration(PlacedField{fields[pair.a - 2], pair.pose_a, 1},
-                    PlacedTree{body.view(), pair.pose_b, pair.scale_b}, {}, workspace);
+        penetration(PlacedShape{fields[pair.a - 2], pair.pose_a, 1},
+                    PlacedAsset{body.view(), pair.pose_b, pair.scale_b}, {}, workspace);
     off.look(by_one[i], cpu, pair.scale_b);
     off.look(by_warp[i], cpu, pair.scale_b);
   }
@@ -156,7 +155,7 @@ TEST(GpuFields, CentresOnEdges) {
     return h;
   }();
   const Asset& body = batch_assets()[3];
-  const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.5, 0.5)},
+  const std::vector<Shape> fields = {BoxShape{Eigen::Vector3d(0.5, 0.5, 0.5)},
                                      terrain_of(slope, 9)};
   const std::vector<std::vector<Eigen::Vector3d>> edges = {
       {{0.5, 0.5, 0.1}, {0.5, 0.5, 0.5}, {-0.5, 0.1, 0.5}, {0.5, 0.125, 0.125}},
@@ -180,8 +179,8 @@ TEST(GpuFields, CentresOnEdges) {
   FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Penetration cpu =
-        penetration(PlacedField{fields[pairs[i].a - 1], {}, 1},
-                    PlacedTree{body.view(), pairs[i].pose_b, pairs[i].scale_b}, {}, workspace);
+        penetration(PlacedShape{fields[pairs[i].a - 1], {}, 1},
+                    PlacedAsset{body.view(), pairs[i].pose_b, pairs[i].scale_b}, {}, workspace);
     off.look(by_one[i], cpu, 0.5);
     off.look(by_warp[i], cpu, 0.5);
   }
@@ -200,9 +199,9 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
     ridges.push_back(i % kPoints % 2 == 0 ? 0.0f : 0.03125f);
   const Asset& body = cube();
   const std::vector<WorldSphere> balls = world_spheres({body.view(), Pose{}, 1}, Measure::matched);
-  HeightField terrain = terrain_of(ridges, kPoints);
+  HeightFieldShape terrain = terrain_of(ridges, kPoints);
   terrain.spacing[0] = terrain.spacing[1] = 0.03125;
-  const std::vector<Field> fields = {terrain};
+  const std::vector<Shape> fields = {terrain};
   std::vector<BatchPair> pairs;
   for (std::size_t i = 0; i < balls.size(); i += 100) {
     BatchPair pair;
@@ -217,8 +216,8 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
   FieldOff off;
   for (std::size_t i = 0; i < pairs.size(); ++i)
     off.look(by_warp[i],
-             penetration(PlacedField{fields[0], {}, 1}, PlacedTree{body.view(), pairs[i].pose_b, 1},
-                         {}, workspace),
+             penetration(PlacedShape{fields[0], {}, 1},
+                         PlacedAsset{body.view(), pairs[i].pose_b, 1}, {}, workspace),
              1);
   EXPECT_LE(off.volume, 1e-9);
   EXPECT_LE(off.push, 1e-9);
@@ -229,7 +228,7 @@ TEST(GpuFields, CentresOnEdgesOfManyTriangles) {
 /// From a hair to many times the field's size, by a tree of four levels.
 TEST(GpuFields, ProbesOfAnySize) {
   static const Asset many = baked(torus_mesh(1, 0.4, 48, 24), "torus", 4500, false);
-  const std::vector<Field> fields = {BoxField{Eigen::Vector3d(0.5, 0.4, 0.3)}};
+  const std::vector<Shape> fields = {BoxShape{Eigen::Vector3d(0.5, 0.4, 0.3)}};
   HostBatch batch(with_fields({many.view()}, fields));
   for (const double scale : {1e-7, 1e-5, 1e-3, 0.03, 0.1, 0.3, 3.0, 30.0}) {
     RandomPairs random(17);
@@ -251,11 +250,11 @@ TEST(GpuFields, ProbesOfAnySize) {
     int met = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       const Penetration cpu =
-          penetration(PlacedField{fields[pairs[i].a - 1], {}, 1},
-                      PlacedTree{many.view(), pairs[i].pose_b, scale}, {}, workspace);
+          penetration(PlacedShape{fields[pairs[i].a - 1], {}, 1},
+                      PlacedAsset{many.view(), pairs[i].pose_b, scale}, {}, workspace);
       off.look(by_one[i], cpu, scale);
       off.look(by_warp[i], cpu, scale);
-      met += cpu.translation_gradient.norm() > 0 ? 1 : 0;
+      met += cpu.force.norm() > 0 ? 1 : 0;
     }
     std::printf("%8g: volume %.1e push %.1e turn %.1e centroid %.1e; %d crossed\n", scale,
                 off.volume, off.push, off.turn, off.centre, met);
@@ -338,9 +337,10 @@ TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
   const std::vector<Penetration> sound = HostBatch(solids).run(pairs, Measure::matched);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<float> holes(27, std::numeric_limits<float>::quiet_NaN());
-  solids = with_fields(solids, {BallField{-1}, BoxField{Eigen::Vector3d(1, 0, 1)},
-                                HalfSpaceField{Eigen::Vector3d::Zero(), 0},
-                                HeightField{nullptr, 9, 9}, grid_of(holes, 3), CapsuleField{0, 1}});
+  solids =
+      with_fields(solids, {BallShape{-1}, BoxShape{Eigen::Vector3d(1, 0, 1)},
+                           HalfSpaceShape{Eigen::Vector3d::Zero(), 0},
+                           HeightFieldShape{nullptr, 9, 9}, grid_of(holes, 3), CapsuleShape{0, 1}});
   std::vector<std::size_t> bad = {3, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41};
   pairs[3].pose_b.t[1] = nan;
   pairs[7].pose_a.q[0] = nan;
@@ -363,7 +363,7 @@ TEST(GpuFields, InvalidInputSpoilsOnlyItself) {
       EXPECT_EQ(answers[i].volume, sound[i].volume) << i;
     }
     if (!is_bad || pairs[i].b >= batch_solids().size() || pairs[i].a >= solids.size()) continue;
-    const Penetration cpu = by_cpu(std::get<Field>(solids[pairs[i].a]), pairs[i], Measure::matched);
+    const Penetration cpu = by_cpu(std::get<Shape>(solids[pairs[i].a]), pairs[i], Measure::matched);
     EXPECT_EQ(cpu.status, QueryStatus::invalid_input) << i;
     EXPECT_TRUE(std::isnan(cpu.volume)) << i;
   }
@@ -387,7 +387,7 @@ TEST(GpuFields, ABatchMixesPairsInAnyOrder) {
     pairs.push_back({pair.b, pair.a, pair.pose_b, pair.pose_a, pair.scale_b, pair.scale_a});
     expected.insert(expected.end(), 2, first[i]);
     turn_over(pair.pose_b, pair.pose_a, expected.back());
-    crossed += first[i].rotation_gradient.norm() > 0 ? 1 : 0;
+    crossed += first[i].torque.norm() > 0 ? 1 : 0;
   }
   EXPECT_GT(crossed, 20u);
   expect_same_bits(HostBatch(solids).run(pairs, Measure::matched, 1), expected);
@@ -403,7 +403,7 @@ TEST(GpuFields, WhatHoldsNoSpheresIsNotHeld) {
   const std::vector<Separation> gaps = HostSeparations(solids).run(pairs);
   const std::vector<PatchedPair> patches = HostPatches(solids).run(pairs, Measure::matched, 4);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto held = [](bool yes) { return yes ? QueryStatus::ok : QueryStatus::not_held; };
+    const auto held = [](bool yes) { return yes ? QueryStatus::ok : QueryStatus::missing_data; };
     EXPECT_EQ(volumes[i].status, held(i != 1)) << i;
     EXPECT_EQ(std::isnan(volumes[i].volume), i == 1) << i;
     EXPECT_EQ(gaps[i].status, held(i == 0)) << i;
@@ -422,10 +422,10 @@ TEST(GpuFields, WhatABatchCannotHoldIsNamed) {
     }
     return "nothing";
   };
-  FunctionField function;
-  function.sample = [](const void*, const Eigen::Vector3d&) noexcept { return FieldSample{}; };
-  EXPECT_EQ(said(Field(function)).find("GPU: solid 1 is a FunctionField"), 0u);
-  EXPECT_EQ(said(TreeView{}), "GPU: solid 1 is an empty asset");
+  FunctionShape function;
+  function.sample = [](const void*, const Eigen::Vector3d&) noexcept { return ShapeSample{}; };
+  EXPECT_EQ(said(Shape(function)).find("GPU: solid 1 is a FunctionShape"), 0u);
+  EXPECT_EQ(said(AssetView{}), "GPU: solid 1 is an empty asset");
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ TEST(GpuQuery, APlaceIsThatOfTheMatricesByEigen) {
     PairPlace place;
     ASSERT_TRUE(place.place(solids.refs()[pair.a].frame, a.pose, a.scale,
                             solids.refs()[pair.b].frame, b.pose, b.scale));
-    const auto world_from = [](const PlacedTree& tree) {
-      const AssetHeader& h = tree.tree.header();
+    const auto world_from = [](const PlacedAsset& tree) {
+      const AssetHeader& h = tree.asset.header();
       return Eigen::Affine3d(
           Eigen::Translation3d(Vector3d(tree.pose.t)) *
           Eigen::Quaterniond(tree.pose.q[0], tree.pose.q[1], tree.pose.q[2], tree.pose.q[3])
@@ -108,11 +108,8 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
       worst_centre = std::max(worst_centre, (answers[i].centroid - sum.centroid()).norm() / size);
       // Of a ball that all but lies in another the force is a small rest.
       const double area = sum.force_scale + std::cbrt(sum.volume * sum.volume);
-      worst_push = std::max(
-          worst_push, (answers[i].translation_gradient - sum.translation_gradient).norm() / area);
-      worst_turn =
-          std::max(worst_turn,
-                   (answers[i].rotation_gradient - sum.rotation_gradient).norm() / (area * size));
+      worst_push = std::max(worst_push, (answers[i].force - sum.force).norm() / area);
+      worst_turn = std::max(worst_turn, (answers[i].torque - sum.torque).norm() / (area * size));
     }
     std::printf(
         "%s: worst volume %.2g, push %.2g, turn %.2g, centroid %.2g; %zu met, %u "
@@ -212,16 +209,15 @@ TEST(GpuQuery, LanesOfAWarpNeedNoLuck) {
 }
 
 TEST(GpuQuery, ForceAndTorqueAreTheGradientsTurned) {
-  double push[3], turn[3], force[3], torque[3];
+  double force[3], torque[3];
   GpuPenetrations to;
-  to.translation_gradient = push;
-  to.rotation_gradient = turn;
   to.force = force;
   to.torque = torque;
-  gpu::write_answer(to, 0, {1, {0, 0, 0}, {2, -3, 5}, {-7, 11, 13}}, {});
+  const WorldSums sums = {1, {0, 0, 0}, {2, -3, 5}, {-7, 11, 13}};
+  gpu::write_answer(to, 0, sums, {});
   for (int k = 0; k < 3; ++k) {
-    EXPECT_EQ(force[k], -push[k]);
-    EXPECT_EQ(torque[k], -turn[k]);
+    EXPECT_EQ(force[k], -sums.translation_gradient[k]);
+    EXPECT_EQ(torque[k], -sums.rotation_gradient[k]);
   }
   gpu::write_nothing(to, 0, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(force[0]) && std::isnan(force[2]) && std::isnan(torque[2]));
@@ -247,7 +243,7 @@ TEST(GpuQuery, InvalidPosesSpoilOnlyThemselves) {
     const bool is_bad = std::find(bad.begin(), bad.end(), i) != bad.end();
     EXPECT_EQ(answers[i].status, is_bad ? QueryStatus::invalid_input : QueryStatus::ok) << i;
     EXPECT_EQ(std::isnan(answers[i].volume) && answers[i].centroid.hasNaN() &&
-                  answers[i].translation_gradient.hasNaN() && answers[i].rotation_gradient.hasNaN(),
+                  answers[i].force.hasNaN() && answers[i].torque.hasNaN(),
               is_bad)
         << i;
     if (!is_bad) {

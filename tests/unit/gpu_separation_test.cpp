@@ -25,14 +25,14 @@ struct LeastGaps {
   Vector3d normal = Vector3d::Zero();  ///< of the first of the nearest spheres, world
 };
 
-LeastGaps least_gaps(const PlacedTree& a, const PlacedTree& b) {
+LeastGaps least_gaps(const PlacedAsset& a, const PlacedAsset& b) {
   struct Ball {
     Vector3d centre;
     double r, cover;
   };
   const RelativePose pose = *relative_pose(a, b);
-  const auto balls = [](const PlacedTree& placed, const Similarity& map) {
-    const SphereTree tree = sphere_tree(placed.tree, Measure::inner);
+  const auto balls = [](const PlacedAsset& placed, const Similarity& map) {
+    const SphereTree tree = sphere_tree(placed.asset, Measure::inner);
     std::vector<Ball> out;
     for (std::uint32_t i = 0; i < kWidth * tree.level[0].count; ++i) {
       const NodeBall ball = tree.sphere(i / kWidth, i % kWidth);

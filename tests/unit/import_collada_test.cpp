@@ -4,8 +4,8 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "support/temp_file.h"
 

@@ -3,8 +3,8 @@
 #include <random>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "support/damage.h"
 #include "support/temp_file.h"

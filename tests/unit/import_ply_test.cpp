@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "support/temp_file.h"
 

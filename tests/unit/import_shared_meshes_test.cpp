@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "support/mesh_table.h"
 #include "support/shared_data.h"

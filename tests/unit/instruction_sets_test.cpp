@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 
 #include <hwy/highway.h>
@@ -72,27 +72,28 @@ const Asset& asset_named(const std::string& name) {
 }
 
 /// A field by the name that a row has in place of its first asset.
-Field field_named(const std::string& name) {
-  static const std::vector<float> numbers = [] {
+Shape field_named(const std::string& name) {
+  const auto numbers_of = [](float sign) {
     std::vector<float> made(343);
     for (std::size_t i = 0; i < made.size(); ++i)
-      made[i] = 0.125f - 0.0625f * static_cast<float>(i * 7 % 11);
+      made[i] = sign * (0.125f - 0.0625f * static_cast<float>(i * 7 % 11));
     return made;
-  }();
-  if (name == "half_space") return HalfSpaceField{{0.6, 0, 0.8}, 0.1};
-  if (name == "box_field") return BoxField{{0.7, 0.5, 0.01}};
-  if (name == "ball_field") return BallField{0.8};
-  if (name == "capsule") return CapsuleField{0.4, 0.5};
-  if (name == "cylinder") return CylinderField{0.5, 0.4};
+  };
+  static const std::vector<float> heights = numbers_of(1), distances = numbers_of(-1);
+  if (name == "half_space") return HalfSpaceShape{{0.6, 0, 0.8}, 0.1};
+  if (name == "box_field") return BoxShape{{0.7, 0.5, 0.01}};
+  if (name == "ball_field") return BallShape{0.8};
+  if (name == "capsule") return CapsuleShape{0.4, 0.5};
+  if (name == "cylinder") return CylinderShape{0.5, 0.4};
   if (name == "terrain") {
-    HeightField field;
-    field.heights = numbers.data();
+    HeightFieldShape field;
+    field.heights = heights.data();
     field.columns = field.rows = 7;
     field.spacing[0] = field.spacing[1] = 0.25;
     return field;
   }
-  DistanceGridField field;
-  field.distances = numbers.data();
+  DistanceGridShape field;
+  field.distances = distances.data();
   for (std::uint32_t& n : field.size) n = 7;
   field.origin = Eigen::Vector3d::Constant(-0.75);
   field.spacing = 0.25;
@@ -120,10 +121,10 @@ class Poses {
 
 /// `A`: a placed tree or a placed field.
 template <class A>
-void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& workspace,
+void ask(const std::string& asked, const A& a, const PlacedAsset& b, Workspace& workspace,
          AnswerBits& bits) {
   PenetrationSettings settings;
-  if constexpr (std::is_same_v<A, PlacedTree>)
+  if constexpr (std::is_same_v<A, PlacedAsset>)
     if (asked == "exact") {
       settings.measure = Measure::exact;
       bits.add(penetration(a, b, settings, workspace));
@@ -144,7 +145,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
       if (asked != "exact_patches") continue;
       for (const double x : {patches[i].point.x(), patches[i].point.y(), patches[i].point.z()})
         bits.add(x);
-      bits.add(patches[i].twist);
+      bits.add(patches[i].torsion);
     }
     return;
   }
@@ -160,7 +161,7 @@ void ask(const std::string& asked, const A& a, const PlacedTree& b, Workspace& w
   const PenetrationAndSeparation both = query(a, b, testing::for_both(settings), workspace);
   bits.add(both.penetration);
   bits.add(both.separation);
-  if constexpr (std::is_same_v<A, PlacedTree>) {
+  if constexpr (std::is_same_v<A, PlacedAsset>) {
     if (asked == "matched") bits.add(without_protrusion(both.penetration, a, b));
   }
 }
@@ -178,12 +179,12 @@ std::string hash_of(const Row& row) {
     for (int i = 0; i < 60; ++i) {
       const double scale = i % 3 == 0 ? 1 : i % 3 == 1 ? 0.3 : 0.001;
       const Pose pose_a = poses.next(0.1);
-      const PlacedTree pb{b.view(), poses.next(0.03 * i), scale};
+      const PlacedAsset pb{b.view(), poses.next(0.03 * i), scale};
       if (row.asked.starts_with(kField)) {
-        const PlacedField pa{field_named(row.a), pose_a, 1.0};
+        const PlacedShape pa{field_named(row.a), pose_a, 1.0};
         ask(row.asked.substr(kField.size()), pa, pb, workspace, bits);
       } else {
-        const PlacedTree pa{asset_named(row.a).view(), pose_a, 1.0};
+        const PlacedAsset pa{asset_named(row.a).view(), pose_a, 1.0};
         ask(row.asked, pa, pb, workspace, bits);
       }
     }

@@ -8,9 +8,9 @@
 #include <random>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/judge.h"
 #include "mesh/mesh_solid.h"
@@ -110,7 +110,7 @@ TEST(OutwardWinding, TurnsWhatFacesInward) {
 
 TEST(Judge, AClosedMeshAgreesWithItself) {
   const ClosedMesh gear = close_mesh(make_sample("gear"), "gear");
-  const Judgement judged = judge(gear.mesh, gear, kKept);
+  const RepairQuality judged = judge(gear.mesh, gear, kKept);
   EXPECT_GT(judged.confidence, 0.98);
   EXPECT_NEAR(judged.volume_ratio, 1, 0.01);
   EXPECT_EQ(judged.kept_surface, 1);
@@ -153,7 +153,7 @@ TEST(Judge, IsTheSameForAnyNumberOfThreads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return close_mesh(open, "ball", OpenMeshPolicy::repair).report.judged.value();
   };
-  const Judgement one = judged_by(1), many = judged_by(4);
+  const RepairQuality one = judged_by(1), many = judged_by(4);
   EXPECT_EQ(std::memcmp(&one, &many, sizeof one), 0);
 }
 
@@ -193,7 +193,7 @@ TEST(Wrap, OfAClosedMeshLiesOnIt) {
   const ClosedMesh truth = close_mesh(gear, "gear");
   const double step = 0.01 * truth.report.bounds.diagonal().norm();
   EXPECT_NEAR(volume_of(wrapped) / volume_of(truth), 1, 0.02);
-  const Judgement judged = wrapped.report.judged.value();
+  const RepairQuality judged = wrapped.report.judged.value();
   EXPECT_LT(judged.input_max, step);
   EXPECT_LT(judged.made_max, step);
   EXPECT_LT(judged.made_mean, 0.1 * step);

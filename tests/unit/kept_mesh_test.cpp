@@ -1,13 +1,11 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/error.h>
-#include <ist/field.h>
 #include <ist/lenses.h>
 #include <ist/mass_properties.h>
-#include <ist/overlap.h>
-#include <ist/pair_fit.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +14,7 @@
 #include <ist/asset_layout.h>
 #include "support/test_meshes.h"
 
-// The mesh that an asset holds for exact queries, and assets of a surface alone.
+// The mesh that an asset holds for exact queries, and assets of a mesh alone.
 
 namespace ist {
 namespace {
@@ -53,8 +51,8 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
     EXPECT_EQ(asset.view().mesh_state(), MeshState::own);
     EXPECT_EQ(asset.view().mesh_triangles(), mesh->mesh.triangles.size());
     EXPECT_EQ(mesh_of(asset).error, 0);
-    EXPECT_EQ(asset.view().counted_twice(), 0);
-    expect_sound(bake_surface(*mesh), *mesh);
+    EXPECT_EQ(asset.view().self_overlap_volume(), 0);
+    expect_sound(bake_mesh_only(*mesh), *mesh);
   }
 }
 
@@ -72,17 +70,17 @@ TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
   cone.vertices.emplace_back(0.1, 0.2, 1);
   cone.vertices.emplace_back(0, 0, 0);
   const ClosedMesh mesh = closed(cone, "cone");
-  const Asset asset = bake_surface(mesh);
+  const Asset asset = bake_mesh_only(mesh);
   expect_sound(asset, mesh);
   EXPECT_LT(asset.bytes().size(), 100u * 2 * kSides);
   // Half a cone and, of the other half, what a box leaves.
-  const Asset box = bake_surface(closed(testing::box_mesh({-2, -2, -2}, {0, 2, 2}), "box"));
-  const Asset other = bake_surface(closed(testing::box_mesh({0, -2, -2}, {2, 2, 2}), "box"));
+  const Asset box = bake_mesh_only(closed(testing::box_mesh({-2, -2, -2}, {0, 2, 2}), "box"));
+  const Asset other = bake_mesh_only(closed(testing::box_mesh({0, -2, -2}, {2, 2, 2}), "box"));
   PenetrationSettings exact;
   exact.measure = Measure::exact;
   Workspace workspace;
   const auto overlap = [&](const Asset& with) {
-    return penetration(PlacedTree{asset.view(), {}, 1}, PlacedTree{with.view(), {}, 1}, exact,
+    return penetration(PlacedAsset{asset.view(), {}, 1}, PlacedAsset{with.view(), {}, 1}, exact,
                        workspace);
   };
   const Penetration one = overlap(box), rest = overlap(other);
@@ -91,12 +89,12 @@ TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
 }
 
 TEST(KeptMesh, TellsHowFarVerticesWereRounded) {
-  const Asset exact = bake_surface(closed(testing::cube_mesh(), "cube"));
+  const Asset exact = bake_mesh_only(closed(testing::cube_mesh(), "cube"));
   EXPECT_EQ(exact.view().mesh_error(), 0);
   TriangleMesh far = testing::torus_mesh(1.0, 0.4, 24, 12);
   for (Point& v : far.vertices) v += Point(0.1, 0.2, 0.3);
   const ClosedMesh moved = closed(std::move(far), "moved");
-  const Asset rounded = bake_surface(moved);
+  const Asset rounded = bake_mesh_only(moved);
   EXPECT_GT(rounded.view().mesh_error(), 0);
   EXPECT_LT(rounded.view().mesh_error(), 1e-15);
   expect_sound(rounded, moved);
@@ -121,13 +119,13 @@ TEST(KeptMesh, OfWhatCountsVolumeTwiceIsResolved) {
     const Asset asset = bake(*mesh, few_spheres());
     EXPECT_TRUE(asset.view().has_mesh());
     EXPECT_EQ(asset.view().mesh_state(), MeshState::resolved);
-    EXPECT_NEAR(asset.view().counted_twice(), mesh->report.volume - asset.view().volume(),
+    EXPECT_NEAR(asset.view().self_overlap_volume(), mesh->report.volume - asset.view().volume(),
                 1e-12 * asset.view().volume());
-    EXPECT_EQ(bake_surface(*mesh).view().mesh_triangles(), asset.view().mesh_triangles());
+    EXPECT_EQ(bake_mesh_only(*mesh).view().mesh_triangles(), asset.view().mesh_triangles());
     for (const Invariant& found : check(asset, *mesh))
       EXPECT_EQ(found.violations, 0u) << found.name;
   }
-  EXPECT_NEAR(bake(nested, few_spheres()).view().counted_twice(), 1, 1e-6);
+  EXPECT_NEAR(bake(nested, few_spheres()).view().self_overlap_volume(), 1, 1e-6);
   // Of parts that touch the wall between them goes; cavities are as they should be.
   const ClosedMesh touching =
       closed(testing::joined(testing::box_mesh(-one, one),
@@ -141,7 +139,7 @@ TEST(KeptMesh, OfWhatCountsVolumeTwiceIsResolved) {
     const Asset asset = bake(*mesh, few_spheres());
     const bool joins = mesh == &touching;
     EXPECT_EQ(asset.view().mesh_state(), joins ? MeshState::resolved : MeshState::own);
-    EXPECT_EQ(asset.view().counted_twice(), 0);
+    EXPECT_EQ(asset.view().self_overlap_volume(), 0);
     EXPECT_EQ(mesh_of(asset).shell_count, joins ? 1u : 2u);
     expect_sound(asset, *mesh);
   }
@@ -160,9 +158,9 @@ TEST(KeptMesh, OfASolidByItsDistanceIsTheOneInItsPlace) {
 
 TEST(KeptMesh, SameBytesForAnyNumberOfThreads) {
   const ClosedMesh ball = closed(testing::icosphere_mesh(5), "ball");
-  const Asset one = bake_surface(ball, 1);
+  const Asset one = bake_mesh_only(ball, 1);
   for (const unsigned threads : {2u, 5u}) {
-    const Asset other = bake_surface(ball, threads);
+    const Asset other = bake_mesh_only(ball, threads);
     EXPECT_TRUE(std::equal(one.bytes().begin(), one.bytes().end(), other.bytes().begin(),
                            other.bytes().end()));
   }
@@ -171,7 +169,7 @@ TEST(KeptMesh, SameBytesForAnyNumberOfThreads) {
 class SurfaceAlone : public ::testing::Test {
  protected:
   const ClosedMesh mesh_ = closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
-  const Asset alone_ = bake_surface(mesh_);
+  const Asset alone_ = bake_mesh_only(mesh_);
   const Asset whole_ = bake(mesh_, few_spheres());
   Workspace workspace_;
 };
@@ -185,66 +183,66 @@ TEST_F(SurfaceAlone, HoldsMeshMassAndBounds) {
   EXPECT_EQ(bounds(alone_.view()).radius, bounds(whole_.view()).radius);
 }
 
-void expect_not_held(const Penetration& found) {
-  EXPECT_EQ(found.status, QueryStatus::not_held);
+void expect_missing_data(const Penetration& found) {
+  EXPECT_EQ(found.status, QueryStatus::missing_data);
   for (const double x : {found.volume, found.volume_min, found.volume_max, found.centroid[0],
-                         found.translation_gradient[1], found.rotation_gradient[2]})
+                         found.force[1], found.torque[2]})
     EXPECT_TRUE(std::isnan(x));
 }
 
-void expect_not_held(const Separation& found) {
-  EXPECT_EQ(found.status, QueryStatus::not_held);
+void expect_missing_data(const Separation& found) {
+  EXPECT_EQ(found.status, QueryStatus::missing_data);
   for (const double x : {found.distance, found.distance_min, found.distance_max, found.point_a[0],
                          found.point_b[1], found.normal[2]})
     EXPECT_TRUE(std::isnan(x));
 }
 
-void expect_not_held(const TimeOfImpact& found) {
-  EXPECT_EQ(found.status, ImpactStatus::not_held);
+void expect_missing_data(const TimeOfImpact& found) {
+  EXPECT_EQ(found.status, QueryStatus::missing_data);
   for (const double x : {found.time, found.distance_min, found.distance_max, found.point_a[0]})
     EXPECT_TRUE(std::isnan(x));
 }
 
 TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
-  const PlacedTree alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
+  const PlacedAsset alone{alone_.view(), {}, 1}, whole{whole_.view(), {}, 1};
   for (const auto& [a, b] : {std::pair(alone, whole), {whole, alone}, {alone, alone}}) {
     for (const Measure measure : {Measure::matched, Measure::inner}) {
       PenetrationSettings settings;
       settings.measure = measure;
-      expect_not_held(penetration(a, b, settings, workspace_));
+      expect_missing_data(penetration(a, b, settings, workspace_));
       settings.pair_budget = 100;
-      expect_not_held(penetration(a, b, settings, workspace_));
+      expect_missing_data(penetration(a, b, settings, workspace_));
       ContactSettings contact;
       contact.measure = measure;
       std::vector<ContactPatch> patches(4);
       const ContactPatches found = contact_patches(a, b, contact, workspace_, patches);
-      expect_not_held(found.penetration);
+      expect_missing_data(found.penetration);
       EXPECT_EQ(found.count, 0u);
       without_protrusion(std::span(patches).first(0), a, b, contact);
     }
-    expect_not_held(separation(a, b, {.inner_spheres = true}, workspace_));
+    expect_missing_data(separation(a, b, {.inner_spheres = true}, workspace_));
     EXPECT_EQ(separation(a, b, {}, workspace_).status, QueryStatus::ok);
-    expect_not_held(time_of_impact(a, b, {}, {}, workspace_));
-    EXPECT_EQ(overlap(a, b, workspace_), Overlapping::unknown);
-    EXPECT_EQ(overlap_lenses(a, b, {}, {}).status, QueryStatus::not_held);
-    EXPECT_TRUE(pair_fit(a, b).fits());
+    expect_missing_data(time_of_impact(a, b, {}, {}, workspace_));
+    EXPECT_EQ(overlap(a, b, workspace_), YesNo::unknown);
+    EXPECT_EQ(overlap_lenses(a, b, {}, {}).status, QueryStatus::missing_data);
+    EXPECT_TRUE(size_match(a, b).fits());
     Penetration answer;
     const PlacedPair pair{a, b};
     penetration_batch({&pair, 1}, {}, {&workspace_, 1}, {&answer, 1});
-    expect_not_held(answer);
-    expect_not_held(without_protrusion(answer, a, b));
+    expect_missing_data(answer);
+    expect_missing_data(without_protrusion(answer, a, b));
   }
 }
 
 TEST_F(SurfaceAlone, MeetsNoField) {
-  const PlacedTree alone{alone_.view(), {}, 1};
-  const PlacedField ball{BallField{1}, {}, 1};
-  expect_not_held(penetration(ball, alone, {}, workspace_));
-  expect_not_held(separation(ball, alone, {}, workspace_));
-  expect_not_held(time_of_impact(ball, alone, {}, {}, workspace_));
-  EXPECT_EQ(overlap(ball, alone, workspace_), Overlapping::unknown);
+  const PlacedAsset alone{alone_.view(), {}, 1};
+  const PlacedShape ball{BallShape{1}, {}, 1};
+  expect_missing_data(penetration(ball, alone, {}, workspace_));
+  expect_missing_data(separation(ball, alone, {}, workspace_));
+  expect_missing_data(time_of_impact(ball, alone, {}, {}, workspace_));
+  EXPECT_EQ(overlap(ball, alone, workspace_), YesNo::unknown);
   std::vector<ContactPatch> patches(4);
-  expect_not_held(contact_patches(ball, alone, {}, workspace_, patches).penetration);
+  expect_missing_data(contact_patches(ball, alone, {}, workspace_, patches).penetration);
 }
 
 }  // namespace

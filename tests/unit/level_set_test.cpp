@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
-#include <ist/error.h>
-#include <ist/level_set.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 #include "support/float_traps.h"
@@ -51,20 +51,20 @@ TEST(LevelSet, BandsAndWholeGridsGiveTheSolid) {
         const Vector3d x(coordinate(random), coordinate(random), coordinate(random));
         const double s = solid->signed_distance(x);
         ASSERT_TRUE(std::abs(s) <= made.error + 0.5 * grid.spacing ||
-                    (s > 0) == mesh.inside(mesh.frame().to_unit(x)));
+                    (s < 0) == mesh.inside(mesh.frame().to_unit(x)));
       }
     }
 }
 
 TEST(LevelSet, AGridOfAnyFunctionHasItsLevelSet) {
-  // r² − x²: no distance, and 0 at points of the lattice.
+  // x² − r²: no distance, and 0 at points of the lattice.
   DistanceGrid grid;
   grid.size = {21, 21, 21};
   grid.origin = {-10, -10, -10};
   grid.spacing = 1;
   for (int i = 0; i < 21 * 21 * 21; ++i) {
     const Vector3d x(i % 21 - 10, i / 21 % 21 - 10, i / 441 - 10);
-    grid.values.push_back(static_cast<float>(49 - x.squaredNorm()));
+    grid.values.push_back(static_cast<float>(x.squaredNorm() - 49));
   }
   const ist::LevelSetMesh made = ist::mesh_level_set(grid, "parabola");
   const auto solid = ist::make_grid_solid(grid);
@@ -85,9 +85,9 @@ TEST(LevelSet, NoiseIsClosedToo) {
       const unsigned x = i % 9, y = i / 9 % 8, z = i / 72;
       const bool border = x == 0 || y == 0 || z == 0 || x == 8 || y == 7 || z == 6;
       const float value =
-          seed == 0 ? ((x + y + z) % 2 == 0 ? 1.0f : -1.0f)
-                    : static_cast<float>(static_cast<double>(random() >> 11) * 0x1p-52 - 1);
-      grid.values.push_back(border ? -1.0f : value);
+          seed == 0 ? ((x + y + z) % 2 == 0 ? -1.0f : 1.0f)
+                    : static_cast<float>(static_cast<double>(random() >> 11) * -0x1p-52 + 1);
+      grid.values.push_back(border ? 1.0f : value);
     }
     EXPECT_NO_THROW(ist::mesh_level_set(grid, "noise")) << seed;  // close_mesh demands a cycle
   }
@@ -110,12 +110,12 @@ TEST(LevelSet, RefusesWhatIsNoLevelSet) {
   refused([](DistanceGrid& g) { g.values.pop_back(); }, "values");
   refused([](DistanceGrid& g) { g.values[77] = NAN; }, "not finite");
   refused([](DistanceGrid& g) { g.values[77] = INFINITY; }, "not finite");
-  refused([](DistanceGrid& g) { g.values[0] = 1; }, "border at point (0 0 0)");
+  refused([](DistanceGrid& g) { g.values[0] = -1; }, "border at point (0 0 0)");
   refused([](DistanceGrid& g) { g.spacing = 0; }, "spacing");
   refused([](DistanceGrid& g) { g.origin[1] = NAN; }, "origin");
   refused([](DistanceGrid& g) { g.size[1] = 1; }, "along an axis");
   refused([](DistanceGrid& g) { g.size = {1u << 20, 1u << 20, 1u << 20}; }, "2^31");
-  refused([](DistanceGrid& g) { g.values.assign(g.values.size(), -1.0f); }, "no point");
+  refused([](DistanceGrid& g) { g.values.assign(g.values.size(), 1.0f); }, "no point");
   EXPECT_THROW(ist::mesh_level_set(good, "", [](const ist::Progress&) { return false; }),
                ist::Error);
 }

@@ -240,7 +240,7 @@ TEST(MassProperties, InTheWorld) {
       Eigen::AngleAxisd(1.1, Vector3d(-1, 2, 0.5).normalized()).toRotationMatrix();
   const Eigen::Quaterniond q(turn);
   const double scale = 1.7;
-  const PlacedTree placed{asset.view(), {{q.w(), q.x(), q.y(), q.z()}, {4, -5, 6}}, scale};
+  const PlacedAsset placed{asset.view(), {{q.w(), q.x(), q.y(), q.z()}, {4, -5, 6}}, scale};
   TriangleMesh moved = box_mesh(lower, upper);
   for (Vector3d& v : moved.vertices) v = turn * (scale * v) + Vector3d(4, -5, 6);
   const Reference expected = by_quadrature(moved);
@@ -253,7 +253,7 @@ TEST(MassProperties, InTheWorld) {
   }
   EXPECT_LE((held.lower - box.min()).norm() + (held.upper - box.max()).norm(), 1e-13);
 
-  PlacedTree wrong = placed;
+  PlacedAsset wrong = placed;
   for (double& q : wrong.pose.q) q = 0;
   EXPECT_TRUE(std::isnan(mass_properties(wrong).volume));
   EXPECT_TRUE(mass_properties(wrong).inertia.hasNaN());
@@ -261,9 +261,9 @@ TEST(MassProperties, InTheWorld) {
   wrong = placed;
   wrong.scale = 0;
   EXPECT_TRUE(std::isnan(mass_properties(wrong).volume));
-  EXPECT_TRUE(std::isnan(mass_properties(PlacedTree()).volume));
-  EXPECT_EQ(mass_properties(TreeView()).inertia, Matrix3d(Matrix3d::Zero()));
-  EXPECT_EQ(bounds(TreeView()).radius, 0);
+  EXPECT_TRUE(std::isnan(mass_properties(PlacedAsset()).volume));
+  EXPECT_EQ(mass_properties(AssetView()).inertia, Matrix3d(Matrix3d::Zero()));
+  EXPECT_EQ(bounds(AssetView()).radius, 0);
 }
 
 TEST(Bounds, BallsAreTheSmallest) {

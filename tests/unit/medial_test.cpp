@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
-#include <ist/error.h>
-#include <ist/medial.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 
 #include <cmath>
 

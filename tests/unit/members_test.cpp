@@ -2,10 +2,10 @@
 
 #include <cstddef>
 
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <ist/lenses.h>
 #include <ist/query.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
 #include <ist/time_of_impact.h>
 
 #include "query/base/members.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_moments.h"
 #include "support/float_traps.h"
@@ -26,9 +26,9 @@ double volume_of(const ist::TriangleMesh& mesh) { return MeshSolid(closed(mesh, 
 
 TEST(MeshSolid, SignedDistanceOfTheCube) {
   const MeshSolid cube(closed(cube_mesh(), "cube"));
-  EXPECT_DOUBLE_EQ(cube.signed_distance({0, 0, 0}), 0.5);
-  EXPECT_DOUBLE_EQ(cube.signed_distance({0.25, 0.1, 0}), 0.25);
-  EXPECT_DOUBLE_EQ(cube.signed_distance({0, 1.5, 0}), -1);
+  EXPECT_DOUBLE_EQ(cube.signed_distance({0, 0, 0}), -0.5);
+  EXPECT_DOUBLE_EQ(cube.signed_distance({0.25, 0.1, 0}), -0.25);
+  EXPECT_DOUBLE_EQ(cube.signed_distance({0, 1.5, 0}), 1);
   EXPECT_DOUBLE_EQ(cube.signed_distance({0.5, 0.5, 0.5}), 0);
 }
 

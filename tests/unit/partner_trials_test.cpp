@@ -78,7 +78,7 @@ TEST(PartnerTrials, HoldTheOverlapAskedFor) {
 TEST(PartnerTrials, AreTheSameForAnyNumberOfThreads) {
   const auto trials_of = [](int threads) {
     return tbb::task_arena(threads).execute([] {
-      const Asset surface = bake_surface(cube());
+      const Asset surface = bake_mesh_only(cube());
       return PartnerTrials(solid_cube(), surface.view()).find(TrialPartner::corner, 0.001, 4, 3);
     });
   };

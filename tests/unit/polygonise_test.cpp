@@ -10,7 +10,7 @@
 #include <numbers>
 #include <random>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 
@@ -119,7 +119,7 @@ TEST(Polygonise, ErrorsHoldAndMeshesClose) {
         for (int k = 0; k < 3; ++k)
           x[k] = std::uniform_real_distribution<double>(box.min()[k], box.max()[k])(random);
         const double s = c.solid->signed_distance(x);
-        ASSERT_TRUE(std::abs(s) <= made.error || (s > 0) == mesh.inside(mesh.frame().to_unit(x)));
+        ASSERT_TRUE(std::abs(s) <= made.error || (s < 0) == mesh.inside(mesh.frame().to_unit(x)));
       }
       const double volume = c.solid->volume();
       EXPECT_NEAR(mesh.volume(), volume, 3 * edge * edge / 0.25 * volume);
@@ -177,7 +177,7 @@ TEST(Polygonise, WhatIsTooThinCountsIntoTheError) {
 class Faulty final : public Solid {
  public:
   Faulty(double slope, double bound) : slope_(slope), bound_(bound) {}
-  double signed_distance(const Vector3d& x) const override { return slope_ * (1 - x.norm()); }
+  double signed_distance(const Vector3d& x) const override { return slope_ * (x.norm() - 1); }
   Eigen::AlignedBox3d bounds() const override {
     return {Vector3d::Constant(-bound_), Vector3d::Constant(bound_)};
   }

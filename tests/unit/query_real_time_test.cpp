@@ -2,12 +2,11 @@
 // while queries of all kinds run, and every trap is shown to spring.
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/field.h>
-#include <ist/ist.h>
-#include <ist/overlap.h>
+#include <ist/c.h>
 #include <ist/query.h>
+#include <ist/raycast.h>
 #include <ist/scene.h>
-#include <ist/surface.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 
 #include <bit>
@@ -29,8 +28,8 @@ class RealTime : public ::testing::Test {
  protected:
   /// One query of each kind, at a pose that depends on `i`.
   void ask(int i, const PenetrationSettings& settings) {
-    const PlacedTree a{a_.view(), poses_a_[i], 1.0};
-    const PlacedTree b{b_.view(), poses_b_[i], i % 3 == 0 ? 0.01 : 1.0};
+    const PlacedAsset a{a_.view(), poses_a_[i], 1.0};
+    const PlacedAsset b{b_.view(), poses_b_[i], i % 3 == 0 ? 0.01 : 1.0};
     volume_[i] = penetration(a, b, settings, workspaces_[0]).volume;
     separation(a, b, testing::for_separation(settings), workspaces_[0]);
     overlap(a, b, workspaces_[0]);
@@ -52,7 +51,7 @@ class RealTime : public ::testing::Test {
       ADD_FAILURE() << ist_describe(c_penetration.status);
 
     // What meets a surface: a field and a tree, and trees by the surface of either.
-    const PlacedField field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
+    const PlacedShape field{fields_[static_cast<std::size_t>(i) % fields_.size()], poses_a_[i], 1};
     volume_[i] += penetration(field, b, settings, workspaces_[0]).volume;
     query(field, b, testing::for_both(settings), workspaces_[0]);
     contact_patches(field, b, settings, workspaces_[0], patches_);
@@ -68,12 +67,12 @@ class RealTime : public ::testing::Test {
     until.max_visits = settings.max_visits != 0 ? settings.max_visits : 3000;
     time_of_impact(a, b, motions, until, workspaces_[0]);
     time_of_impact(field, b, motions, until, workspaces_[0]);
-    const PlacedTree solid{box_.view(), poses_a_[i], 1.0};
-    const PlacedTree other{box_.view(), poses_b_[(i + 20) % kPoses], 1.0};
+    const PlacedAsset solid{box_.view(), poses_a_[i], 1.0};
+    const PlacedAsset other{box_.view(), poses_b_[(i + 20) % kPoses], 1.0};
     // By meshes: across, in place, and in little room.
     PenetrationSettings exact = settings;
     exact.measure = Measure::exact;
-    const PlacedTree ball{ball_.view(), poses_b_[i], 1.0};
+    const PlacedAsset ball{ball_.view(), poses_b_[i], 1.0};
     volume_[i] += penetration(solid, ball, exact, workspaces_[0]).volume_max;
     penetration(solid, solid, exact, workspaces_[0]);
     penetration(ball, ball, exact, small_);
@@ -88,35 +87,35 @@ class RealTime : public ::testing::Test {
     time_of_impact(solid, other, motions, until, workspaces_[0]);
     time_of_impact(field, other, motions, until, workspaces_[0]);
     for (const double scale : {1.0, 0.1}) {  // where spheres answer, and where meshes do
-      const PlacedTree small{box_.view(), b.pose, scale};
+      const PlacedAsset small{box_.view(), b.pose, scale};
       volume_[i] += penetration(solid, small, settings, workspaces_[0]).volume +
                     penetration(small, solid, settings, workspaces_[0]).volume;
       contact_patches(solid, small, settings, workspaces_[0], patches_);
     }
   }
 
-  static FieldSample sample(const void*, const Eigen::Vector3d& x) noexcept {
-    return {0.2 - x.z(), -Eigen::Vector3d::UnitZ()};
+  static ShapeSample sample(const void*, const Eigen::Vector3d& x) noexcept {
+    return {x.z() - 0.2, Eigen::Vector3d::UnitZ()};
   }
 
   static constexpr int kPoses = 40;
   const Asset a_ = testing::make_random_asset({600, 0.2, {}, 0, 2}, 1);
   const Asset b_ = testing::make_random_asset({600, 0.2, {}, 0, 1}, 2);
   const Asset box_ = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 60});
-  const Asset ball_ = bake_surface(close_mesh(testing::icosphere_mesh(4), "ball"));
+  const Asset ball_ = bake_mesh_only(close_mesh(testing::icosphere_mesh(4), "ball"));
   const std::vector<float> numbers_ = std::vector<float>(125, 0.1f);
-  const std::vector<Field> fields_ = {
-      HalfSpaceField{},
-      BoxField{{0.5, 0.4, 0.05}},
-      BallField{0.6},
-      CapsuleField{0.4, 0.4},
-      CylinderField{0.4, 0.4},
-      HeightField{numbers_.data(), 5, 5, {0.3, 0.3}},
-      DistanceGridField{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
-      FunctionField{sample, nullptr, 0}};
+  const std::vector<Shape> fields_ = {
+      HalfSpaceShape{},
+      BoxShape{{0.5, 0.4, 0.05}},
+      BallShape{0.6},
+      CapsuleShape{0.4, 0.4},
+      CylinderShape{0.4, 0.4},
+      HeightFieldShape{numbers_.data(), 5, 5, {0.3, 0.3}},
+      DistanceGridShape{numbers_.data(), {5, 5, 5}, Eigen::Vector3d::Constant(-1), 0.5, 0},
+      FunctionShape{sample, nullptr, 0}};
   Workspace workspaces_[1], small_{16};
   ist_workspace_t c_workspace_ = {};
-  ist_tree_t c_tree_a_ = {}, c_tree_b_ = {};
+  ist_asset_t c_tree_a_ = {}, c_tree_b_ = {};
   ContactPatch patches_[8];
   Penetration answers_[2];
   double volume_[kPoses] = {};
@@ -137,15 +136,15 @@ class RealTime : public ::testing::Test {
       SceneBody body;
       body.number = k;
       body.group = k % 2;
-      const Field floor = HalfSpaceField{{0, 0, 1}, -0.5};
+      const Shape floor = HalfSpaceShape{{0, 0, 1}, -0.5};
       body.solid = k == 0       ? PlacedSolid(floor, Pose{})
                    : k % 4 == 1 ? PlacedSolid(ball_.view(), Pose{})
                                 : PlacedSolid(k % 4 == 3 ? box_.view() : a_.view(), Pose{});
       scene_.add(body);
     }
     ist_workspace_make(0, nullptr, &c_workspace_);
-    ist_tree_view(a_.bytes().data(), a_.bytes().size(), &c_tree_a_);
-    ist_tree_view(b_.bytes().data(), b_.bytes().size(), &c_tree_b_);
+    ist_asset_view(a_.bytes().data(), a_.bytes().size(), &c_tree_a_);
+    ist_asset_view(b_.bytes().data(), b_.bytes().size(), &c_tree_b_);
     std::mt19937_64 random(4);
     for (int i = 0; i < kPoses; ++i) {
       poses_a_[i] = testing::random_pose(random, 0.0);

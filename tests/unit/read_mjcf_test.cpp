@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "robot/kinematics.h"
 #include "robot/robot_model.h"

@@ -3,7 +3,7 @@
 #include <numbers>
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "robot/kinematics.h"
 #include "robot/robot_model.h"
@@ -55,7 +55,7 @@ TEST(Sdf, LinksJointsAndShapes) {
   EXPECT_TRUE(std::get<LinkBox>(robot.links[0].collision.at(0).shape)
                   .half_extents.isApprox(Vector3d(0.5, 1, 1.5)));
   EXPECT_EQ(robot.links[0].collision.size(), 1u);
-  const PlacedShape& mesh = robot.links[1].collision.at(0);
+  const PlacedLinkShape& mesh = robot.links[1].collision.at(0);
   EXPECT_EQ(std::get<LinkMesh>(mesh.shape).file, "model://m/b.stl");
   EXPECT_TRUE(std::get<LinkMesh>(mesh.shape).scale.isApprox(Vector3d(2, 2, -1)));
   EXPECT_TRUE(mesh.translation.isApprox(Vector3d(0, 0, 0.5)));

@@ -8,8 +8,8 @@
 #include <set>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "mesh/edge_table.h"
 #include "mesh/repair.h"

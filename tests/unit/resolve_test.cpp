@@ -12,9 +12,9 @@
 #include <vector>
 
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/mesh.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "support/mesh_table.h"
 #include "support/shared_data.h"
@@ -60,9 +60,9 @@ void expect_same_solid(const ClosedMesh& a, const ClosedMesh& b, const double ne
     const Point at(share(random), share(random), share(random));
     const Point p = a.report.bounds.min() + at.cwiseProduct(a.report.bounds.sizes());
     const double in_a = of_a->signed_distance(p), in_b = of_b->signed_distance(p);
-    inside += in_a > 0 ? 1 : 0;
+    inside += in_a < 0 ? 1 : 0;
     if (std::abs(in_a) > near) {
-      EXPECT_EQ(in_a > 0, in_b > 0) << p.transpose();
+      EXPECT_EQ(in_a < 0, in_b < 0) << p.transpose();
     }
   }
   EXPECT_GT(inside, 0u);
@@ -197,7 +197,7 @@ TEST(Resolve, PartsThatTouchAreOneSolidAtEveryTurn) {
       EXPECT_GE(result.resolution.counted_twice, 0);
       EXPECT_NEAR(result.mesh.report.volume, volume, 1e-11 * volume) << turn;
       EXPECT_NEAR(area_of(result.mesh.mesh), area, 1e-9 * area) << "an inner wall, " << turn;
-      const Asset asset = bake_surface(closed);
+      const Asset asset = bake_mesh_only(closed);
       EXPECT_NEAR(asset.view().volume(), volume, 1e-11 * volume);
       if (turn % 6 > 1) continue;
       for (const Invariant& one : check(asset, closed))
@@ -423,7 +423,7 @@ TEST(Resolve, ReportsAndIsCancelled) {
     return std::string_view(now.stage) != "resolve";
   };
   EXPECT_THROW(bake(closed, {.max_spheres = 100}, no), Error);
-  EXPECT_THROW(bake_surface(closed, 0, no), Error);
+  EXPECT_THROW(bake_mesh_only(closed, 0, no), Error);
   EXPECT_THROW(bake_to_error(closed, {}, {}, no), Error);
   // What meets nothing is not looked at.
   EXPECT_EQ(resolve(close_mesh(testing::cube_mesh(), "cube"), no).resolution.how, How::as_it_is);

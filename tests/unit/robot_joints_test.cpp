@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "robot/group_states.h"
 #include "robot/kinematics.h"

@@ -5,8 +5,8 @@
 #include <regex>
 #include <string>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "robot/link_mesh.h"
 #include "robot/robot_model.h"
@@ -43,7 +43,7 @@ TEST(RobotModel, ReadsShapesAndPoses) {
       "<joint name='j' type='fixed'><parent link='base'/><child link='tip'/></joint></robot>");
   EXPECT_EQ(robot.name, "r&s");
   ASSERT_EQ(robot.links.size(), 2u);
-  const PlacedShape& box = robot.links[0].collision[0];
+  const PlacedLinkShape& box = robot.links[0].collision[0];
   EXPECT_EQ(std::get<LinkBox>(box.shape).half_extents, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(box.translation, Eigen::Vector3d(1, 2, 3));
   EXPECT_TRUE((box.rotation * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
@@ -101,7 +101,7 @@ TEST(RobotModel, FindsPackagesAndTurnsMirroredMeshes) {
   EXPECT_THROW(here.find("no.obj"), Error);
   EXPECT_THROW(here.find("package://"), Error);
 
-  PlacedShape placed;
+  PlacedLinkShape placed;
   placed.shape = LinkMesh{"m.obj", {-2, 1, 3}};
   placed.translation = {5, 0, 0};
   const ClosedMesh closed = close_mesh(mesh_of(placed, here, "r.urdf").mesh, "mirrored");
@@ -132,26 +132,26 @@ TEST(RobotModel, UnusedFaultsAndUnusualNames) {
 }
 
 TEST(RobotModel, ACapsulesMeshHoldsIt) {
-  PlacedShape placed;
+  PlacedLinkShape placed;
   placed.shape = LinkCapsule{2, 3};
   const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
   const auto solid = make_solid(close_mesh(shape.mesh, "capsule"));
   for (int i = 0; i < 1000; ++i) {
     const double z = 0.002 * i - 1, r = std::sqrt(1 - z * z), a = 2.4 * i;
     const Eigen::Vector3d x(2 * r * std::cos(a), 2 * r * std::sin(a), 2 * z + (z < 0 ? -3 : 3));
-    EXPECT_GE(solid->signed_distance(x), -1e-12);
-    EXPECT_LE(solid->signed_distance(x), shape.slack);
+    EXPECT_LE(solid->signed_distance(x), 1e-12);
+    EXPECT_GE(solid->signed_distance(x), -shape.slack);
   }
   EXPECT_LT(shape.slack, 0.01);
 }
 
 TEST(RobotModel, ACylindersMeshHoldsIt) {
-  PlacedShape placed;
+  PlacedLinkShape placed;
   placed.shape = LinkCylinder{2, 3};
   const ShapeMesh shape = mesh_of(placed, PackagePaths("r.urdf", {}, ""), "r.urdf");
   const auto solid = make_solid(close_mesh(shape.mesh, "cylinder"));
   for (int i = 0; i < 1000; ++i)
-    EXPECT_GE(solid->signed_distance({2 * std::cos(0.01 * i), 2 * std::sin(0.01 * i), 0}), -1e-12);
+    EXPECT_LE(solid->signed_distance({2 * std::cos(0.01 * i), 2 * std::sin(0.01 * i), 0}), 1e-12);
   EXPECT_LT(shape.slack, 2e-3);
 }
 

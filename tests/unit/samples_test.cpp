@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include "mesh/winding.h"
 
@@ -78,9 +78,9 @@ double deepest_corner(double turns, double along) {
   const Eigen::Vector3d t(0, 0, along);
   double deepest = -1;
   for (const Eigen::Vector3d& v : nut.vertices)
-    deepest = std::max(deepest, bolt_solid->signed_distance(r * v + t));
+    deepest = std::max(deepest, -bolt_solid->signed_distance(r * v + t));
   for (const Eigen::Vector3d& v : bolt.vertices)
-    deepest = std::max(deepest, nut_solid->signed_distance(r.transpose() * (v - t)));
+    deepest = std::max(deepest, -nut_solid->signed_distance(r.transpose() * (v - t)));
   return deepest;
 }
 

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
-#include <ist/error.h>
 #include <ist/mesh.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"

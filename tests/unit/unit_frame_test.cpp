@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 namespace {
 

@@ -3,7 +3,7 @@
 // Lengths are [u], the unit of the mesh that was baked. Everything is in double precision.
 // Every function except init() is synchronous, and throws an IstError with one English sentence:
 // what is wrong, and the remedy. An option that is misspelt throws a TypeError that names it.
-// The module keeps its memory in WebAssembly: assets and fields are released by free(), or some time
+// The module keeps its memory in WebAssembly: assets and shapes are released by free(), or some time
 // after the last reference is gone.
 // Each worker of a page has its own module and awaits its init().
 
@@ -30,7 +30,7 @@ export function version(): string;
 
 /** An error of this package. */
 export class IstError extends Error {
-  /** ist_status_t of <ist/ist.h>, < 0; 0 if the module itself refuses. */
+  /** ist_status_t of <ist/c.h>, < 0; 0 if the module itself refuses. */
   readonly status: number;
 }
 
@@ -87,7 +87,7 @@ export interface AssetInfo {
   /** [u] its surface and the solid's lie within this of each other. */
   meshError: number;
   /** [u³] volume that the input mesh counts more than once. */
-  countedTwice: number;
+  selfOverlapVolume: number;
 }
 
 /** A box and a ball that contain the solid. */
@@ -119,7 +119,7 @@ export interface SphereSet {
 }
 
 /** A closed surface, for drawing and measuring. */
-export interface Surface {
+export interface ClosedSurface {
   /** [u] x, y, z of each vertex. */
   positions: Float64Array;
   /** Three vertices per triangle, counter-clockwise from outside. */
@@ -153,25 +153,25 @@ export class Asset {
   level(level: number, set?: SphereSet): Float64Array;
 
   /** The stored mesh; null if there is none. */
-  surface(): Surface | null;
+  mesh(): ClosedSurface | null;
 
   /** Releases the memory. May be called twice. */
   free(): void;
 }
 
-// --- Fields: solids without spheres -----------------------------------------------------------------
+// --- Shapes: solids without spheres -----------------------------------------------------------------
 
 /** A shape, as one of the two solids of a query. Make it once and use it often. */
-export class Field {
+export class Shape {
   /** normal · x ≤ offset. `normal`: outward, not 0; its length divides `offset` too. */
-  static halfSpace(normal: Vector, offset?: number): Field;
+  static halfSpace(normal: Vector, offset?: number): Shape;
   /** Around the origin. */
-  static box(halfExtents: Vector): Field;
-  static ball(radius: number): Field;
+  static box(halfExtents: Vector): Shape;
+  static ball(radius: number): Shape;
   /** About the z axis; `halfHeight` ≥ 0 is the segment's. */
-  static capsule(radius: number, halfHeight: number): Field;
+  static capsule(radius: number, halfHeight: number): Shape;
   /** About the z axis. */
-  static cylinder(radius: number, halfHeight: number): Field;
+  static cylinder(radius: number, halfHeight: number): Shape;
   /**
    * Terrain under a grid of heights along z, copied: `columns` (x) run fastest, heights[0] is at
    * the origin. Beyond its border it continues level.
@@ -181,9 +181,9 @@ export class Field {
     columns: number,
     rows: number,
     spacing: ArrayLike<number>,
-  ): Field;
+  ): Shape;
   /**
-   * Distances, positive inside, at the points of a grid, copied: x runs fastest. Points outside
+   * Distances, negative inside, at the points of a grid, copied: x runs fastest. Points outside
    * the grid are outside the solid.
    */
   static distanceGrid(
@@ -191,7 +191,7 @@ export class Field {
     points: ArrayLike<number>,
     spacing: number,
     options?: { origin?: Vector; error?: number },
-  ): Field;
+  ): Shape;
 
   /** Releases the memory. May be called twice. */
   free(): void;
@@ -216,7 +216,7 @@ export interface ContactOptions extends Limits {
   measure?: Measure;
   /**
    * Sums spheres even where they are too coarse for two solids of unlike sizes, and may be wrong by
-   * any factor (pairFit()); otherwise the meshes answer there. `matched` only. Default false.
+   * any factor (sizeMatch()); otherwise the meshes answer there. `matched` only. Default false.
    */
   spheresOnly?: boolean;
   /**
@@ -279,8 +279,8 @@ export interface Penetration {
 
 /** Throws for a pose or an option out of range, and for a solid that lacks what the measure needs. */
 export function penetration(
-  a: Asset | Field,
-  b: Asset | Field,
+  a: Asset | Shape,
+  b: Asset | Shape,
   poseB: Pose,
   options?: PenetrationOptions,
 ): Penetration;
@@ -313,8 +313,8 @@ export interface Separation {
 }
 
 export function separation(
-  a: Asset | Field,
-  b: Asset | Field,
+  a: Asset | Shape,
+  b: Asset | Shape,
   poseB: Pose,
   options?: SeparationOptions,
 ): Separation;
@@ -339,7 +339,7 @@ export interface ContactPatch {
   /** [u] The point of the wrench's central axis that is nearest to the centroid. */
   point: Float64Array;
   /** [u³/rad] Residual moment about the normal of a force at `point`. */
-  twist: number;
+  torsion: number;
 }
 
 export interface ContactPatchesOptions extends ContactOptions {
@@ -358,8 +358,8 @@ export interface ContactPatches {
 }
 
 export function contactPatches(
-  a: Asset | Field,
-  b: Asset | Field,
+  a: Asset | Shape,
+  b: Asset | Shape,
   poseB: Pose,
   options?: ContactPatchesOptions,
 ): ContactPatches;
@@ -402,8 +402,8 @@ export function overlapOutline(
 
 /** Whether two solids share a point. `yes` and `no` are certain. */
 export function overlap(
-  a: Asset | Field,
-  b: Asset | Field,
+  a: Asset | Shape,
+  b: Asset | Shape,
   poseB: Pose,
   options?: { poseA?: Pose },
 ): 'no' | 'yes' | 'unknown';
@@ -450,22 +450,22 @@ export interface RayHits {
   point: Float64Array;
   /** Unit, outward, three numbers per ray. */
   normal: Float64Array;
-  /** Of the kept mesh, 2³² − 1: no hit, or a field. */
+  /** Of the kept mesh, 2³² − 1: no hit, or a shape. */
   triangle: Uint32Array;
 }
 
 /**
  * Where rays first meet the surface of a solid at `pose`, on their way out if they start inside. No
  * ray passes between two triangles. Directions may have any length but 0. One origin or one direction
- * applies to all rays. Fields: half-spaces, boxes, balls, capsules and cylinders.
- * `longest` [u]: rays end there; default Infinity.
+ * applies to all rays. Shapes: half-spaces, boxes, balls, capsules and cylinders.
+ * `maxDistance` [u]: rays end there; default Infinity.
  */
 export function raycast(
-  solid: Asset | Field,
+  solid: Asset | Shape,
   pose: Pose,
   origins: ArrayLike<number>,
   directions: ArrayLike<number>,
-  options?: { longest?: number; into?: RayHits },
+  options?: { maxDistance?: number; into?: RayHits },
 ): RayHits;
 
 /** Of each point; arrays given by `into` may be longer than `count`. */
@@ -485,7 +485,7 @@ export interface SurfacePoints {
 
 /** The points of a solid's surface that are nearest to points [u] of the world. */
 export function closestPoint(
-  solid: Asset | Field,
+  solid: Asset | Shape,
   pose: Pose,
   points: ArrayLike<number>,
   options?: { into?: SurfacePoints },
@@ -496,7 +496,7 @@ export function closestPoint(
  * the surface either answer is possible, always the same one.
  */
 export function contains(
-  solid: Asset | Field,
+  solid: Asset | Shape,
   pose: Pose,
   points: ArrayLike<number>,
   options?: { into?: Uint8Array },
@@ -557,10 +557,10 @@ export function wrenches(
 ): Wrenches;
 
 /** Whether the sizes of two assets suit each other, independent of their poses. */
-export interface PairFit {
+export interface SizeMatch {
   /** [u] the spheres do not resolve finer features. */
-  grainA: number;
-  grainB: number;
+  featureSizeA: number;
+  featureSizeB: number;
   /** ≥ 1, coarser grain over the finer. */
   ratio: number;
   aIsCoarser: boolean;
@@ -572,11 +572,11 @@ export interface PairFit {
   fits: boolean;
 }
 
-export function pairFit(
+export function sizeMatch(
   a: Asset,
   b: Asset,
   options?: { scaleA?: number; scaleB?: number },
-): PairFit;
+): SizeMatch;
 
 // --- Time of impact ---------------------------------------------------------------------------------
 
@@ -654,8 +654,8 @@ export interface Impact {
  * none, of balls that contain it.
  */
 export function timeOfImpact(
-  a: Asset | Field,
-  b: Asset | Field,
+  a: Asset | Shape,
+  b: Asset | Shape,
   poseB: Pose,
   options?: ImpactOptions,
 ): Impact;
@@ -664,8 +664,8 @@ export function timeOfImpact(
 
 /** One pair of a batch. */
 export interface Pair {
-  a: Asset | Field;
-  b: Asset | Field;
+  a: Asset | Shape;
+  b: Asset | Shape;
   /** Default: the identity. */
   poseA?: Pose;
   poseB: Pose;

@@ -18,7 +18,7 @@ class Part {
 
   const std::string& name() const { return name_; }
   const ist::TriangleMesh& mesh() const { return mesh_; }
-  const ist::TreeView& tree() const { return asset_->view(); }
+  const ist::AssetView& tree() const { return asset_->view(); }
   double volume() const { return tree().volume(); }  ///< [u³]
   const ist::bullet::BodyFrame& frame() const { return frame_; }
 

@@ -12,8 +12,8 @@
 #include <memory>
 
 #include <ist/bullet/shape.h>
+#include <ist/contact_law.h>
 #include <ist/query.h>
-#include <ist/response.h>
 
 // Narrow phase and contact manifolds of assets in Bullet: docs/engines.md. Link ist::bullet with
 // Bullet in single precision, ist::bullet-float64 with Bullet in double precision
@@ -31,7 +31,7 @@ struct Settings {
   };
   Response response = Response::solver;
   std::size_t patches = 8;  ///< [1, kPatches] per contact
-  /// Where an asset keeps no mesh (TreeView::has_mesh), by matched spheres.
+  /// Where an asset keeps no mesh (AssetView::has_mesh), by matched spheres.
   ContactSettings query{.measure = Measure::exact};
 
   /// law.stiffness [force/u³] is the pressure over depth, for both responses. The solver steps the

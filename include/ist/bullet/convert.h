@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include <ist/pose.h>
+#include <ist/types.h>
 
 // Conversions between Bullet's types, of either precision, and those of Eigen and ist.
 

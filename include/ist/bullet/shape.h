@@ -4,7 +4,7 @@
 
 #include <Eigen/Geometry>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 namespace ist::bullet {
 
@@ -16,7 +16,7 @@ struct BodyFrame {
   Eigen::Isometry3d in_mesh = Eigen::Isometry3d::Identity();  ///< body's frame to mesh's
   Eigen::Vector3d unit_inertia = Eigen::Vector3d::Zero();  ///< [u²] about its axes, of a mass of 1
 };
-BodyFrame body_frame(const TreeView& tree);
+BodyFrame body_frame(const AssetView& tree);
 
 /// A baked solid as a collision shape of Bullet, for Contacts. The asset's bytes must outlive it.
 ///
@@ -24,9 +24,9 @@ BodyFrame body_frame(const TreeView& tree);
 /// transform is that of body_frame(), not the mesh's.
 class Shape : public btConcaveShape {
  public:
-  explicit Shape(const TreeView& tree);
+  explicit Shape(const AssetView& tree);
 
-  const TreeView& tree() const { return tree_; }
+  const AssetView& tree() const { return tree_; }
   const btTransform& mesh_in_body() const { return mesh_in_body_; }
   double scale() const { return scale_; }
   double reach() const { return scale_ * reach_; }  ///< [u] bounding radius about the origin
@@ -45,14 +45,14 @@ class Shape : public btConcaveShape {
   void setLocalScaling(const btVector3& scaling) override;
   const btVector3& getLocalScaling() const override { return scaling_; }
 
-  /// Gives Bullet's sweeps and debug drawing the triangles of the kept mesh (TreeView::has_mesh),
-  /// all of them in turn, and its rays those that they hit, by raycast() of <ist/surface.h>.
+  /// Gives Bullet's sweeps and debug drawing the triangles of the kept mesh (AssetView::has_mesh),
+  /// all of them in turn, and its rays those that they hit, by raycast() of <ist/raycast.h>.
   /// Without a mesh there are none, and warn() says so.
   void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                            const btVector3& upper) const override;
 
  private:
-  TreeView tree_;
+  AssetView tree_;
   BodyFrame frame_;
   btTransform mesh_in_body_;
   double scale_ = 1, reach_ = 0;

@@ -1,6 +1,6 @@
 #include "bake/asset/asset_writer.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <cstring>
 
 #include "query/asset/content_hash.h"

@@ -1,6 +1,6 @@
 #include "bake/backend/make_backend.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "cuda/cuda_backend.h"
 #include "packing/banded/banded_packer.h"

@@ -1,7 +1,7 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/error.h>
 #include <ist/solid.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>
@@ -144,7 +144,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
 }
 
 /// Box and ball hold the surface, and what may be around it where that is a solid's mesh.
-std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& surface) {
+std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = vector(asset.centre);
   const Vector3d lower = (vector(asset.box_lower) - origin) / unit;
@@ -152,14 +152,14 @@ std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh&
   const Vector3d middle = (vector(asset.ball_centre) - origin) / unit;
   const double beyond = asset.polygonise_error;
   Tally box, tight, ball;
-  for (std::size_t t = 0; t < surface.triangles().size(); ++t)
-    for (const Vector3d& corner : surface.triangles()[t]) {
+  for (std::size_t t = 0; t < checked.triangles().size(); ++t)
+    for (const Vector3d& corner : checked.triangles()[t]) {
       box.add((lower - corner).maxCoeff() + beyond, t);
       box.add((corner - upper).maxCoeff() + beyond, t);
       ball.add((corner - middle).norm() + beyond - asset.ball_radius / unit, t);
     }
-  tight.add((surface.bounds().min() - lower).maxCoeff() - beyond - 1e-12, 0);
-  tight.add((upper - surface.bounds().max()).maxCoeff() - beyond - 1e-12, 0);
+  tight.add((checked.bounds().min() - lower).maxCoeff() - beyond - 1e-12, 0);
+  tight.add((upper - checked.bounds().max()).maxCoeff() - beyond - 1e-12, 0);
   return {box.named("box holds solid", "protrusion of the surface out of the box, unit frame"),
           tight.named("box is tight", "gap between box and surface, above 1e-12, unit frame"),
           ball.named("ball holds solid", "protrusion of the surface out of the ball, unit frame")};
@@ -175,7 +175,7 @@ class DistanceSolid final : public CheckedSolid {
 
   double distance(const Eigen::Vector3d& p, double) const override { return std::abs(value(p)); }
 
-  int winding(const Eigen::Vector3d& p) const override { return value(p) > 0 ? 1 : 0; }
+  int winding(const Eigen::Vector3d& p) const override { return value(p) < 0 ? 1 : 0; }
 
   const Eigen::AlignedBox3d& bounds() const override { return bounds_; }
 
@@ -190,16 +190,16 @@ class DistanceSolid final : public CheckedSolid {
 };
 
 /// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
-/// certified against; `surface`: what matched spheres are calibrated by; of a mesh's asset they are
+/// certified against; `checked`: what matched spheres are calibrated by; of a mesh's asset they are
 /// the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
-                                 const CheckedSolid& solid, const CheckedMesh& surface,
+                                 const CheckedSolid& solid, const CheckedMesh& checked,
                                  const UnitFrame& frame, const MeshMoments& moments) {
   std::vector<Invariant> all;
   all.push_back(check_frame(asset, frame));
   append(all, check_mass(asset, moments, solid));
-  append(all, check_bounds(asset, surface));
-  append(all, check_kept_mesh(asset, mesh, frame, surface));
+  append(all, check_bounds(asset, checked));
+  append(all, check_kept_mesh(asset, mesh, frame, checked));
   if (asset.sphere_count == 0) return all;
   append(all, check_spheres(asset, solid));
   all.push_back(check_cover(asset, solid));
@@ -207,7 +207,7 @@ std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mes
                          at<float>(asset, asset.cover_radii), "inner tree"));
   for (std::uint32_t i = 0; i <= asset.detail_count; ++i) {
     const std::string name = i == 0 ? "" : "detail " + std::to_string(i) + ": ";
-    append(all, check_matched(asset, i, surface, name));
+    append(all, check_matched(asset, i, checked, name));
     append(all, check_tree(asset, matched_tree(asset, i), matched_spheres(asset, i), nullptr,
                            name + "matched tree"));
   }
@@ -220,8 +220,8 @@ std::vector<Invariant> check_mesh(const AssetHeader& asset, const ClosedMesh& as
   const MeshSolid solid(resolved);
   if (solid.hash() != asset.mesh_hash || (asset.flags & kFlagPolygonised) != 0)
     throw Error(mesh.name + ": the asset was baked from another mesh; bake again");
-  const CheckedMesh surface(mesh, solid.frame());
-  return check_all(asset, mesh, surface, surface, solid.frame(), solid.unit_moments());
+  const CheckedMesh checked(mesh, solid.frame());
+  return check_all(asset, mesh, checked, checked, solid.frame(), solid.unit_moments());
 }
 
 std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid) {

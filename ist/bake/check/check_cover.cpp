@@ -26,10 +26,10 @@ using BallList = std::vector<std::uint32_t>;
 /// proven. A point in the solid that no ball holds, or a cell too small to divide, is a violation.
 class CoverProof {
  public:
-  CoverProof(const AssetHeader& asset, const CheckedSolid& surface)
+  CoverProof(const AssetHeader& asset, const CheckedSolid& checked)
       : spheres_(at<Sphere>(asset, asset.inner_spheres)),
         covers_(at<float>(asset, asset.cover_radii)),
-        surface_(surface) {}
+        checked_(checked) {}
 
   void prove(Cell cell, const BallList& parent, Tally& tally,
              std::vector<std::pair<Cell, BallList>>* later) const {
@@ -53,9 +53,9 @@ class CoverProof {
       }
     }
     if (!cell.inside) {
-      const double distance = surface_.distance(cell.centre, corner);
+      const double distance = checked_.distance(cell.centre, corner);
       if (distance > 0 && (gap > 0 || distance >= corner)) {
-        const bool inside = surface_.winding(cell.centre) >= 1;
+        const bool inside = checked_.winding(cell.centre) >= 1;
         if (!inside && distance >= corner) return;
         if (inside && gap > 0) return tally.add(gap, nearest);
         cell.inside = inside && distance >= corner;
@@ -77,16 +77,16 @@ class CoverProof {
  private:
   const Sphere* spheres_;
   const float* covers_;
-  const CheckedSolid& surface_;
+  const CheckedSolid& checked_;
 };
 
 }  // namespace
 
-Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface) {
-  const CoverProof proof(asset, surface);
+Invariant check_cover(const AssetHeader& asset, const CheckedSolid& checked) {
+  const CoverProof proof(asset, checked);
   BallList all(asset.sphere_count);
   std::iota(all.begin(), all.end(), 0u);
-  const Cell root = {surface.bounds().center(), surface.bounds().sizes().maxCoeff() / 2 + 1e-9, 0,
+  const Cell root = {checked.bounds().center(), checked.bounds().sizes().maxCoeff() / 2 + 1e-9, 0,
                      false};
   std::vector<std::pair<Cell, BallList>> tasks;
   Tally tally;

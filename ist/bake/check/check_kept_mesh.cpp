@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 #include "bake/check/check_tally.h"
 #include "bake/kept_mesh.h"
@@ -273,12 +273,12 @@ Invariant shells(const MeshOfAsset& mesh) {
 }  // namespace
 
 std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
-                                       const UnitFrame& frame, const CheckedMesh& surface) {
+                                       const UnitFrame& frame, const CheckedMesh& checked) {
   if (asset.mesh == 0) return {};
   const MeshOfAsset mesh(asset, *at<MeshHeader>(asset, asset.mesh));
   Tally error;
   error.add(std::fabs(mesh.header.error - asset.polygonise_error), 0);
-  return {same_triangles(mesh.triangles(), surface.triangles()),
+  return {same_triangles(mesh.triangles(), checked.triangles()),
           rounding(baked, frame, mesh.header.rounding),
           error.named("mesh error",
                       "difference of the mesh's error and the solid's polygonisation, unit frame"),

@@ -55,19 +55,19 @@ std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres,
   return both;
 }
 
-std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& surface) {
+std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& checked) {
   const std::size_t n = asset.sphere_count;
   const Sphere* inner = at<Sphere>(asset, asset.inner_spheres);
   const float* covers = at<float>(asset, asset.cover_radii);
   std::vector<Invariant> out;
 
   out.push_back(tally_all(n, [&](std::size_t i, Tally& tally) {
-                  tally.add(1.0 - surface.winding(centre(inner[i])), i);
+                  tally.add(1.0 - checked.winding(centre(inner[i])), i);
                 }).named("centre inside solid", "1 − winding number of an inner sphere's centre"));
   out.push_back(tally_all(n,
                           [&](std::size_t i, Tally& tally) {
                             const double r = inner[i].r;
-                            tally.add(r - surface.distance(centre(inner[i]), 2 * r + 1e-3), i);
+                            tally.add(r - checked.distance(centre(inner[i]), 2 * r + 1e-3), i);
                           })
                     .named("sphere clear of surface",
                            "radius − distance of the centre to the surface, unit frame"));
@@ -91,7 +91,7 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
 }
 
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
-                                     const CheckedMesh& surface, const std::string& name) {
+                                     const CheckedMesh& checked, const std::string& name) {
   const std::size_t n = matched_tree(asset, detail).sphere_count;
   const Sphere* const matched = matched_spheres(asset, detail);
   const double stated =
@@ -107,8 +107,8 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
       tally_all(n,
                 [&](std::size_t i, Tally& tally) {
                   const Eigen::Vector3d c = centre(matched[i]);
-                  const double d = surface.distance(c, 100);
-                  const double depth = surface.winding(c) >= 1 ? d : -d;
+                  const double d = checked.distance(c, 100);
+                  const double depth = checked.winding(c) >= 1 ? d : -d;
                   tally.add(matched[i].r - depth - protrusion - 1e-12, i);
                 })
           .named(

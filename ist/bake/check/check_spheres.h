@@ -20,14 +20,14 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
                                   const std::string& name);
 
 /// Inner spheres lie in the solid and apart; covers hold spheres.
-std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& surface);
+std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& checked);
 
 /// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.
 std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t detail,
-                                     const CheckedMesh& surface, const std::string& name);
+                                     const CheckedMesh& checked, const std::string& name);
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
-Invariant check_cover(const AssetHeader& asset, const CheckedSolid& surface);
+Invariant check_cover(const AssetHeader& asset, const CheckedSolid& checked);
 
 /// For every sphere, the others that it overlaps.
 std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres, std::size_t count);

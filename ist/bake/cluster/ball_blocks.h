@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include <ist/sphere.h>
+#include <ist/types.h>
 
 #include <ist/asset_layout.h>
 #include "bake/cluster/bounding_ball.h"

@@ -202,19 +202,19 @@ class Growth {
 };
 
 /// A ball around a patch: the middle of its box and the farthest vertex.
-struct SurfaceExtent {
+struct PatchExtent {
   FloatPoint middle;
   double radius;
 };
 
-SurfaceExtent extent_of(const FloatMesh& mesh, const std::vector<std::uint32_t>& vertices) {
+PatchExtent extent_of(const FloatMesh& mesh, const std::vector<std::uint32_t>& vertices) {
   FloatPoint low = mesh.vertices[vertices[0]], high = low;
   for (const std::uint32_t v : vertices)
     for (std::size_t k = 0; k < 3; ++k) {
       low[k] = std::min(low[k], mesh.vertices[v][k]);
       high[k] = std::max(high[k], mesh.vertices[v][k]);
     }
-  SurfaceExtent out{{}, 0};
+  PatchExtent out{{}, 0};
   for (std::size_t k = 0; k < 3; ++k) out.middle[k] = (low[k] + high[k]) / 2;
   for (const std::uint32_t v : vertices)
     out.radius = std::max(out.radius, distance2(mesh.vertices[v], out.middle));
@@ -234,7 +234,7 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
   std::vector<FloatPoint> middles(patches.size());
   std::vector<double> radii(patches.size());
   for (std::size_t p = 0; p < patches.size(); ++p) {
-    const SurfaceExtent extent = extent_of(mesh, patches[p].vertices);
+    const PatchExtent extent = extent_of(mesh, patches[p].vertices);
     middles[p] = extent.middle;
     radii[p] = extent.radius;
   }

@@ -102,8 +102,8 @@ constexpr double kPlateThickness = 0.02;
 constexpr double kPlaneReach = 4;  // half extent of the box that the plane's truth is
 
 /// A partner turned as it will come, around the origin.
-struct Shape {
-  Field field;
+struct TrialShape {
+  Shape field;
   Pose pose;              ///< of the field
   ConvexBody body;        ///< what the truth is of
   Vector3d half_extents;  ///< [u] of a ball: its radius
@@ -123,8 +123,8 @@ Quaterniond random_turn(const Vector3d& from, const Vector3d& to, TrialRandom& r
   }
 }
 
-Shape box_shape(const Vector3d& half_extents, const Quaterniond& turn) {
-  return {BoxField{half_extents},
+TrialShape box_shape(const Vector3d& half_extents, const Quaterniond& turn) {
+  return {BoxShape{half_extents},
           {{turn.w(), turn.x(), turn.y(), turn.z()}, {0, 0, 0}},
           ConvexBody::box(Vector3d::Zero(), turn.toRotationMatrix(), half_extents),
           half_extents};
@@ -138,11 +138,11 @@ Asset box_surface(const Vector3d& half) {
                              (corner & 4) != 0 ? half.z() : -half.z()});
   mesh.triangles = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}, {0, 1, 5}, {0, 5, 4},
                     {2, 6, 7}, {2, 7, 3}, {0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}};
-  return bake_surface(close_mesh(std::move(mesh), "box"), 1);
+  return bake_mesh_only(close_mesh(std::move(mesh), "box"), 1);
 }
 
-Shape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,
-               TrialRandom& random) {
+TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,
+                    TrialRandom& random) {
   const double size = diagonal * (kSmallest + (kLargest - kSmallest) * random.uniform());
   const Vector3d cube = Vector3d::Constant(size / 2);
   const auto turned = [&](const Vector3d& lead) {
@@ -151,12 +151,12 @@ Shape shape_of(TrialPartner partner, double diagonal, const Vector3d& direction,
   switch (partner) {
     case TrialPartner::plane: {
       const double reach = kPlaneReach * diagonal;
-      Shape shape = box_shape(Vector3d::Constant(reach), turned({0, 0, 1}));
-      shape.field = HalfSpaceField{Vector3d::UnitZ(), reach};
+      TrialShape shape = box_shape(Vector3d::Constant(reach), turned({0, 0, 1}));
+      shape.field = HalfSpaceShape{Vector3d::UnitZ(), reach};
       return shape;
     }
     case TrialPartner::ball:
-      return {BallField{size / 2},
+      return {BallShape{size / 2},
               {},
               ConvexBody::ball(Vector3d::Zero(), size / 2),
               Vector3d::Constant(size / 2)};
@@ -271,7 +271,7 @@ double ball_part(const MeshSolid& solid, const Vector3d& centre, double radius) 
   return volume * (unit * unit * unit);
 }
 
-PartnerTrials::PartnerTrials(const MeshSolid& solid, const TreeView& mesh)
+PartnerTrials::PartnerTrials(const MeshSolid& solid, const AssetView& mesh)
     : solid_(solid),
       mesh_(mesh),
       points_(inner_points(solid, kPoints)),
@@ -293,7 +293,7 @@ std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overl
     const double volume = random_in_decade(overlap / kHalfDecade, random) * solid_.volume();
     const Vector3d target = points_[random.bits() % points_.size()];
     const Vector3d direction = random.direction();
-    const Shape shape = shape_of(partner, diagonal_, direction, random);
+    const TrialShape shape = shape_of(partner, diagonal_, direction, random);
     constexpr double kMostHeld = 0.5;
     if (volume > kMostHeld * std::min(solid_.volume(), shape.body.volume())) continue;
     const double share = volume / solid_.volume();

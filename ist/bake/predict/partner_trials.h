@@ -1,7 +1,7 @@
 #pragma once
 
+#include <ist/asset.h>
 #include <ist/query.h>
-#include <ist/tree_view.h>
 
 #include <Eigen/Core>
 #include <cstddef>
@@ -24,7 +24,7 @@ double ball_part(const MeshSolid& solid, const Eigen::Vector3d& centre, double r
 
 /// A solid, at rest, and a partner of another shape and size that meets it.
 struct PartnerTrial {
-  PlacedField partner;  ///< in the solid's frame
+  PlacedShape partner;  ///< in the solid's frame
   double volume = 0;    ///< [u³] of the overlap
 };
 
@@ -45,7 +45,7 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 class PartnerTrials {
  public:
   /// `mesh`: an asset that holds the solid's own triangles. Both must outlive this.
-  PartnerTrials(const MeshSolid& solid, const TreeView& mesh);
+  PartnerTrials(const MeshSolid& solid, const AssetView& mesh);
 
   /// About `count` with overlaps near `overlap` of the solid's volume; fewer or none where the
   /// partner has no room for so much.
@@ -57,7 +57,7 @@ class PartnerTrials {
 
  private:
   const MeshSolid& solid_;
-  const TreeView mesh_;
+  const AssetView mesh_;
   const std::vector<Eigen::Vector3d> points_;
   double diagonal_ = 0;  ///< [u] of the solid's bounds
 };

@@ -91,7 +91,7 @@ class Trials {
     for (int k = 0; k < 3; ++k)
       place[k] = box.min()[k] + random_.uniform() * (box.max()[k] - box.min()[k]);
     const Eigen::Quaterniond q = random_.rotation();
-    if (a_.solid.signed_distance(place) <= 0) return false;
+    if (a_.solid.signed_distance(place) >= 0) return false;
     out.b_in_a = pose_of(q, place - q * (out.scale_b * centre_b_));
     out.volume = out.scale_b * out.scale_b * out.scale_b * b_.mesh.volume();
     out.fraction = 1;

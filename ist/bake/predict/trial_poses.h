@@ -5,8 +5,8 @@
 #include <functional>
 #include <vector>
 
-#include <ist/pose.h>
-#include <ist/tree_view.h>
+#include <ist/asset.h>
+#include <ist/types.h>
 
 #include <ist/asset_layout.h>
 #include "mesh/mesh_solid.h"
@@ -29,7 +29,7 @@ inline constexpr std::array<const char*, kOverlapClasses> kOverlapClassNames = {
 /// A solid, and an asset that holds its own triangles.
 struct TrialBody {
   const MeshSolid& solid;
-  TreeView mesh;
+  AssetView mesh;
 };
 
 /// About `per_class` poses for each class of overlap: independent random rotations, directions of

@@ -97,20 +97,19 @@ Setting grid() {
           [](BakeSettings settings) { return std::string(name_of(settings.packing.grid)); }};
 }
 
-Setting surface() {
-  return {"surface",
-          "all|none",
-          kSurfaceMeaning,
-          "all",
-          "Surface kept in the asset: the mesh, or none. Simplify the mesh before the bake for a "
-          "smaller one",
+Setting keep_mesh() {
+  return {"keep-mesh",
+          "yes|no",
+          "one of yes, no",
+          "yes",
+          "Keep the mesh in the asset, all of it. Simplify the mesh before the bake for a smaller "
+          "one",
           SettingKind::choice,
           [](BakeSettings& settings, const std::string& text) {
-            const std::optional<bool> keep = parse_surface(text);
-            if (keep) settings.packing.keep_mesh = *keep;
-            return keep.has_value();
+            if (text == "yes" || text == "no") settings.packing.keep_mesh = text == "yes";
+            return text == "yes" || text == "no";
           },
-          [](BakeSettings settings) { return settings.packing.keep_mesh ? "all" : "none"; }};
+          [](BakeSettings settings) { return settings.packing.keep_mesh ? "yes" : "no"; }};
 }
 
 template <class Of>
@@ -194,10 +193,9 @@ std::vector<Setting> make_settings() {
             {.least = 0, .most = 1, .without_most = true},
             "Greedy tolerance: every radius is at least 1 − epsilon times the largest that fits; 0 "
             "= automatic schedule"),
-      surface(),
+      keep_mesh(),
       flag(
-          "surface-only", [](BakeSettings& settings) -> bool& { return settings.surface_only; },
-          true,
+          "mesh-only", [](BakeSettings& settings) -> bool& { return settings.mesh_only; }, true,
           "Store the mesh without spheres. Such an asset bakes fast and answers exact queries "
           "only"),
       grid(),
@@ -278,16 +276,16 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
   return std::nullopt;
 }
 
-/// A surface alone is not packed.
-std::optional<SettingFault> surface_only_fault(const BakeSettings& settings,
-                                               const std::set<std::string>& own,
-                                               const std::string& prefix) {
+/// A mesh alone is not packed.
+std::optional<SettingFault> mesh_only_fault(const BakeSettings& settings,
+                                            const std::set<std::string>& own,
+                                            const std::string& prefix) {
   if (!settings.packing.keep_mesh)
-    return SettingFault{"surface-only", "contradicts " + prefix + "surface none"};
+    return SettingFault{"mesh-only", "contradicts " + prefix + "keep-mesh no"};
   for (const Setting& setting : settings_list()) {
-    if (setting.name == "surface") break;  // what stands before it, is of packing
+    if (setting.name == "keep-mesh") break;  // what stands before it, is of packing
     if (own.count(setting.name) != 0)
-      return SettingFault{setting.name, "has no effect with " + prefix + "surface-only"};
+      return SettingFault{setting.name, "has no effect with " + prefix + "mesh-only"};
   }
   return std::nullopt;
 }
@@ -323,8 +321,8 @@ std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std:
   if (aims && given.count("spheres") == 0) settings.packing.max_spheres = 0;
   if (!aims && own.count("at-overlap") != 0)
     return SettingFault{"at-overlap", "has no effect without " + prefix + "target-error"};
-  if (settings.surface_only)
-    if (const auto fault = surface_only_fault(settings, own, prefix)) return fault;
+  if (settings.mesh_only)
+    if (const auto fault = mesh_only_fault(settings, own, prefix)) return fault;
   if (settings.mesh.up_axis == 0 && own.count("world-up") != 0)
     return SettingFault{"world-up", "has no effect without " + prefix + "up-axis"};
   return idle_setting(settings.packing, prefix);
@@ -335,10 +333,6 @@ std::string describe_exactly(const BakeSettings& settings) {
   for (const Setting& setting : settings_list())
     text += setting.name + "=" + setting.show(settings) + "\n";
   return text;
-}
-
-std::optional<bool> parse_surface(const std::string& text) {
-  return text == "all" || text == "none" ? std::optional(text == "all") : std::nullopt;
 }
 
 const char* name_of(GridMode mode) noexcept {

@@ -28,7 +28,7 @@ struct BakeSettings {
   MeshSettings mesh;
   PackingSettings packing;  ///< device, GPU and threads are not among what is set by name
   ErrorTarget target = {0, ErrorTarget().at_overlap};  ///< error 0: none is asked for
-  bool surface_only = false;                           ///< bake_surface()
+  bool mesh_only = false;                              ///< bake_mesh_only()
 };
 
 /// What is written for a setting.
@@ -86,9 +86,5 @@ inline constexpr std::pair<const char*, GridMode> kGridModes[] = {
     {"hybrid", GridMode::hybrid}};
 const char* name_of(GridMode mode) noexcept;
 const char* name_of(MeshState state) noexcept;
-
-/// Whether "all" or "none"; nothing for others.
-std::optional<bool> parse_surface(const std::string& text);
-inline constexpr const char* kSurfaceMeaning = "one of all, none";
 
 }  // namespace ist

@@ -24,7 +24,7 @@ Asset::Asset(std::span<const std::byte> bytes, const std::string& name)
     : data_(static_cast<std::byte*>(::operator new[](bytes.size(), kAlignment))),
       size_(bytes.size()) {
   std::copy(bytes.begin(), bytes.end(), data_.get());
-  const AssetStatus status = TreeView::from_bytes(this->bytes(), view_);
+  const AssetStatus status = AssetView::from_bytes(this->bytes(), view_);
   if (status != AssetStatus::ok) throw Error(name + ": " + describe(status));
 }
 

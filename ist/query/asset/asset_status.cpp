@@ -1,4 +1,4 @@
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 namespace ist {
 
@@ -17,7 +17,7 @@ const char* describe(AssetStatus status) noexcept {
     case AssetStatus::corrupt_hash:
       return "the content does not match its checksum; bake again";
     case AssetStatus::corrupt_layout:
-      return "a field or offset is out of range; bake again";
+      return "a shape or offset is out of range; bake again";
   }
   return "unknown status";
 }

@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
+#include <ist/asset.h>
 #include <ist/asset_layout.h>
-#include <ist/tree_view.h>
 
 namespace ist {
 

@@ -16,7 +16,7 @@ inline constexpr double kFarthestPose = 1e60;
 /// Quaternions and normals of these lengths are normalised: their squares are neither 0 nor Inf.
 inline constexpr double kShortestDirection = 1e-150, kLongestDirection = 1e150;
 
-/// Of a field's lengths and distances; their squares stay finite.
+/// Of a shape's lengths and distances; their squares stay finite.
 inline constexpr double kLongestLength = 1e150;
 
 /// From this ratio of sizes on all is in double. Float keeps a sum of lenses to 1e-5 while both

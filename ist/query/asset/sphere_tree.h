@@ -96,7 +96,7 @@ struct SphereTree {
   const float* sphere_cover;  ///< inner tree: a cover radius a lane of level 0
 };
 
-inline SphereTree sphere_tree(const TreeView& view, Measure measure) noexcept {
+inline SphereTree sphere_tree(const AssetView& view, Measure measure) noexcept {
   const AssetHeader& asset = view.header();
   return SphereTree(asset, measure == Measure::inner ? asset.inner_tree : asset.matched_tree);
 }

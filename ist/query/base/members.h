@@ -20,8 +20,6 @@ IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
   IST_MEMBER(volume_min);
   IST_MEMBER(volume_max);
   IST_MEMBER(centroid);
-  IST_MEMBER(translation_gradient);
-  IST_MEMBER(rotation_gradient);
   IST_MEMBER(contact_area);
   IST_MEMBER(contact_normal);
   IST_MEMBER(distance);
@@ -37,7 +35,7 @@ IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
   IST_MEMBER(depth);
   IST_MEMBER(force);
   IST_MEMBER(torque);
-  IST_MEMBER(twist);
+  IST_MEMBER(torsion);
   IST_MEMBER(centre);
   IST_MEMBER(axis);
   IST_MEMBER(radius);
@@ -45,6 +43,7 @@ IST_HD constexpr void for_each_member(const Visit& visit, Answers&... answers) {
   IST_MEMBER(triangle);
   IST_MEMBER(sphere_a);
   IST_MEMBER(sphere_b);
+  IST_MEMBER(kind);
   IST_MEMBER(status);
   IST_MEMBER(node_visits);
   IST_MEMBER(sphere_pairs);

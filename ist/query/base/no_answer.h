@@ -4,8 +4,8 @@
 #include <type_traits>
 #include <variant>
 
-#include <ist/field.h>
 #include <ist/query.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 
 // Answers to what cannot be asked: every number is NaN, which nobody takes for no contact.
@@ -15,19 +15,21 @@ namespace ist {
 /// The numbers of an answer that cannot be given.
 inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// It is a surface alone.
-inline bool lacks_spheres(const TreeView& tree) noexcept {
+/// It is a mesh alone.
+inline bool lacks_spheres(const AssetView& tree) noexcept {
   return !tree.empty() && tree.sphere_count() == 0;
 }
-inline bool lacks_spheres(const PlacedTree& placed) noexcept { return lacks_spheres(placed.tree); }
-inline bool lack_spheres(const PlacedTree& a, const PlacedTree& b) noexcept {
+inline bool lacks_spheres(const PlacedAsset& placed) noexcept {
+  return lacks_spheres(placed.asset);
+}
+inline bool lack_spheres(const PlacedAsset& a, const PlacedAsset& b) noexcept {
   return lacks_spheres(a) || lacks_spheres(b);
 }
-inline bool lack_spheres(const PlacedField&, const PlacedTree& b) noexcept {
+inline bool lack_spheres(const PlacedShape&, const PlacedAsset& b) noexcept {
   return lacks_spheres(b);
 }
 
-/// `why`: not_held or invalid_input.
+/// `why`: missing_data or invalid_input.
 template <class Answer>
 Answer no_answer(QueryStatus why) noexcept {
   const Eigen::Vector3d none = Eigen::Vector3d::Constant(kNone);
@@ -37,8 +39,7 @@ Answer no_answer(QueryStatus why) noexcept {
     return {no_answer<ContactPatches>(why)};
   } else if constexpr (std::is_same_v<Answer, TimeOfImpact>) {
     TimeOfImpact result;
-    result.status =
-        why == QueryStatus::not_held ? ImpactStatus::not_held : ImpactStatus::invalid_input;
+    result.status = why;
     result.time = result.distance_min = result.distance_max = kNone;
     result.point_a = result.point_b = result.normal = none;
     return result;
@@ -50,8 +51,8 @@ Answer no_answer(QueryStatus why) noexcept {
 }
 
 template <class Answer>
-Answer not_held() noexcept {
-  return no_answer<Answer>(QueryStatus::not_held);
+Answer missing_data() noexcept {
+  return no_answer<Answer>(QueryStatus::missing_data);
 }
 template <class Answer>
 Answer invalid_input() noexcept {

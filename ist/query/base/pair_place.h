@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include <ist/asset_layout.h>
-#include <ist/pose.h>
+#include <ist/types.h>
 
 #include "numerics/vec3.h"
 #include "query/asset/shared_constants.h"

@@ -4,10 +4,10 @@ namespace ist {
 namespace {
 
 std::optional<RelativePose> relative(const AssetFrame& frame_a, const Pose& a, double scale_a,
-                                     const PlacedTree& b) {
+                                     const PlacedAsset& b) {
   std::optional<RelativePose> pose(std::in_place);
-  if (b.tree.empty() ||
-      !pose->place(frame_a, a, scale_a, frame_of(b.tree.header()), b.pose, b.scale))
+  if (b.asset.empty() ||
+      !pose->place(frame_a, a, scale_a, frame_of(b.asset.header()), b.pose, b.scale))
     pose.reset();
   return pose;
 }
@@ -19,13 +19,13 @@ std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale
   return unit_rotation(pose);
 }
 
-std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept {
-  if (a.tree.empty()) return std::nullopt;
-  return relative(frame_of(a.tree.header()), a.pose, a.scale, b);
+std::optional<RelativePose> relative_pose(const PlacedAsset& a, const PlacedAsset& b) noexcept {
+  if (a.asset.empty()) return std::nullopt;
+  return relative(frame_of(a.asset.header()), a.pose, a.scale, b);
 }
 
 std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
-                                          const PlacedTree& b) noexcept {
+                                          const PlacedAsset& b) noexcept {
   return relative({{0, 0, 0}, 1}, a, scale_a, b);
 }
 

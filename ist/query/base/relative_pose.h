@@ -38,10 +38,10 @@ inline Eigen::Quaterniond unit_rotation(const Pose& pose) noexcept {
 }
 
 /// Empty if a pose or scale is not usable (QueryStatus::invalid_input) or a tree is empty.
-std::optional<RelativePose> relative_pose(const PlacedTree& a, const PlacedTree& b) noexcept;
+std::optional<RelativePose> relative_pose(const PlacedAsset& a, const PlacedAsset& b) noexcept;
 
 /// The same where A is no tree: its unit frame is its own.
 std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
-                                          const PlacedTree& b) noexcept;
+                                          const PlacedAsset& b) noexcept;
 
 }  // namespace ist

@@ -10,18 +10,18 @@
 namespace ist {
 
 /// [u³] At most, of a solid.
-inline double volume_of(const PlacedTree& placed) noexcept {
-  const AssetHeader& asset = placed.tree.header();
+inline double volume_of(const PlacedAsset& placed) noexcept {
+  const AssetHeader& asset = placed.asset.header();
   return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
          (placed.scale * placed.scale * placed.scale);
 }
 
-inline double smaller_volume(const PlacedTree& a, const PlacedTree& b) noexcept {
+inline double smaller_volume(const PlacedAsset& a, const PlacedAsset& b) noexcept {
   return std::min(volume_of(a), volume_of(b));
 }
 
 /// The true volume lies between nothing and the smaller solid's; what spheres say may be more.
-inline void bound_by_solids(const PlacedTree& a, const PlacedTree& b,
+inline void bound_by_solids(const PlacedAsset& a, const PlacedAsset& b,
                             Penetration& answer) noexcept {
   answer.volume_min = 0;
   answer.volume_max = smaller_volume(a, b) * (1 + 1e-12);

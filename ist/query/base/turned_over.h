@@ -18,7 +18,7 @@ inline Vec3 arm_between(const Pose& moved, const Pose& other) noexcept {
 }
 
 inline void turn_over(const Pose& moved, const Pose& other, Penetration& answer) noexcept {
-  Eigen::Vector3d &push = answer.translation_gradient, &turn = answer.rotation_gradient;
+  Eigen::Vector3d &push = answer.force, &turn = answer.torque;
   turn = vector(turned_over(arm_between(moved, other), plain(push), plain(turn)));
   push = -push;
 }

@@ -8,7 +8,7 @@
 namespace ist::c_api {
 
 /// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status. `Solid`:
-/// PlacedSolid, or PlacedTree where only assets have an answer.
+/// PlacedSolid, or PlacedAsset where only assets have an answer.
 template <class Solid, class Ask>
 ist_status_t ask_about(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
                        const Ask& ask) noexcept {

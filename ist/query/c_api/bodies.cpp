@@ -1,10 +1,8 @@
 #include <cmath>
 #include <cstring>
 
+#include <ist/contact_law.h>
 #include <ist/mass_properties.h>
-#include <ist/pair_fit.h>
-#include <ist/response.h>
-#include <ist/wrench.h>
 
 #include "query/base/relative_pose.h"
 #include "query/c_api/structs.h"
@@ -34,7 +32,7 @@ void write(const Bounds& found, ist_bounds_t& out) noexcept {
 }
 
 /// As queries read it, and refused for a pose that they refuse.
-ist_status_t read_usable(const ist_placed_t* given, PlacedTree& placed) noexcept {
+ist_status_t read_usable(const ist_placed_t* given, PlacedAsset& placed) noexcept {
   const ist_status_t status = c_api::read(given, placed);
   if (status != IST_OK) return status;
   return usable_rotation(placed.pose, placed.scale) ? IST_OK : IST_INVALID_INPUT;
@@ -55,7 +53,7 @@ const auto kMassProperties = [](const auto& solid) noexcept { return mass_proper
 const auto kBounds = [](const auto& solid) noexcept { return bounds(solid); };
 
 Wrench wrench_on_b(const ist_penetration_t& contact) noexcept {
-  return {-vector(contact.translation_gradient), -vector(contact.rotation_gradient)};
+  return {vector(contact.force), vector(contact.torque)};
 }
 Wrench wrench_on_b(const ist_contact_patch_t& patch) noexcept {
   return {vector(patch.force), vector(patch.torque)};
@@ -82,30 +80,28 @@ ist_status_t find_wrenches(const Contact* contact, const ist_pose_t* b, const do
   return IST_OK;
 }
 
-Twist twist(const ist_twist_t* given) noexcept {
-  if (given == nullptr) return {};
-  return {vector(given->point), vector(given->velocity), vector(given->angular_velocity)};
-}
-
 /// The contact of C++ that has this wrench.
 Penetration with_wrench(const Wrench& on_b) noexcept {
   Penetration contact;
-  contact.translation_gradient = -on_b.force;
-  contact.rotation_gradient = -on_b.torque;
+  contact.force = on_b.force;
+  contact.torque = on_b.torque;
   return contact;
 }
 
 template <class Contact>
-ist_status_t find_rate(const Contact* contact, const ist_pose_t* b, const ist_twist_t* motion_a,
-                       const ist_twist_t* motion_b, double* rate) noexcept {
+ist_status_t find_rate(const Contact* contact, const ist_placed_t* a, const ist_placed_t* b,
+                       const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                       double* rate) noexcept {
   if (rate == nullptr) return IST_NULL_POINTER;
   *rate = 0;
-  const ist_status_t status = check(contact);
-  if (status != IST_OK) return status;
-  if (b == nullptr) return IST_NULL_POINTER;
-  *rate =
-      volume_rate(with_wrench(wrench_on_b(*contact)), pose(*b), twist(motion_a), twist(motion_b));
-  return IST_OK;
+  ist_status_t status = check(contact);
+  PlacedSolid solid_a, solid_b;
+  if (status == IST_OK) status = c_api::read(a, solid_a);
+  if (status == IST_OK) status = c_api::read(b, solid_b);
+  if (status == IST_OK)
+    *rate = volume_rate(with_wrench(wrench_on_b(*contact)), solid_a, solid_b, c_api::read(motion_a),
+                        c_api::read(motion_b));
+  return status;
 }
 
 }  // namespace
@@ -113,22 +109,22 @@ ist_status_t find_rate(const Contact* contact, const ist_pose_t* b, const ist_tw
 
 using namespace ist::c_api;
 
-ist_status_t ist_tree_get_mass_properties(const ist_tree_t* tree,
-                                          ist_mass_properties_t* properties) {
-  return tell<ist::TreeView>(tree, view_of, kMassProperties, properties);
+ist_status_t ist_asset_get_mass_properties(const ist_asset_t* asset,
+                                           ist_mass_properties_t* properties) {
+  return tell<ist::AssetView>(asset, view_of, kMassProperties, properties);
 }
 
-ist_status_t ist_tree_get_bounds(const ist_tree_t* tree, ist_bounds_t* bounds) {
-  return tell<ist::TreeView>(tree, view_of, kBounds, bounds);
+ist_status_t ist_asset_get_bounds(const ist_asset_t* asset, ist_bounds_t* bounds) {
+  return tell<ist::AssetView>(asset, view_of, kBounds, bounds);
 }
 
 ist_status_t ist_placed_mass_properties(const ist_placed_t* placed,
                                         ist_mass_properties_t* properties) {
-  return tell<ist::PlacedTree>(placed, read_usable, kMassProperties, properties);
+  return tell<ist::PlacedAsset>(placed, read_usable, kMassProperties, properties);
 }
 
 ist_status_t ist_placed_bounds(const ist_placed_t* placed, ist_bounds_t* bounds) {
-  return tell<ist::PlacedTree>(placed, read_usable, kBounds, bounds);
+  return tell<ist::PlacedAsset>(placed, read_usable, kBounds, bounds);
 }
 
 ist_status_t ist_wrenches(const ist_penetration_t* contact, const ist_pose_t* b,
@@ -143,29 +139,30 @@ ist_status_t ist_patch_wrenches(const ist_contact_patch_t* patch, const ist_pose
   return find_wrenches(patch, b, point_a, point_b, wrenches);
 }
 
-ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_pose_t* b,
-                             const ist_twist_t* motion_a, const ist_twist_t* motion_b,
-                             double* rate) {
-  return find_rate(contact, b, motion_a, motion_b, rate);
+ist_status_t ist_volume_rate(const ist_penetration_t* contact, const ist_placed_t* a,
+                             const ist_placed_t* b, const ist_motion_t* motion_a,
+                             const ist_motion_t* motion_b, double* rate) {
+  return find_rate(contact, a, b, motion_a, motion_b, rate);
 }
 
-ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_pose_t* b,
-                                   const ist_twist_t* motion_a, const ist_twist_t* motion_b,
-                                   double* rate) {
-  return find_rate(patch, b, motion_a, motion_b, rate);
+ist_status_t ist_patch_volume_rate(const ist_contact_patch_t* patch, const ist_placed_t* a,
+                                   const ist_placed_t* b, const ist_motion_t* motion_a,
+                                   const ist_motion_t* motion_b, double* rate) {
+  return find_rate(patch, a, b, motion_a, motion_b, rate);
 }
 
-ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_pair_fit_t* fit) {
+ist_status_t ist_get_size_match(const ist_placed_t* a, const ist_placed_t* b,
+                                ist_size_match_t* fit) {
   ist_status_t status = clear(fit);
   if (status != IST_OK) return status;
-  ist::PlacedTree first, second;
+  ist::PlacedAsset first, second;
   status = read_usable(a, first);
   if (status == IST_OK) status = read_usable(b, second);
   fit->status = status;
   if (status != IST_OK) return status;
-  const ist::PairFit found = ist::pair_fit(first, second);
-  fit->grain_a = found.grain_a;
-  fit->grain_b = found.grain_b;
+  const ist::SizeMatch found = ist::size_match(first, second);
+  fit->feature_size_a = found.feature_size_a;
+  fit->feature_size_b = found.feature_size_b;
   fit->ratio = found.ratio;
   fit->a_is_coarser = found.a_is_coarser ? 1 : 0;
   fit->has_mesh = found.has_mesh ? 1 : 0;
@@ -175,9 +172,10 @@ ist_status_t ist_get_pair_fit(const ist_placed_t* a, const ist_placed_t* b, ist_
 }
 
 ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_patch_t* patches,
-                               std::size_t count, const ist_pose_t* b, const ist_twist_t* motion_a,
-                               const ist_twist_t* motion_b, double step,
-                               ist_contact_memory_t* memory, ist_contact_force_t* force) {
+                               std::size_t count, const ist_placed_t* a, const ist_placed_t* b,
+                               const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                               double step, ist_contact_memory_t* memory,
+                               ist_contact_force_t* force) {
   static_assert(sizeof(ist_contact_memory_t) == sizeof(ist::ContactMemory) &&
                 offsetof(ist_contact_memory_t, count) == offsetof(ist::ContactMemory, count) &&
                 sizeof(ist_patch_memory_t) == sizeof(ist::PatchMemory) &&
@@ -185,8 +183,11 @@ ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_p
   ist_status_t status = clear(force);
   if (status == IST_OK) status = check_size(law);
   if (status != IST_OK) return status;
-  if ((patches == nullptr && count > 0) || b == nullptr || memory == nullptr)
-    return IST_NULL_POINTER;
+  if ((patches == nullptr && count > 0) || memory == nullptr) return IST_NULL_POINTER;
+  ist::PlacedSolid solid_a, solid_b;
+  status = ist::c_api::read(a, solid_a);
+  if (status == IST_OK) status = ist::c_api::read(b, solid_b);
+  if (status != IST_OK) return status;
   const ist::ContactLaw given = {
       law->stiffness,       law->area, law->damping, law->friction, law->friction_stiffness,
       law->friction_damping};
@@ -199,10 +200,11 @@ ist_status_t ist_contact_force(const ist_contact_law_t* law, const ist_contact_p
   // Both memories are plain numbers at the same places.
   ist::ContactMemory kept;
   std::memcpy(static_cast<void*>(&kept), memory, sizeof kept);
-  const Eigen::Vector3d origin = vector(b->t);
-  const ist::ContactForce found = ist::contact_force(
-      given, {reinterpret_cast<const ist::ContactPatch*>(patches), count},
-      ist::relative_motion(twist(motion_a), twist(motion_b), origin), origin, step, kept);
+  const ist::ContactForce found =
+      ist::contact_force(given, {reinterpret_cast<const ist::ContactPatch*>(patches), count},
+                         ist::relative_motion(solid_a, solid_b, ist::c_api::read(motion_a),
+                                              ist::c_api::read(motion_b)),
+                         vector(b->pose.t), step, kept);
   std::memcpy(memory, &kept, sizeof kept);
   write(found.force, force->force);
   write(found.torque, force->torque);

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include <ist/asset_layout.h>
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "query/base/hooked_memory.h"
 #include "query/c_api/structs.h"
@@ -33,10 +33,10 @@ ist_status_t asset_status_of(AssetStatus status) noexcept {
   return IST_CORRUPT_LAYOUT;
 }
 
-ist_status_t make_tree(const void* bytes, std::size_t size, ist_tree_t& tree) noexcept {
-  TreeHandle& handle = *new (&tree) TreeHandle{};
+ist_status_t make_tree(const void* bytes, std::size_t size, ist_asset_t& asset) noexcept {
+  AssetHandle& handle = *new (&asset) AssetHandle{};
   const AssetStatus status =
-      TreeView::from_bytes({static_cast<const std::byte*>(bytes), size}, handle.view);
+      AssetView::from_bytes({static_cast<const std::byte*>(bytes), size}, handle.view);
   if (status == AssetStatus::ok) handle.mark = handle.expected_mark();
   return asset_status_of(status);
 }
@@ -76,16 +76,17 @@ ist_status_t Allocator::from(const ist_allocator_t* given, Allocator& out) noexc
 using namespace ist;
 using namespace ist::c_api;
 
-ist_status_t ist_tree_view(const void* bytes, std::size_t size, ist_tree_t* tree) {
-  if (tree == nullptr) return IST_NULL_POINTER;
-  *tree = {};
+ist_status_t ist_asset_view(const void* bytes, std::size_t size, ist_asset_t* asset) {
+  if (asset == nullptr) return IST_NULL_POINTER;
+  *asset = {};
   if (bytes == nullptr) return IST_NULL_POINTER;
-  return make_tree(bytes, size, *tree);
+  return make_tree(bytes, size, *asset);
 }
 
-ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, ist_tree_t* tree) {
-  if (tree == nullptr) return IST_NULL_POINTER;
-  *tree = {};
+ist_status_t ist_asset_load(const char* path, const ist_allocator_t* allocator,
+                            ist_asset_t* asset) {
+  if (asset == nullptr) return IST_NULL_POINTER;
+  *asset = {};
   if (path == nullptr) return IST_NULL_POINTER;
   Allocator memory;
   ist_status_t status = Allocator::from(allocator, memory);
@@ -95,9 +96,9 @@ ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, i
     status = read_file(path, memory.hooks, bytes);
     if (status != IST_OK) return status;
     const HookedRelease& owned = bytes.get_deleter();
-    status = make_tree(bytes.get(), owned.bytes, *tree);
+    status = make_tree(bytes.get(), owned.bytes, *asset);
     if (status != IST_OK) return status;
-    TreeHandle& handle = TreeHandle::in(*tree);
+    AssetHandle& handle = AssetHandle::in(*asset);
     handle.memory = memory.hooks;
     handle.size = owned.bytes;
     handle.bytes = bytes.release();
@@ -107,21 +108,21 @@ ist_status_t ist_tree_load(const char* path, const ist_allocator_t* allocator, i
   }
 }
 
-ist_status_t ist_tree_release(ist_tree_t* tree) {
-  if (tree == nullptr) return IST_NULL_POINTER;
-  const TreeHandle handle = TreeHandle::in(*tree);
+ist_status_t ist_asset_release(ist_asset_t* asset) {
+  if (asset == nullptr) return IST_NULL_POINTER;
+  const AssetHandle handle = AssetHandle::in(*asset);
   if (!handle.made()) return IST_NO_HANDLE;
-  *tree = {};
+  *asset = {};
   if (handle.bytes != nullptr)
     give_memory_back(handle.memory, handle.bytes, handle.size, kAssetAlignment);
   return IST_OK;
 }
 
-ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
+ist_status_t ist_asset_get_info(const ist_asset_t* asset, ist_asset_info_t* info) {
   const ist_status_t room = clear(info);
   if (room != IST_OK) return room;
-  TreeView view;
-  const ist_status_t status = view_of(tree, view);
+  AssetView view;
+  const ist_status_t status = view_of(asset, view);
   if (status != IST_OK) return status;
   info->spheres = view.sphere_count();
   info->volume = view.volume();
@@ -132,16 +133,17 @@ ist_status_t ist_tree_get_info(const ist_tree_t* tree, ist_tree_info_t* info) {
   info->mesh_triangles = view.mesh_triangles();
   info->mesh_state = static_cast<ist_mesh_state_t>(view.mesh_state());
   info->mesh_error = view.mesh_error();
-  info->counted_twice = view.counted_twice();
+  info->self_overlap_volume = view.self_overlap_volume();
   return IST_OK;
 }
 
-ist_status_t ist_tree_get_predicted_errors(const ist_tree_t* tree, ist_predicted_errors_t* errors) {
+ist_status_t ist_asset_get_predicted_errors(const ist_asset_t* asset,
+                                            ist_predicted_errors_t* errors) {
   static_assert(IST_TRIAL_PLATE == static_cast<int>(ist::TrialPartner::plate));
   const ist_status_t room = clear(errors);
   if (room != IST_OK) return room;
-  TreeView view;
-  const ist_status_t status = view_of(tree, view);
+  AssetView view;
+  const ist_status_t status = view_of(asset, view);
   if (status != IST_OK) return status;
   const ist::PredictedErrors found = view.predicted_errors();
   errors->poses = found.poses;

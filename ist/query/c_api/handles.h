@@ -4,8 +4,8 @@
 #include <cstring>
 #include <new>
 
+#include <ist/c.h>
 #include <ist/deadline.h>
-#include <ist/ist.h>
 #include <ist/query.h>
 
 // What lies in the memory of the caller's handles.
@@ -21,18 +21,20 @@ struct Allocator {
 };
 
 /// A tree's handle. The mark tells one from what was never made without following a pointer.
-struct TreeHandle {
+struct AssetHandle {
   std::uint64_t mark;
-  TreeView view;
+  AssetView view;
   void* bytes;  ///< that it owns, or null
   std::size_t size;
   MemoryHooks memory;
 
   static constexpr std::uint64_t kMark = 0x7473692d65657274;  // "tree-ist"
 
-  static TreeHandle& in(ist_tree_t& tree) noexcept { return *reinterpret_cast<TreeHandle*>(&tree); }
-  static const TreeHandle& in(const ist_tree_t& tree) noexcept {
-    return *reinterpret_cast<const TreeHandle*>(&tree);
+  static AssetHandle& in(ist_asset_t& tree) noexcept {
+    return *reinterpret_cast<AssetHandle*>(&tree);
+  }
+  static const AssetHandle& in(const ist_asset_t& tree) noexcept {
+    return *reinterpret_cast<const AssetHandle*>(&tree);
   }
   std::uint64_t expected_mark() const noexcept {
     std::uintptr_t address;
@@ -41,7 +43,7 @@ struct TreeHandle {
   }
   bool made() const noexcept { return mark == expected_mark(); }
 };
-static_assert(sizeof(TreeHandle) <= sizeof(ist_tree_t) && sizeof(TreeView) == sizeof(void*));
+static_assert(sizeof(AssetHandle) <= sizeof(ist_asset_t) && sizeof(AssetView) == sizeof(void*));
 
 /// A workspace's handle.
 struct WorkspaceHandle {
@@ -67,9 +69,9 @@ inline const Deadline& deadline_in(const ist_deadline_t& deadline) noexcept {
 }
 
 /// The checked view behind a handle.
-inline ist_status_t view_of(const ist_tree_t* tree, TreeView& view) noexcept {
+inline ist_status_t view_of(const ist_asset_t* tree, AssetView& view) noexcept {
   if (tree == nullptr) return IST_NULL_POINTER;
-  const TreeHandle& handle = TreeHandle::in(*tree);
+  const AssetHandle& handle = AssetHandle::in(*tree);
   if (!handle.made()) return IST_NO_HANDLE;
   view = handle.view;
   return IST_OK;

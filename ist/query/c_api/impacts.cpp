@@ -6,13 +6,6 @@
 namespace ist::c_api {
 namespace {
 
-using c_api::read;
-
-Motion read(const ist_motion_t* given) noexcept {
-  if (given == nullptr) return {};
-  return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
-}
-
 bool is_finite(const Motion& motion) noexcept {
   return motion.velocity.allFinite() && motion.angular_velocity.allFinite() &&
          motion.about.allFinite();

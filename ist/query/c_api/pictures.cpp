@@ -44,13 +44,13 @@ void write_balls(const OwnFrame& frame, std::size_t count, const BallOf& ball, i
 
 NodeBall ball_of(const Sphere& s) noexcept { return {{s.x, s.y, s.z}, s.r}; }
 
-ist_status_t get_balls(const TreeView& view, const ist_ball_set_t& set, ist_ball_t* balls,
+ist_status_t get_balls(const AssetView& view, const ist_ball_set_t& set, ist_ball_t* balls,
                        std::size_t capacity, std::size_t& count) noexcept {
   const AssetHeader& asset = view.header();
   const bool inner = set.measure == IST_INNER;
   if (!inner && set.measure != IST_MATCHED) return IST_INVALID_INPUT;
   if (set.detail > (inner ? 0 : asset.detail_count)) return IST_INVALID_INPUT;
-  if (view.sphere_count() == 0) return IST_NOT_HELD;
+  if (view.sphere_count() == 0) return IST_MISSING_DATA;
   const SphereTree tree(asset, inner ? asset.inner_tree : matched_tree(asset, set.detail));
   if (set.level > static_cast<std::uint32_t>(tree.top)) return IST_INVALID_INPUT;
   const OwnFrame frame(asset);
@@ -70,7 +70,7 @@ ist_status_t get_balls(const TreeView& view, const ist_ball_set_t& set, ist_ball
   return IST_OK;
 }
 
-void get_mesh(const TreeView& view, ist_surface_t& out) noexcept {
+void get_mesh(const AssetView& view, ist_mesh_t& out) noexcept {
   const MeshParts mesh(view.header(), *at<MeshHeader>(view.header(), view.header().mesh));
   const OwnFrame frame(view.header());
   out.vertex_count = mesh.header->vertex_count;
@@ -108,26 +108,26 @@ static_assert(offsetof(ist_lens_t, sphere_b) == offsetof(OverlapLens, sphere_b))
 
 using namespace ist::c_api;
 
-ist_status_t ist_tree_get_balls(const ist_tree_t* tree, const ist_ball_set_t* set,
-                                ist_ball_t* balls, std::size_t capacity, std::size_t* count) {
+ist_status_t ist_asset_get_balls(const ist_asset_t* asset, const ist_ball_set_t* set,
+                                 ist_ball_t* balls, std::size_t capacity, std::size_t* count) {
   if (count == nullptr) return IST_NULL_POINTER;
   *count = 0;
   ist_status_t status = check_size(set);
   if (status == IST_OK && balls == nullptr && capacity > 0) status = IST_NULL_POINTER;
-  ist::TreeView view;
-  if (status == IST_OK) status = view_of(tree, view);
+  ist::AssetView view;
+  if (status == IST_OK) status = view_of(asset, view);
   return status == IST_OK ? get_balls(view, *set, balls, capacity, *count) : status;
 }
 
-ist_status_t ist_tree_get_surface(const ist_tree_t* tree, ist_surface_t* surface) {
+ist_status_t ist_asset_get_mesh(const ist_asset_t* asset, ist_mesh_t* surface) {
   ist_status_t status = check_size(surface);
   if (status != IST_OK) return status;
   surface->vertex_count = surface->triangle_count = 0;
   if ((surface->vertices == nullptr && surface->vertex_capacity > 0) ||
       (surface->triangles == nullptr && surface->triangle_capacity > 0))
     return IST_NULL_POINTER;
-  ist::TreeView view;
-  status = view_of(tree, view);
+  ist::AssetView view;
+  status = view_of(asset, view);
   if (status == IST_OK && view.has_mesh()) get_mesh(view, *surface);
   return status;
 }
@@ -141,7 +141,7 @@ ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
   if (lenses->lenses == nullptr && lenses->capacity > 0) return IST_NULL_POINTER;
   ist::LensSettings chosen;
   status = read(settings, chosen);
-  ist::PlacedTree first, second;
+  ist::PlacedAsset first, second;
   if (status == IST_OK) status = read(a, first);
   if (status == IST_OK) status = read(b, second);
   if (status != IST_OK) return status;

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <span>
 
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include "query/base/relative_pose.h"
 #include "query/c_api/ask.h"
@@ -9,6 +9,8 @@
 
 namespace ist::c_api {
 namespace {
+
+using c_api::read;
 
 /// The worse of two.
 ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
@@ -54,16 +56,17 @@ ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
   return status;
 }
 
-/// `ask(a, b, workspace)` answers an Overlapping.
+/// `ask(a, b, workspace)` gives a YesNoAnswer.
 template <class Ask>
 ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
-                          ist_overlapping_t* answer, const Ask& ask) noexcept {
-  static_assert(IST_OVERLAP_UNKNOWN == static_cast<int>(Overlapping::unknown));
+                          ist_yes_no_t* answer, const Ask& ask) noexcept {
+  static_assert(IST_UNKNOWN == static_cast<int>(YesNo::unknown));
   if (answer == nullptr) return IST_NULL_POINTER;
-  *answer = IST_OVERLAP_UNKNOWN;
+  *answer = IST_UNKNOWN;
   return ask_about<PlacedSolid>(a, b, workspace, [&](const auto& x, const auto& y, auto& scratch) {
-    *answer = static_cast<ist_overlapping_t>(ask(x, y, scratch));
-    return ist_status_t{IST_OK};
+    const YesNoAnswer found = ask(x, y, scratch);
+    *answer = static_cast<ist_yes_no_t>(found.answer);
+    return status_of(found.status);
   });
 }
 
@@ -95,7 +98,7 @@ ist_status_t ist_without_protrusion(const ist_penetration_t* whole, const ist_pl
   const ist::Penetration before = status == IST_OK ? read(*whole) : ist::Penetration{};
   const ist_status_t room = clear(answer);  // which may be `whole`
   if (room != IST_OK) return room;
-  ist::PlacedTree first, second;
+  ist::PlacedAsset first, second;
   if (status == IST_OK) status = read(a, first);
   if (status == IST_OK) status = read(b, second);
   if (status != IST_OK) return refuse<ist::Penetration>(status, *answer);
@@ -111,14 +114,14 @@ ist_status_t ist_separation(const ist_placed_t* a, const ist_placed_t* b,
 }
 
 ist_status_t ist_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_workspace_t* workspace,
-                         ist_overlapping_t* answer) {
+                         ist_yes_no_t* answer) {
   return find_overlap(a, b, workspace, answer, [](const auto& x, const auto& y, auto& scratch) {
     return ist::overlap(x, y, scratch);
   });
 }
 
 ist_status_t ist_overlap_within(const ist_placed_t* a, const ist_placed_t* b, double margin,
-                                ist_workspace_t* workspace, ist_overlapping_t* answer) {
+                                ist_workspace_t* workspace, ist_yes_no_t* answer) {
   const ist_status_t status =
       find_overlap(a, b, workspace, answer, [&](const auto& x, const auto& y, auto& scratch) {
         return ist::overlap(x, y, margin, scratch);
@@ -172,8 +175,8 @@ ist_status_t ist_overlap_outline(const ist_placed_t* a, const ist_placed_t* b,
     outline->count = std::min(found.segments, outline->capacity);
     return found.contact;
   };
-  return find_patches<ist::PlacedTree>(a, b, settings, workspace, patches, whole,
-                                       check_room(outline), ask);
+  return find_patches<ist::PlacedAsset>(a, b, settings, workspace, patches, whole,
+                                        check_room(outline), ask);
 }
 
 ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_placed_t* b,
@@ -181,7 +184,7 @@ ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_pla
                                             ist_contact_patches_t* patches) {
   ist_status_t status = check_room(patches);
   if (status == IST_OK && patches->count > patches->capacity) status = IST_INVALID_INPUT;
-  ist::PlacedTree first, second;
+  ist::PlacedAsset first, second;
   if (status == IST_OK) status = read(a, first);
   if (status == IST_OK) status = read(b, second);
   ist::ContactSettings found_with;

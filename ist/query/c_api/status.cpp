@@ -1,5 +1,5 @@
-#include <ist/ist.h>
-#include <ist/tree_view.h>
+#include <ist/asset.h>
+#include <ist/c.h>
 
 using ist::AssetStatus;
 
@@ -14,11 +14,11 @@ const char* ist_describe(ist_status_t status) {
       return "finished, but the error is larger than relative_error: bake both assets with surface "
              "all, or with more spheres";
     case IST_INVALID_INPUT:
-      return "a pose, a scale, a number of a field or a setting is out of range";
-    case IST_NOT_HELD:
+      return "a pose, a scale, a number of a shape or a setting is out of range";
+    case IST_MISSING_DATA:
       return "an asset lacks data that the query needs: the exact measure needs the kept meshes of "
              "two assets (bake them with surface all), every other query needs spheres (bake "
-             "without surface-only)";
+             "without mesh-only)";
     case IST_NULL_POINTER:
       return "a required pointer is null";
     case IST_WRONG_SIZE:

@@ -36,34 +36,34 @@ ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) 
 
 namespace {
 
-FieldSample sample(const void* context, const Eigen::Vector3d& x) noexcept {
-  const auto& function = static_cast<const ist_field_t*>(context)->as.function;
-  ist_field_sample_t answer = {};
+ShapeSample sample(const void* context, const Eigen::Vector3d& x) noexcept {
+  const auto& function = static_cast<const ist_shape_t*>(context)->as.function;
+  ist_shape_sample_t answer = {};
   function.sample(function.context, x.data(), &answer);
   return {answer.distance, vector(answer.gradient)};
 }
 
-ist_status_t read(const ist_field_t& given, Field& field) noexcept {
+ist_status_t read(const ist_shape_t& given, Shape& field) noexcept {
   switch (given.kind) {
     case IST_HALF_SPACE:
-      field = HalfSpaceField{vector(given.as.half_space.normal), given.as.half_space.offset};
+      field = HalfSpaceShape{vector(given.as.half_space.normal), given.as.half_space.offset};
       return IST_OK;
     case IST_BOX:
-      field = BoxField{vector(given.as.box.half_extents)};
+      field = BoxShape{vector(given.as.box.half_extents)};
       return IST_OK;
     case IST_BALL:
-      field = BallField{given.as.ball.radius};
+      field = BallShape{given.as.ball.radius};
       return IST_OK;
     case IST_CAPSULE:
-      field = CapsuleField{given.as.capsule.radius, given.as.capsule.half_height};
+      field = CapsuleShape{given.as.capsule.radius, given.as.capsule.half_height};
       return IST_OK;
     case IST_CYLINDER:
-      field = CylinderField{given.as.cylinder.radius, given.as.cylinder.half_height};
+      field = CylinderShape{given.as.cylinder.radius, given.as.cylinder.half_height};
       return IST_OK;
     case IST_HEIGHTS: {
       const auto& from = given.as.heights;
       if (from.heights == nullptr) return IST_NULL_POINTER;
-      HeightField heights{
+      HeightFieldShape heights{
           from.heights, from.columns, from.rows, {from.spacing[0], from.spacing[1]}};
       if (from.lowest != 0 || from.highest != 0) {
         heights.lowest = from.lowest;
@@ -75,7 +75,7 @@ ist_status_t read(const ist_field_t& given, Field& field) noexcept {
     case IST_DISTANCE_GRID: {
       const auto& from = given.as.distance_grid;
       if (from.distances == nullptr) return IST_NULL_POINTER;
-      field = DistanceGridField{from.distances,
+      field = DistanceGridShape{from.distances,
                                 {from.points[0], from.points[1], from.points[2]},
                                 vector(from.origin),
                                 from.spacing,
@@ -84,7 +84,7 @@ ist_status_t read(const ist_field_t& given, Field& field) noexcept {
     }
     case IST_FUNCTION:
       if (given.as.function.sample == nullptr) return IST_NULL_POINTER;
-      field = FunctionField{sample, &given, given.as.function.error};
+      field = FunctionShape{sample, &given, given.as.function.error};
       return IST_OK;
     default:
       return IST_INVALID_INPUT;
@@ -93,24 +93,25 @@ ist_status_t read(const ist_field_t& given, Field& field) noexcept {
 
 }  // namespace
 
-ist_status_t read(const ist_placed_t* given, PlacedTree& placed) noexcept {
+ist_status_t read(const ist_placed_t* given, PlacedAsset& placed) noexcept {
   ist_status_t status = check_size(given);
   if (status != IST_OK) return status;
-  if (given->field != nullptr) status = given->tree == nullptr ? IST_NOT_HELD : IST_INVALID_INPUT;
-  if (status == IST_OK) status = view_of(given->tree, placed.tree);
+  if (given->shape != nullptr)
+    status = given->asset == nullptr ? IST_MISSING_DATA : IST_INVALID_INPUT;
+  if (status == IST_OK) status = view_of(given->asset, placed.asset);
   placed.pose = pose(given->pose);
   placed.scale = given->scale == 0 ? 1 : given->scale;
   return status;
 }
 
 ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept {
-  PlacedTree tree;
+  PlacedAsset tree;
   ist_status_t status = read(given, tree);
   if (status == IST_OK) placed = tree;
-  if (status != IST_NOT_HELD) return status;
-  PlacedField field{{}, tree.pose, tree.scale};
-  status = check_size(given->field);
-  if (status == IST_OK) status = read(*given->field, field.field);
+  if (status != IST_MISSING_DATA) return status;
+  PlacedShape field{{}, tree.pose, tree.scale};
+  status = check_size(given->shape);
+  if (status == IST_OK) status = read(*given->shape, field.shape);
   if (status == IST_OK) placed = field;
   return status;
 }

@@ -5,10 +5,10 @@
 #include <cstring>
 #include <type_traits>
 
-#include <ist/field.h>
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <ist/query.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
+#include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 
 #include "query/base/members.h"
@@ -54,22 +54,15 @@ inline ist_status_t status_of(QueryStatus status) noexcept {
   return status == QueryStatus::ok                 ? IST_OK
          : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
          : status == QueryStatus::error_exceeded   ? IST_ERROR_EXCEEDED
-         : status == QueryStatus::not_held         ? IST_NOT_HELD
+         : status == QueryStatus::missing_data     ? IST_MISSING_DATA
                                                    : IST_INVALID_INPUT;
 }
 inline QueryStatus query_status(ist_status_t status) noexcept {
   return status == IST_OK                 ? QueryStatus::ok
          : status == IST_BUDGET_EXHAUSTED ? QueryStatus::budget_exhausted
          : status == IST_ERROR_EXCEEDED   ? QueryStatus::error_exceeded
-         : status == IST_NOT_HELD         ? QueryStatus::not_held
+         : status == IST_MISSING_DATA     ? QueryStatus::missing_data
                                           : QueryStatus::invalid_input;
-}
-
-inline ist_status_t status_of(ImpactStatus status) noexcept {
-  return status == ImpactStatus::invalid_input      ? IST_INVALID_INPUT
-         : status == ImpactStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
-         : status == ImpactStatus::not_held         ? IST_NOT_HELD
-                                                    : IST_OK;
 }
 
 /// Copies an answer from C++ to C or back. What lies between a struct's numbers is 0, so that its
@@ -81,13 +74,13 @@ void write(const From& from, To& to) noexcept {
     std::memset(&to, 0, sizeof to);
     to.size = sizeof to;
   }
-  static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactStatus::overlapping));
-  if constexpr (requires { to.kind; })
-    to.kind = status_of(from.status) == IST_OK ? static_cast<ist_impact_kind_t>(from.status) : 0;
+  static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactKind::overlapping));
   for_each_member(
       []<class X, class Y>(const X& x, Y& y) {
         if constexpr (std::is_same_v<Y, QueryStatus>)
           y = query_status(x);
+        else if constexpr (std::is_same_v<X, ImpactKind>)
+          y = static_cast<ist_impact_kind_t>(x);
         else if constexpr (std::is_enum_v<X>)
           y = status_of(x);
         else if constexpr (std::is_same_v<Y, Eigen::Vector3d>)
@@ -100,10 +93,10 @@ void write(const From& from, To& to) noexcept {
       from, to);
 }
 
-/// The field of a function points to the caller's struct and reads it for every sample.
+/// The shape of a function points to the caller's struct and reads it for every sample.
 ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
-/// An asset: IST_NOT_HELD for a field.
-ist_status_t read(const ist_placed_t* given, PlacedTree& placed) noexcept;
+/// An asset: IST_MISSING_DATA for a shape.
+ist_status_t read(const ist_placed_t* given, PlacedAsset& placed) noexcept;
 
 ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
 ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
@@ -111,8 +104,13 @@ ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) 
 
 inline Ray read(const ist_ray_t& given) noexcept {
   Ray ray{vector(given.origin), vector(given.direction)};
-  if (given.longest != 0) ray.longest = given.longest;
+  if (given.max_distance != 0) ray.max_distance = given.max_distance;
   return ray;
+}
+/// Null: at rest.
+inline Motion read(const ist_motion_t* given) noexcept {
+  if (given == nullptr) return {};
+  return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
 }
 inline Penetration read(const ist_penetration_t& given) noexcept {
   Penetration result;
@@ -132,7 +130,7 @@ static_assert(offsetof(ist_contact_patch_t, volume) == offsetof(ContactPatch, vo
 static_assert(offsetof(ist_contact_patch_t, force) == offsetof(ContactPatch, force));
 static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, torque));
 static_assert(offsetof(ist_contact_patch_t, point) == offsetof(ContactPatch, point));
-static_assert(offsetof(ist_contact_patch_t, twist) == offsetof(ContactPatch, twist));
+static_assert(offsetof(ist_contact_patch_t, torsion) == offsetof(ContactPatch, torsion));
 
 // So are segments of outlines.
 static_assert(std::is_standard_layout_v<OutlineSegment>);

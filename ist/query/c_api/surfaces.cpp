@@ -1,4 +1,4 @@
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include <algorithm>
 
@@ -48,14 +48,12 @@ ist_status_t ist_closest_point(const ist_placed_t* solid, const double* points, 
 }
 
 ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_t count,
-                          ist_overlapping_t* inside) {
+                          ist_yes_no_t* inside) {
   return ask_each(solid, count, points != nullptr && inside != nullptr,
                   [&](const auto& placed, std::size_t i) {
                     const double* const x = points + 3 * i;
-                    const ist::Containment found = ist::contains(placed, {x[0], x[1], x[2]});
-                    inside[i] = found.status != ist::QueryStatus::ok ? IST_OVERLAP_UNKNOWN
-                                : found.inside                       ? IST_OVERLAP_YES
-                                                                     : IST_OVERLAP_NO;
+                    const ist::YesNoAnswer found = ist::contains(placed, {x[0], x[1], x[2]});
+                    inside[i] = static_cast<ist_yes_no_t>(found.answer);
                     return status_of(found.status);
                   });
 }

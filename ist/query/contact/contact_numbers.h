@@ -39,7 +39,7 @@ IST_HD inline bool divides_b(std::uint32_t blocks_a, double radius_a, std::uint3
 /// The central axis of a patch's wrench on B, world.
 struct PatchAxis {
   Vec3 point, normal;
-  double area, depth, twist;
+  double area, depth, torsion;
 
   /// `origin`: [u] that the torque is about; `deepest`: [u] what the depth is held under.
   IST_HD static PatchAxis of(double volume, const Vec3& centroid, const Vec3& force,
@@ -52,7 +52,7 @@ struct PatchAxis {
     axis.depth = volume / area < deepest ? volume / area : deepest;
     const Vec3 moment = torque - cross(centroid - origin, force);
     axis.point = centroid + cross(axis.normal, moment) / area;
-    axis.twist = dot(axis.normal, moment);
+    axis.torsion = dot(axis.normal, moment);
     return axis;
   }
 };

@@ -4,9 +4,9 @@
 #include <limits>
 
 #include <ist/asset_layout.h>
+#include <ist/contact_law.h>
 #include <ist/pose_eigen.h>
-#include <ist/support.h>
-#include <ist/surface.h>
+#include <ist/raycast.h>
 
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_numbers.h"
@@ -103,13 +103,12 @@ struct SupportPolygon::Hull {
 SupportPolygon::SupportPolygon(const Penetration& whole, const Vector3d& origin_b,
                                const Matrix3d& axes, double reach, double blur) noexcept
     : whole_(whole), origin_b_(origin_b), reach_(reach), blurred_(blur > 0) {
-  const PatchAxis axis = PatchAxis::of(whole.volume, plain(whole.centroid),
-                                       plain(Vector3d(-whole.translation_gradient)),
-                                       plain(Vector3d(-whole.rotation_gradient)), plain(origin_b),
-                                       std::numeric_limits<double>::infinity());
+  const PatchAxis axis =
+      PatchAxis::of(whole.volume, plain(whole.centroid), plain(whole.force), plain(whole.torque),
+                    plain(origin_b), std::numeric_limits<double>::infinity());
   area_ = axis.area;
   near_ = kNearMiddle * axis.depth + blur;
-  twist_ = axis.twist;
+  torsion_ = axis.torsion;
   middle_ = vector(axis.point);
   normal_ = vector(axis.normal);
   int across = 0;
@@ -170,20 +169,20 @@ void SupportPolygon::add_plane(bool of_b, const Vector3d& normal, const Vector3d
 }
 
 bool SupportPolygon::add(bool of_b, const PlacedSolid& solid) noexcept {
-  if (const auto* const tree = std::get_if<PlacedTree>(&solid.placed)) {
-    if (!tree->tree.has_mesh()) return false;
+  if (const auto* const tree = std::get_if<PlacedAsset>(&solid.placed)) {
+    if (!tree->asset.has_mesh()) return false;
     if (area_ > 0) add_mesh(of_b, *tree);
     return true;
   }
-  const PlacedField& placed = std::get<PlacedField>(solid.placed);
+  const PlacedShape& placed = std::get<PlacedShape>(solid.placed);
   const Eigen::Isometry3d pose = to_isometry(placed.pose);
-  if (const auto* const half = std::get_if<HalfSpaceField>(&placed.field)) {
+  if (const auto* const half = std::get_if<HalfSpaceShape>(&placed.shape)) {
     const double length = half->normal.norm();
     const Vector3d normal = half->normal / length;
     add_plane(of_b, pose.linear() * normal, pose * (placed.scale * half->offset / length * normal));
     return true;
   }
-  if (const auto* const box = std::get_if<BoxField>(&placed.field)) {
+  if (const auto* const box = std::get_if<BoxShape>(&placed.shape)) {
     for (int axis = 0; axis < 3; ++axis)
       for (const double sign : {-1.0, 1.0}) {
         const auto at = [&](double s, double t) -> Vector3d {
@@ -201,8 +200,8 @@ bool SupportPolygon::add(bool of_b, const PlacedSolid& solid) noexcept {
   return false;
 }
 
-void SupportPolygon::add_mesh(bool of_b, const PlacedTree& solid) noexcept {
-  const AssetHeader& asset = solid.tree.header();
+void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
+  const AssetHeader& asset = solid.asset.header();
   const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
   const double* const vertices = at<double>(asset, mesh.vertices);
   const MeshBlock* const blocks = at<MeshBlock>(asset, mesh.level[0].blocks);
@@ -372,8 +371,8 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
     patch.depth = std::max(0.0, patch.depth) * (blurred_ ? 1 : whole_.volume / volume);
     patch.volume = patch.area * patch.depth;
     patch.force = patch.area * normal;
-    patch.twist = blurred_ ? 0 : twist_ * (patch.area / area_);
-    patch.torque = (patch.point - origin_b_).cross(patch.force) + patch.twist * normal;
+    patch.torsion = blurred_ ? 0 : torsion_ * (patch.area / area_);
+    patch.torque = (patch.point - origin_b_).cross(patch.force) + patch.torsion * normal;
   }
   return static_cast<std::size_t>(count);
 }
@@ -383,14 +382,14 @@ ContactPatches contact_points(const PlacedSolid& a, const PlacedSolid& b,
                               std::span<ContactPatch> patches) noexcept {
   ContactPatches found = contact_patches(a, b, settings, workspace, patches);
   if (found.count == 0 || found.penetration.status != QueryStatus::ok) return found;
-  const auto* const tree_a = std::get_if<PlacedTree>(&a.placed);
-  const auto* const tree_b = std::get_if<PlacedTree>(&b.placed);
-  const auto radius = [](const PlacedTree* tree) {
-    return tree != nullptr ? tree->scale * tree->tree.header().ball_radius
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
+  const auto radius = [](const PlacedAsset* tree) {
+    return tree != nullptr ? tree->scale * tree->asset.header().ball_radius
                            : std::numeric_limits<double>::infinity();
   };
-  const auto blur = [](const PlacedTree* tree) {
-    return tree != nullptr ? tree->scale * tree->tree.protrusion() : 0;
+  const auto blur = [](const PlacedAsset* tree) {
+    return tree != nullptr ? tree->scale * tree->asset.protrusion() : 0;
   };
   const bool by_b = radius(tree_b) <= radius(tree_a);
   const Pose& pose_b = std::visit([](const auto& at) -> const Pose& { return at.pose; }, b.placed);

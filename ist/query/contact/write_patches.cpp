@@ -58,9 +58,9 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
     patch.torque *= factor;
   }
   complete(out, largest, whole.volume, [](ContactPatch& p) -> double& { return p.volume; });
-  complete<Eigen::Vector3d>(out, largest, -whole.translation_gradient,
+  complete<Eigen::Vector3d>(out, largest, whole.force,
                             [](ContactPatch& p) -> Eigen::Vector3d& { return p.force; });
-  complete<Eigen::Vector3d>(out, largest, -whole.rotation_gradient,
+  complete<Eigen::Vector3d>(out, largest, whole.torque,
                             [](ContactPatch& p) -> Eigen::Vector3d& { return p.torque; });
   return out.size();
 }
@@ -72,15 +72,15 @@ std::size_t spread(const Penetration& part, const Penetration& whole, std::size_
     patches[0] = ContactPatch();
     patches[0].centroid = whole.centroid;
     patches[0].volume = whole.volume;
-    patches[0].force = -whole.translation_gradient;
-    patches[0].torque = -whole.rotation_gradient;
+    patches[0].force = whole.force;
+    patches[0].torque = whole.torque;
     return 1;
   }
   const double factor = whole.volume / part.volume;
   for (ContactPatch& patch : patches.first(count)) {
     const double share = patch.volume / part.volume;
-    patch.force -= share * (whole.translation_gradient - part.translation_gradient);
-    patch.torque -= share * (whole.rotation_gradient - part.rotation_gradient);
+    patch.force += share * (whole.force - part.force);
+    patch.torque += share * (whole.torque - part.torque);
     patch.volume *= factor;
   }
   return count;
@@ -94,7 +94,7 @@ void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepe
     patch.normal = vector(axis.normal);
     patch.area = axis.area;
     patch.depth = axis.depth;
-    patch.twist = axis.twist;
+    patch.torsion = axis.torsion;
   }
 }
 

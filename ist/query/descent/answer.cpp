@@ -13,8 +13,8 @@ Penetration world_answer(const Overlap& overlap, double lowest, double highest,
   result.volume_min = unit3 * lowest;
   result.volume_max = unit3 * highest;
   result.centroid = vector(sums.centroid);
-  result.translation_gradient = vector(sums.translation_gradient);
-  result.rotation_gradient = vector(sums.rotation_gradient);
+  result.force = -vector(sums.translation_gradient);
+  result.torque = -vector(sums.rotation_gradient);
   return result;
 }
 
@@ -23,8 +23,8 @@ Penetration kept_within(double most, Penetration answer) noexcept {
   const double factor = most / answer.volume;
   answer.volume = most;
   answer.volume_min = std::min(answer.volume_min, most);
-  answer.translation_gradient *= factor;
-  answer.rotation_gradient *= factor;
+  answer.force *= factor;
+  answer.torque *= factor;
   return answer;
 }
 

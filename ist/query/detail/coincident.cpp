@@ -12,8 +12,8 @@ Penetration mix(const Penetration& x, const Penetration& y, double weight) noexc
   result.volume_max = rest * x.volume_max + weight * y.volume_max;
   if (result.volume > 0)
     result.centroid = x.centroid + (weight * y.volume / result.volume) * (y.centroid - x.centroid);
-  result.translation_gradient = rest * x.translation_gradient + weight * y.translation_gradient;
-  result.rotation_gradient = rest * x.rotation_gradient + weight * y.rotation_gradient;
+  result.force = rest * x.force + weight * y.force;
+  result.torque = rest * x.torque + weight * y.torque;
   result.status = std::max(x.status, y.status);
   result.node_visits = x.node_visits + y.node_visits;
   result.sphere_pairs = x.sphere_pairs + y.sphere_pairs;
@@ -23,8 +23,8 @@ Penetration mix(const Penetration& x, const Penetration& y, double weight) noexc
 void add_slope(const PoseSlope& slope, double step, const RelativePose& pose,
                Penetration& mixed) noexcept {
   const Vec3 push = turned(step / pose.unit_a, pose.rotation_a, slope.by_translation);
-  mixed.translation_gradient += vector(push);
-  mixed.rotation_gradient +=
+  mixed.force -= vector(push);
+  mixed.torque -=
       vector(turned(step, pose.rotation_a, slope.by_rotation) + cross(pose.offset_b, push));
 }
 

@@ -18,20 +18,20 @@ namespace {
 /// Asks pairs of levels one after another under the limits that they share.
 class DetailQueries {
  public:
-  DetailQueries(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+  DetailQueries(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                 const PenetrationSettings& settings, Workspace& workspace,
                 LargestPart* largest) noexcept
       : placed_a_(a),
         placed_b_(b),
-        a_(a.tree.header()),
-        b_(b.tree.header()),
+        a_(a.asset.header()),
+        b_(b.asset.header()),
         pose_(pose),
         settings_(settings),
         workspace_(workspace),
         largest_(largest),
         same_asset_(are_one_asset(a_, b_)),
-        has_exact_(by_error(settings) && settings.pair_budget == 0 && a.tree.has_mesh() &&
-                   b.tree.has_mesh()) {}
+        has_exact_(by_error(settings) && settings.pair_budget == 0 && a.asset.has_mesh() &&
+                   b.asset.has_mesh()) {}
 
   /// The exact measure may answer: nothing limits sphere pairs, which it does not obey.
   bool has_exact() const noexcept { return has_exact_; }
@@ -120,8 +120,8 @@ class DetailQueries {
     return counted(most && sorts() ? largest_->level(pair, limits) : sum(pair, limits));
   }
 
-  const PlacedTree& placed_a_;
-  const PlacedTree& placed_b_;
+  const PlacedAsset& placed_a_;
+  const PlacedAsset& placed_b_;
   const AssetHeader& a_;
   const AssetHeader& b_;
   const RelativePose& pose_;
@@ -137,8 +137,8 @@ class DetailQueries {
 constexpr double kRough = 5e-4;
 
 void add_gradients(double factor, const Penetration& part, Penetration& sum) {
-  sum.translation_gradient += factor * part.translation_gradient;
-  sum.rotation_gradient += factor * part.rotation_gradient;
+  sum.force += factor * part.force;
+  sum.torque += factor * part.torque;
 }
 
 /// Adds a part of a blend.
@@ -167,13 +167,13 @@ Penetration kept_within_solid(Penetration part, double most, double error) {
   part.volume = kept(part.volume);
   part.volume_min = kept(part.volume_min);
   part.volume_max = kept(part.volume_max);
-  part.translation_gradient *= slope;
-  part.rotation_gradient *= slope;
+  part.force *= slope;
+  part.torque *= slope;
   return part;
 }
 
 /// What is known where a limit stopped the coarse estimate: any level might have been meant.
-Penetration stopped_blend(DetailQueries& queries, const PlacedTree& a, const PlacedTree& b,
+Penetration stopped_blend(DetailQueries& queries, const PlacedAsset& a, const PlacedAsset& b,
                           const PenetrationSettings& settings, const DetailChain& chain,
                           const Penetration& coarse) {
   Penetration result = coarse;
@@ -365,13 +365,13 @@ class BlendSum {
 
 }  // namespace
 
-Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+Penetration blend_details(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                           const PenetrationSettings& settings, Workspace& workspace,
                           LargestPart* largest) noexcept {
   DetailQueries queries(a, b, pose, settings, workspace, largest);
   const bool with_error = by_error(settings);
   if (!with_error && settings.pair_budget == 0) return queries.ask(DetailPair(), true);
-  const DetailChain chain(a.tree.header(), b.tree.header(), pose.a_from_b.scale);
+  const DetailChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
   // Nothing to choose, or nothing dear.
   if (!with_error && chain.size() == 1) return queries.ask(chain[0], true);
   DetailWeight sure = {};

@@ -25,7 +25,7 @@ class LargestPart {
 /// without either the finest answers; copies of one asset that all but coincide are asked as unlike
 /// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null
 /// where that part is summed as the others. No allocation, lock or exception.
-Penetration blend_details(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+Penetration blend_details(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                           const PenetrationSettings& settings, Workspace& workspace,
                           LargestPart* largest = nullptr) noexcept;
 

@@ -1,6 +1,6 @@
 #include "query/detail/unlike_sizes.h"
 
-#include <ist/pair_fit.h>
+#include <ist/mass_properties.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -51,14 +51,14 @@ double triangles_met(const AssetHeader& asset, double radius) {
 PairMethod method_by_grains(const AssetHeader& header_a, const AssetHeader& header_b,
                             double scale) {
   PairMethod method;
-  const double grain_a = grain(header_a), grain_b = grain(header_b) * scale;
-  const double coarse = std::max(grain_a, grain_b);
-  const double ratio = coarse / std::min(grain_a, grain_b);
+  const double feature_size_a = grain(header_a), feature_size_b = grain(header_b) * scale;
+  const double coarse = std::max(feature_size_a, feature_size_b);
+  const double ratio = coarse / std::min(feature_size_a, feature_size_b);
   if (ratio >= kUnlike) return {false, true};
   if (!(ratio > kAlike)) return method;
   // Grows without bound as the ratio does towards kUnlike.
   const double unlike = smooth_step((ratio - kAlike) / (kUnlike - kAlike));
-  const double triangles = grain_b <= grain_a
+  const double triangles = feature_size_b <= feature_size_a
                                ? triangles_met(header_a, header_b.matched_tree.mean_radius * scale)
                                : triangles_met(header_b, header_a.matched_tree.mean_radius / scale);
   const double worth =
@@ -72,7 +72,7 @@ PairMethod method_by_grains(const AssetHeader& header_a, const AssetHeader& head
 
 }  // namespace
 
-PairMethod pair_method(const PlacedTree& a, const PlacedTree& b,
+PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
                        const PenetrationSettings& settings,
                        const std::optional<RelativePose>& pose) noexcept {
   const bool mesh_alone = lack_spheres(a, b);
@@ -80,28 +80,29 @@ PairMethod pair_method(const PlacedTree& a, const PlacedTree& b,
   if (settings.measure == Measure::exact || (by_error(settings) && mesh_alone))
     return {false, true};
   if (settings.measure != Measure::matched || settings.spheres_only || mesh_alone || !pose ||
-      !a.tree.has_mesh() || !b.tree.has_mesh())
+      !a.asset.has_mesh() || !b.asset.has_mesh())
     return {};
   const PairMethod method =
-      method_by_grains(a.tree.header(), b.tree.header(), pose->a_from_b.scale);
+      method_by_grains(a.asset.header(), b.asset.header(), pose->a_from_b.scale);
   // Under a wanted error blend_details() has the exact measure for what spheres cannot do.
   const bool has_own = by_error(settings) && settings.pair_budget == 0;
   return method.spheres && has_own ? PairMethod() : method;
 }
 
-PairFit pair_fit(const PlacedTree& a, const PlacedTree& b) noexcept {
-  PairFit fit;
-  if (a.tree.sphere_count() == 0 || b.tree.sphere_count() == 0) return fit;
+SizeMatch size_match(const PlacedAsset& a, const PlacedAsset& b) noexcept {
+  SizeMatch fit;
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return fit;
   if (!(a.scale > 0) || !(b.scale > 0)) return fit;
-  const auto placed_grain = [](const PlacedTree& placed) {
-    const AssetHeader& header = placed.tree.header();
+  const auto placed_grain = [](const PlacedAsset& placed) {
+    const AssetHeader& header = placed.asset.header();
     return std::ldexp(placed.scale * grain(header), header.exponent);
   };
-  fit.grain_a = placed_grain(a);
-  fit.grain_b = placed_grain(b);
-  fit.a_is_coarser = fit.grain_b <= fit.grain_a;
-  fit.ratio = std::max(fit.grain_a, fit.grain_b) / std::min(fit.grain_a, fit.grain_b);
-  fit.has_mesh = a.tree.has_mesh() && b.tree.has_mesh();
+  fit.feature_size_a = placed_grain(a);
+  fit.feature_size_b = placed_grain(b);
+  fit.a_is_coarser = fit.feature_size_b <= fit.feature_size_a;
+  fit.ratio = std::max(fit.feature_size_a, fit.feature_size_b) /
+              std::min(fit.feature_size_a, fit.feature_size_b);
+  fit.has_mesh = a.asset.has_mesh() && b.asset.has_mesh();
   fit.needs_mesh = fit.ratio >= kUnlike;
   return fit;
 }
@@ -138,7 +139,8 @@ std::optional<PenetrationSettings> left_for_exact(PenetrationSettings settings,
   return settings;
 }
 
-Penetration without_exact(const PlacedTree& a, const PlacedTree& b, Penetration spheres) noexcept {
+Penetration without_exact(const PlacedAsset& a, const PlacedAsset& b,
+                          Penetration spheres) noexcept {
   bound_by_solids(a, b, spheres);
   spheres.status = QueryStatus::budget_exhausted;
   return spheres;
@@ -169,16 +171,15 @@ Penetration blended(const Penetration& spheres, Penetration sum, const ExactWeig
   sum.volume_min = std::max(0.0, lowest);
   sum.volume_max = highest;
   sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
-  sum.translation_gradient =
-      w * sum.translation_gradient + (1 - w + slope) * spheres.translation_gradient;
-  sum.rotation_gradient = w * sum.rotation_gradient + (1 - w + slope) * spheres.rotation_gradient;
+  sum.force = w * sum.force + (1 - w + slope) * spheres.force;
+  sum.torque = w * sum.torque + (1 - w + slope) * spheres.torque;
   return sum;
 }
 
-Penetration lens_sum(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+Penetration lens_sum(const PlacedAsset& a, const TreeHeader& tree_a, const PlacedAsset& b,
                      const TreeHeader& tree_b, const RelativePose& pose,
                      const DescentLimits& limits, Workspace::Impl& scratch) noexcept {
-  const SphereTree of_a(a.tree.header(), tree_a), of_b(b.tree.header(), tree_b);
+  const SphereTree of_a(a.asset.header(), tree_a), of_b(b.asset.header(), tree_b);
   Descent descent(of_a, of_b, pose, limits, scratch);
   descent.run();
   return descent.penetration();

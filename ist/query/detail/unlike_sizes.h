@@ -27,7 +27,7 @@ inline double covered_part(const AssetHeader& asset) noexcept {
 }
 
 /// Without a pose by what was asked for alone.
-PairMethod pair_method(const PlacedTree& a, const PlacedTree& b,
+PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
                        const PenetrationSettings& settings,
                        const std::optional<RelativePose>& pose) noexcept;
 
@@ -46,14 +46,14 @@ std::optional<PenetrationSettings> left_for_exact(PenetrationSettings settings,
                                                   std::uint32_t spent) noexcept;
 
 /// What spheres say where no visits are left for the exact query.
-Penetration without_exact(const PlacedTree& a, const PlacedTree& b, Penetration spheres) noexcept;
+Penetration without_exact(const PlacedAsset& a, const PlacedAsset& b, Penetration spheres) noexcept;
 
 /// Both sums by weight, with the counts of both. `unit3`: volume of A's unit.
 Penetration blended(const Penetration& spheres, Penetration exact, const ExactWeight& weight,
                     double unit3) noexcept;
 
 /// The sum of lenses of two trees of placed assets.
-Penetration lens_sum(const PlacedTree& a, const TreeHeader& tree_a, const PlacedTree& b,
+Penetration lens_sum(const PlacedAsset& a, const TreeHeader& tree_a, const PlacedAsset& b,
                      const TreeHeader& tree_b, const RelativePose& pose,
                      const DescentLimits& limits, Workspace::Impl& scratch) noexcept;
 

@@ -82,12 +82,12 @@ double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
   return tree.volume_sum / tree.sphere_count * (wider * wider * wider);
 }
 
-WantedError::WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                          const PenetrationSettings& settings, const DetailChain& chain,
                          bool exact) noexcept
     : error_(std::min(settings.relative_error, 1.0)), size_(chain.size()) {
-  const AssetHeader& asset_a = a.tree.header();
-  const AssetHeader& asset_b = b.tree.header();
+  const AssetHeader& asset_a = a.asset.header();
+  const AssetHeader& asset_b = b.asset.header();
   const double scale3 = pose.a_from_b.scale * pose.a_from_b.scale * pose.a_from_b.scale;
   for (std::size_t i = 0; i < size_; ++i) {
     const TreeHeader& tree_a = matched_tree(asset_a, chain[i].a);

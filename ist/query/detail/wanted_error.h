@@ -40,7 +40,7 @@ struct LevelTrust {
 class WantedError {
  public:
   /// `exact`: the exact measure may answer.
-  WantedError(const PlacedTree& a, const PlacedTree& b, const RelativePose& pose,
+  WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
               const PenetrationSettings& settings, const DetailChain& chain, bool exact) noexcept;
 
   /// Some level is exact enough at some overlap.

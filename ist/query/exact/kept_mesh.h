@@ -10,21 +10,21 @@
 
 namespace ist {
 
-inline bool keeps_mesh(const PlacedTree& placed) noexcept {
-  return !placed.tree.empty() && placed.tree.header().mesh != 0;
+inline bool keeps_mesh(const PlacedAsset& placed) noexcept {
+  return !placed.asset.empty() && placed.asset.header().mesh != 0;
 }
 
 /// Only where the asset keeps one.
-inline MeshTree mesh_of(const PlacedTree& placed) noexcept {
-  const AssetHeader& asset = placed.tree.header();
+inline MeshTree mesh_of(const PlacedAsset& placed) noexcept {
+  const AssetHeader& asset = placed.asset.header();
   return {asset, *at<MeshHeader>(asset, asset.mesh)};
 }
 
 /// The same of placed assets.
-inline double moved_by_poses(const PlacedTree& a, const PlacedTree& b, const MeshTree& mesh_b,
+inline double moved_by_poses(const PlacedAsset& a, const PlacedAsset& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
-  const auto offset = [](const PlacedTree& placed) {
-    const double* c = placed.tree.header().centre;
+  const auto offset = [](const PlacedAsset& placed) {
+    const double* c = placed.asset.header().centre;
     return placed.scale * Eigen::Vector3d(c[0], c[1], c[2]).norm();
   };
   return moved_by_poses(a.pose.t, offset(a), b.pose.t, offset(b), mesh_b.extent(), pose);

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "query/field/patch_shapes.h"
-#include "query/field/shapes.h"
 #include "query/impact/convex_pair.h"
 #include "query/impact/way_between.h"
+#include "query/shape/patch_shapes.h"
+#include "query/shape/shapes.h"
 
 // Convex fields as all points within a radius of a core whose furthest point in a direction is
 // known, and their distance from triangles.
@@ -16,35 +16,35 @@
 namespace ist {
 
 /// Shapes whose tangent plane at the nearest point has all of them on one side.
-template <class Shape>
+template <class Sampler>
 inline constexpr bool kConvex = false;
 template <>
-inline constexpr bool kConvex<HalfSpaceShape> = true;
+inline constexpr bool kConvex<HalfSpaceSampler> = true;
 template <>
-inline constexpr bool kConvex<BoxShape> = true;
+inline constexpr bool kConvex<BoxSampler> = true;
 template <>
-inline constexpr bool kConvex<BallShape> = true;
+inline constexpr bool kConvex<BallSampler> = true;
 template <>
-inline constexpr bool kConvex<CapsuleShape> = true;
+inline constexpr bool kConvex<CapsuleSampler> = true;
 template <>
-inline constexpr bool kConvex<CylinderShape> = true;
+inline constexpr bool kConvex<CylinderSampler> = true;
 
-inline double core_radius(const BoxShape&) noexcept { return 0; }
-inline double core_radius(const BallShape& s) noexcept { return s.radius; }
-inline double core_radius(const CapsuleShape& s) noexcept { return s.radius; }
-inline double core_radius(const CylinderShape&) noexcept { return 0; }
+inline double core_radius(const BoxSampler&) noexcept { return 0; }
+inline double core_radius(const BallSampler& s) noexcept { return s.radius; }
+inline double core_radius(const CapsuleSampler& s) noexcept { return s.radius; }
+inline double core_radius(const CylinderSampler&) noexcept { return 0; }
 
-inline Eigen::Vector3d furthest(const BoxShape& s, const Eigen::Vector3d& n) noexcept {
+inline Eigen::Vector3d furthest(const BoxSampler& s, const Eigen::Vector3d& n) noexcept {
   return {std::copysign(s.half[0], n.x()), std::copysign(s.half[1], n.y()),
           std::copysign(s.half[2], n.z())};
 }
-inline Eigen::Vector3d furthest(const BallShape&, const Eigen::Vector3d&) noexcept {
+inline Eigen::Vector3d furthest(const BallSampler&, const Eigen::Vector3d&) noexcept {
   return Eigen::Vector3d::Zero();
 }
-inline Eigen::Vector3d furthest(const CapsuleShape& s, const Eigen::Vector3d& n) noexcept {
+inline Eigen::Vector3d furthest(const CapsuleSampler& s, const Eigen::Vector3d& n) noexcept {
   return {0, 0, std::copysign(s.half, n.z())};
 }
-inline Eigen::Vector3d furthest(const CylinderShape& s, const Eigen::Vector3d& n) noexcept {
+inline Eigen::Vector3d furthest(const CylinderSampler& s, const Eigen::Vector3d& n) noexcept {
   const double across = std::sqrt(n.x() * n.x() + n.y() * n.y());
   const double to = across > 0 ? s.radius / across : 0;
   return {to * n.x(), to * n.y(), std::copysign(s.half, n.z())};
@@ -52,14 +52,14 @@ inline Eigen::Vector3d furthest(const CylinderShape& s, const Eigen::Vector3d& n
 
 /// A plane between a convex field and a triangle, all in one frame.
 struct PlaneBetween {
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, from the field to the triangle
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, from the shape to the triangle
   double apart = 0;     ///< > 0: they lie so far apart along it, a proof; else they may meet
   double distance = 0;  ///< they are no further apart than this
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< of the triangle, so near
 };
 
-template <class Shape>
-PlaneBetween plane_between(const Shape& shape, const ConvexPiece& triangle) noexcept {
+template <class Sampler>
+PlaneBetween plane_between(const Sampler& shape, const ConvexPiece& triangle) noexcept {
   // A plane that is tilted by as much as costs so little of the gap is good enough.
   constexpr double kEnough = 0.995;
   constexpr int kSteps = 60;
@@ -93,7 +93,7 @@ PlaneBetween plane_between(const Shape& shape, const ConvexPiece& triangle) noex
 }
 
 /// Of a half-space there is one plane.
-inline PlaneBetween plane_between(const HalfSpaceShape& shape,
+inline PlaneBetween plane_between(const HalfSpaceSampler& shape,
                                   const ConvexPiece& triangle) noexcept {
   PlaneBetween between;
   between.normal = Eigen::Vector3d(shape.normal);

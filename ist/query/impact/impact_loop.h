@@ -22,7 +22,7 @@ inline constexpr double kReported = 0.75;
 
 /// What a pair was found to do, of the frame's lengths.
 struct ImpactFound {
-  ImpactStatus status = ImpactStatus::no_impact;
+  ImpactKind kind = ImpactKind::no_impact;
   double time = 0;
   double gap = 0;       ///< the solids' distance is at least this, as far as the pair tells
   double distance = 0;  ///< and at most this
@@ -54,8 +54,8 @@ class ImpactLoop {
     while (size_ > 0 && !full_) {
       const RankedPair pair = waiting_[0];
       // At the start all is weighed, for an overlap counts more than an impact.
-      if (found_.status != ImpactStatus::no_impact && pair.bound > 0) break;
-      if (found_.status == ImpactStatus::overlapping) break;
+      if (found_.kind != ImpactKind::no_impact && pair.bound > 0) break;
+      if (found_.kind == ImpactKind::overlapping) break;
       if (budget_.grant(1) == 0) {
         full_ = true;
         break;
@@ -87,8 +87,8 @@ class ImpactLoop {
   bool leads_on(double step) const noexcept { return now_ + step > now_; }
 
   void found(const ImpactFound& what) noexcept {
-    if (found_.status != ImpactStatus::overlapping &&
-        (what.status != ImpactStatus::impact || found_.status == ImpactStatus::no_impact))
+    if (found_.kind != ImpactKind::overlapping &&
+        (what.kind != ImpactKind::impact || found_.kind == ImpactKind::no_impact))
       found_ = what;
     found_.time = now_;
   }
@@ -118,11 +118,11 @@ class ImpactLoop {
     TimeOfImpact result;
     result.node_visits = budget_.visits();
     result.surface_pairs = surface_pairs_;
-    result.status = found_.status;
-    const bool decided = found_.status != ImpactStatus::no_impact;
+    result.kind = found_.kind;
+    const bool decided = found_.kind != ImpactKind::no_impact;
     if (decided) {
       result.time = found_.time;
-      if (found_.status == ImpactStatus::overlapping) return result;
+      if (found_.kind == ImpactKind::overlapping) return result;
       result.distance_min = frame_.unit * std::clamp(found_.gap, 0.0, floor_);
       result.distance_max = frame_.unit * std::max(0.0, found_.distance);
       result.point_a = frame_.to_world(found_.point_a, result.time);
@@ -132,7 +132,7 @@ class ImpactLoop {
     }
     result.time = end;
     if (full_) {
-      result.status = ImpactStatus::budget_exhausted;
+      result.status = QueryStatus::budget_exhausted;
       result.time = std::min(now_, lost_);
     }
     // At the start nothing may have been looked at.

@@ -29,7 +29,7 @@ bool holds_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a_fr
 
 }  // namespace
 
-ImpactSide::ImpactSide(const TreeView& view) noexcept
+ImpactSide::ImpactSide(const AssetView& view) noexcept
     : spheres_(sphere_tree(view, Measure::inner)) {
   if (!view.has_mesh()) return;
   const AssetHeader& asset = view.header();

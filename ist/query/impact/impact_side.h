@@ -33,7 +33,7 @@ struct PointHull {
 /// sphere, and the node of the top level is the whole.
 class ImpactSide {
  public:
-  explicit ImpactSide(const TreeView& view) noexcept;
+  explicit ImpactSide(const AssetView& view) noexcept;
 
   /// Null if the asset has none.
   const MeshTree* mesh() const noexcept { return mesh_ ? &*mesh_ : nullptr; }

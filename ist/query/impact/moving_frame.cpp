@@ -56,16 +56,16 @@ bool usable(const Motion& motion) noexcept {
          motion.about.allFinite();
 }
 
-/// `asset_a`: null for a field.
+/// `asset_a`: null for a shape.
 std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const AssetHeader* asset_a,
-                                    const PlacedTree& b, const std::optional<RelativePose>& start,
+                                    const PlacedAsset& b, const std::optional<RelativePose>& start,
                                     const Motions& motions, double duration) noexcept {
   if (!start || !usable(motions.a) || !usable(motions.b) || !(duration > 0)) return std::nullopt;
   MovingFrame frame;
   frame.start = *start;
   frame.unit = start->unit_a;
   frame.a = body(pose_a, scale_a, motions.a, asset_a, frame.unit);
-  frame.b = body(b.pose, b.scale, motions.b, &b.tree.header(), frame.unit);
+  frame.b = body(b.pose, b.scale, motions.b, &b.asset.header(), frame.unit);
   const Vector3d lever_a = lever(pose_a, scale_a, motions.a.about);
   frame.between = ((translation(b.pose) - translation(pose_a)) +
                    (lever(b.pose, b.scale, motions.b.about) - lever_a)) /
@@ -123,12 +123,12 @@ Placement place(const MovingFrame& frame, double time) noexcept {
   return at;
 }
 
-std::optional<MovingFrame> moving_frame(const PlacedTree& a, const PlacedTree& b,
+std::optional<MovingFrame> moving_frame(const PlacedAsset& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept {
-  return frame_of(a.pose, a.scale, &a.tree.header(), b, relative_pose(a, b), motions, duration);
+  return frame_of(a.pose, a.scale, &a.asset.header(), b, relative_pose(a, b), motions, duration);
 }
 
-std::optional<MovingFrame> moving_frame(const PlacedField& a, const PlacedTree& b,
+std::optional<MovingFrame> moving_frame(const PlacedShape& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept {
   return frame_of(a.pose, a.scale, nullptr, b, relative_pose(a.pose, a.scale, b), motions,
                   duration);

@@ -72,10 +72,10 @@ struct Placement {
 Placement place(const MovingFrame& frame, double time) noexcept;
 
 /// Empty if poses or motions are not usable.
-std::optional<MovingFrame> moving_frame(const PlacedTree& a, const PlacedTree& b,
+std::optional<MovingFrame> moving_frame(const PlacedAsset& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept;
 /// A's unit frame is its own.
-std::optional<MovingFrame> moving_frame(const PlacedField& a, const PlacedTree& b,
+std::optional<MovingFrame> moving_frame(const PlacedShape& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept;
 
 /// For how long a gap lasts that shrinks at `rate`, a speed that grows by `bend` per time at most;

@@ -221,15 +221,14 @@ void PairSearch::look_at_pieces(NodeKey key_a, NodeKey key_b, const Placement& a
   // What has an inside is left by the way to its points on it.
   found.point_a = nearest.a - std::min(0.0, a.shape.behind) * found.normal;
   found.point_b = nearest.b + std::min(0.0, b.shape.behind) * found.normal;
-  found.status =
-      found.distance <= loop_.tolerance ? ImpactStatus::impact : ImpactStatus::unresolved;
+  found.kind = found.distance <= loop_.tolerance ? ImpactKind::impact : ImpactKind::unresolved;
   if (at.time == 0 && !(best.gap > 0)) {
     const bool faces = a.shape.corners == 3 && b.shape.corners == 3;
     const double inner =
         nearest.distance + std::min(0.0, a.shape.behind) + std::min(0.0, b.shape.behind);
     const bool meet =
         faces ? nearest.distance <= at.error || triangles_cross(a.shape, b.shape) : inner <= 0;
-    found.status = meet ? ImpactStatus::overlapping : ImpactStatus::unresolved;
+    found.kind = meet ? ImpactKind::overlapping : ImpactKind::unresolved;
   }
   loop_.found(found);
 }

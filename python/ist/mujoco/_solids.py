@@ -32,7 +32,7 @@ def of_mesh(spec, model, mesh, name, folder, spheres, measure, repair):
         closed = ist.close_mesh(ist.Mesh(vertices, faces), name=name, repair=repair)
         if closed.report.notes:
             _warn(f"mesh {name!r}: {'; '.join(closed.report.notes)}")
-        asset = ist.bake(closed, max_spheres=spheres) if spheres else ist.bake_surface(closed)
+        asset = ist.bake(closed, max_spheres=spheres) if spheres else ist.bake_mesh_only(closed)
         part = path.with_suffix(f".{os.getpid()}")
         asset.save(part)
         os.replace(part, path)  # another process may bake the same

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
-#include <ist/error.h>
-#include <ist/level_set.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 
 namespace ist {
 namespace {
@@ -47,7 +47,7 @@ FloatGrid::Ptr level_set_of(const openvdb::GridBase::Ptr& base, const std::strin
   return grid;
 }
 
-/// The values in a box around the active ones, in steps of voxels, positive inside.
+/// The values in a box around the active ones, in steps of voxels.
 DistanceGrid dense_values(const FloatGrid& grid, const std::string& path) {
   openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
   box.expand(1);
@@ -65,7 +65,6 @@ DistanceGrid dense_values(const FloatGrid& grid, const std::string& path) {
   dense.values.resize(count);
   openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> target(box, dense.values.data());
   openvdb::tools::copyToDense(grid, target);
-  for (float& value : dense.values) value = -value;
   return dense;
 }
 

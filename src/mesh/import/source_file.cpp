@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 namespace ist {
 namespace {

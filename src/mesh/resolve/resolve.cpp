@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include "mesh/disjoint_sets.h"
 #include "mesh/message_text.h"

@@ -3,7 +3,7 @@
 #include <string>
 
 #include <ist/mesh.h>
-#include <ist/progress.h>
+#include <ist/types.h>
 
 namespace ist {
 

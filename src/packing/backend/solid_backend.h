@@ -5,8 +5,7 @@
 #include <span>
 #include <vector>
 
-#include <ist/medial.h>
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "packing/backend/tasks.h"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/stop_reason.h>
+#include <ist/types.h>
 
 #include "numerics/hashing.h"
 #include "numerics/roots.h"

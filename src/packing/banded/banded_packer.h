@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "packing/banded/band_schedule.h"
 #include "packing/banded/candidate.h"
@@ -63,7 +63,7 @@ class BandedPacker {
  private:
   using Feature = typename Surface::Feature;
   using Spheres = typename Order::Spheres;
-  using Field = PrototypeField<Surface, Spheres>;
+  using Shape = PrototypeField<Surface, Spheres>;
   using Indices = std::vector<std::uint32_t>;
   static constexpr std::size_t kChunk = 4096;  ///< cells between two looks at clock and progress
 
@@ -105,7 +105,7 @@ class BandedPacker {
   /// Works on the cells until each has settled or holds a candidate; leaves the latter in `active`.
   void resolve(Indices& active) {
     const Spheres spheres(result_.spheres, grid_);
-    const Field field(surface_, spheres);
+    const Shape field(surface_, spheres);
     Indices frontier = std::move(active), splitting;
     std::vector<CellState> state;
     active.clear();
@@ -124,7 +124,7 @@ class BandedPacker {
           const std::size_t to = std::min(now.size(), from + kChunk);
           state.resize(kChunk);
           for_each_index(from, to, 16, [&](std::size_t i) {
-            typename Field::Scratch scratch;
+            typename Shape::Scratch scratch;
             StoredCell<Feature>& stored = cells_[now[i]];
             Cell cell = load_cell(SerialTeam{}, stored, scratch);
             state[i - from] = field.work(SerialTeam{}, cell, scratch, schedule_.threshold,
@@ -147,12 +147,12 @@ class BandedPacker {
 
   /// Replaces each cell by those of its children that still count; appends the ones that reach the
   /// margin to `unsettled`.
-  void split(const Indices& parents, const Field& field, Indices& unsettled) {
+  void split(const Indices& parents, const Shape& field, Indices& unsettled) {
     std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
     for (std::size_t from = 0; from < parents.size(); from += kChunk) {
       const std::size_t to = std::min(parents.size(), from + kChunk);
       for_each_index(from, to, 16, [&](std::size_t i) {
-        typename Field::Scratch scratch;
+        typename Shape::Scratch scratch;
         const Cell parent = load_cell(SerialTeam{}, cells_[parents[i]], scratch);
         for (int k = 0; k < 8; ++k)
           children[8 * (i - from) + static_cast<std::size_t>(k)] = field.child(

@@ -6,7 +6,7 @@
 namespace ist::packing {
 
 /// The surface of any Solid, known by its signed distance alone. Features are balls: a value s at q
-/// bounds the field by |x − q| + s everywhere (it is 1-Lipschitz), which is the ball {q, −s}; taken
+/// bounds the field by s − |x − q| everywhere (it is 1-Lipschitz), which is the ball {q, s}; taken
 /// where the gradient leads to the surface, it is a surface point.
 class FieldSurface {
  public:
@@ -29,7 +29,7 @@ class FieldSurface {
     Feature feature;
     feature.centre = {static_cast<float>(q.x()), static_cast<float>(q.y()),
                       static_cast<float>(q.z())};
-    feature.radius = static_cast<float>(-value(feature.centre));
+    feature.radius = static_cast<float>(value(feature.centre));
     return {feature, static_cast<float>(std::fabs(s)), true};
   }
 
@@ -46,11 +46,11 @@ class FieldSurface {
 
   template <class Team>
   bool inside(const Team&, Float3 x) const {
-    return value(x) > 0;
+    return value(x) < 0;
   }
   template <class Team>
   double clearance(const Team&, Float3 x, double) const {
-    return value(x);
+    return -value(x);
   }
 
  private:

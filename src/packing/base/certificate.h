@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/sphere.h>
+#include <ist/types.h>
 
 #include <cmath>
 

@@ -1,6 +1,6 @@
 #include "packing/base/packing_settings.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>

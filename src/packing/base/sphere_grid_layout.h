@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include <ist/sphere.h>
+#include <ist/types.h>
 
 #include "numerics/float3.h"
 

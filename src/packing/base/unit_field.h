@@ -6,7 +6,7 @@
 
 namespace ist::packing {
 
-/// A solid's signed distance in its unit frame, positive inside.
+/// A solid's signed distance in its unit frame, negative inside.
 struct UnitField {
   const Solid& solid;
   UnitFrame frame;

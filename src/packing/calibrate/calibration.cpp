@@ -1,6 +1,6 @@
 #include "packing/calibrate/calibration.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>

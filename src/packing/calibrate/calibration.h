@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include <ist/progress.h>
+#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"

@@ -1,6 +1,6 @@
 #include "packing/cover/cover.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -52,8 +52,8 @@ struct FieldCover : packing::UnitField {
     Eigen::Vector3d::Map(q) = foot(x, s);
     return true;
   }
-  bool inside(const double point[3]) const { return value(Eigen::Vector3d(point)) > 0; }
-  double depth(const Eigen::Vector3d& point) const { return std::max(0.0, value(point)); }
+  bool inside(const double point[3]) const { return value(Eigen::Vector3d(point)) < 0; }
+  double depth(const Eigen::Vector3d& point) const { return std::max(0.0, -value(point)); }
 };
 
 /// Cells to divide, and the lists that their children filter.

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include <ist/sphere.h>
+#include <ist/types.h>
 
 #include "mesh/triangle_frame.h"
 #include "packing/grids/grid_layout.h"

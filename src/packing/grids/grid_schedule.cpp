@@ -1,6 +1,6 @@
 #include "packing/grids/grid_schedule.h"
 
-#include <ist/error.h>
+#include <ist/types.h>
 
 #include <algorithm>
 #include <cmath>

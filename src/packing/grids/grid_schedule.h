@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include <ist/packing.h>
+#include <ist/bake.h>
 
 #include "packing/grids/grid_layout.h"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/medial.h>
+#include <ist/bake.h>
 
 #include <vector>
 

@@ -13,7 +13,7 @@
 #include <random>
 #include <vector>
 
-static ist::TreeView read_asset(const char* path) {
+static ist::AssetView read_asset(const char* path) {
   struct alignas(64) Line {
     char bytes[64];
   };
@@ -23,13 +23,13 @@ static ist::TreeView read_asset(const char* path) {
   const auto size = static_cast<std::size_t>(file.tellg());
   memory.resize(size / sizeof(Line) + 1);
   file.seekg(0).read(memory[0].bytes, static_cast<std::streamsize>(size));
-  ist::TreeView tree;
-  ist::TreeView::from_bytes({reinterpret_cast<const std::byte*>(memory.data()), size}, tree);
+  ist::AssetView tree;
+  ist::AssetView::from_bytes({reinterpret_cast<const std::byte*>(memory.data()), size}, tree);
   return tree;
 }
 
 int main(int argc, char** argv) {
-  const ist::TreeView tree = read_asset(argc > 1 ? argv[1] : "");
+  const ist::AssetView tree = read_asset(argc > 1 ? argv[1] : "");
   if (tree.empty()) return std::fprintf(stderr, "usage: stack BOX.ist [s [hz [askew]]]\n"), 2;
   const double seconds = argc > 2 ? std::atof(argv[2]) : 8;
   const double hz = argc > 3 ? std::atof(argv[3]) : 240;

@@ -4,7 +4,7 @@ import {copy3} from './desk.js';
 import {f64, u32} from './memory.js';
 
 export const kInvalidInput = -1;  // IST_INVALID_INPUT
-export const kNotHeld = -15;      // IST_NOT_HELD
+export const kNotHeld = -15;      // IST_MISSING_DATA
 const kErrorExceeded = 2;         // IST_ERROR_EXCEEDED
 
 export const statusOf = (status) => status === 0 ? 'ok' :
@@ -99,7 +99,7 @@ export function readGap(at, out) {
 }
 
 export const newPatch =
-    () => ({id: 0, ...newVectors(kPatch), area: 0, depth: 0, volume: 0, twist: 0});
+    () => ({id: 0, ...newVectors(kPatch), area: 0, depth: 0, volume: 0, torsion: 0});
 
 /** Bytes of an ist_contact_patch_t. */
 export const kPatchBytes = 160;
@@ -111,7 +111,7 @@ export function readPatch(place, patch) {
   patch.area = numbers[at + 7];
   patch.depth = numbers[at + 8];
   patch.volume = numbers[at + 9];
-  patch.twist = numbers[at + 19];
+  patch.torsion = numbers[at + 19];
   readVectors(kPatch, at, patch);
 }
 
@@ -122,7 +122,7 @@ export function writePatch(place, patch) {
   numbers[at + 7] = patch.area;
   numbers[at + 8] = patch.depth;
   numbers[at + 9] = patch.volume;
-  numbers[at + 19] = patch.twist;
+  numbers[at + 19] = patch.torsion;
   writeVectors(kPatch, at, patch);
 }
 

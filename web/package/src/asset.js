@@ -1,4 +1,4 @@
-// Assets and fields: what lies in WebAssembly's memory and is given back.
+// Assets and shapes: what lies in WebAssembly's memory and is given back.
 
 import {kNotHeld} from './answers.js';
 import {count, desk, sphereMeasureOf, writeNumbers} from './desk.js';
@@ -96,7 +96,7 @@ export class Asset extends Owner {
       meshState: kMeshStates[integers[at + 11]],
       meshTriangles: integers[at + 10],
       meshError: numbers[values + 4],
-      countedTwice: numbers[values + 5],
+      selfOverlapVolume: numbers[values + 5],
     };
   }
 
@@ -126,7 +126,7 @@ export class Asset extends Owner {
     const measure = sphereMeasureOf(set?.measure);
     const status = functions('an asset').balls(this._at, measure, detail, level, room, capacity);
     if (status === kNotHeld)
-      throw new IstError(`ist: ${this._name}: is a surface alone, without spheres`, status);
+      throw new IstError(`ist: ${this._name}: is a mesh alone, without spheres`, status);
     if (status < 0)
       throw new IstError(
           `ist: ${this._name}: has no level ${level} of detail ${detail} in its ` +
@@ -157,15 +157,15 @@ export class Asset extends Owner {
     });
   }
 
-  surface() {
+  mesh() {
     const wasm = functions('an asset');
-    check(wasm.surface(this._at, 0, 0, 0, 0), this._name);
+    check(wasm.mesh(this._at, 0, 0, 0, 0), this._name);
     const counts = desk().counts / 4;
     const vertices = u32()[counts], triangles = u32()[counts + 1];
     if (triangles === 0) return null;
     return withRoom(24 * vertices + 12 * triangles, (room) => {
       const corners = room + 24 * vertices;
-      check(wasm.surface(this._at, room, vertices, corners, triangles), this._name);
+      check(wasm.mesh(this._at, room, vertices, corners, triangles), this._name);
       return {
         positions: f64().slice(room / 8, room / 8 + 3 * vertices),
         triangles: u32().slice(corners / 4, corners / 4 + 3 * triangles),
@@ -174,20 +174,20 @@ export class Asset extends Owner {
   }
 }
 
-// ist_field_kind_t
+// ist_shape_kind_t
 const kHalfSpace = 1, kBox = 2, kBall = 3, kCapsule = 4, kCylinder = 5, kHeights = 6,
       kDistanceGrid = 7;
 
-/** A field of up to eight numbers, and of `data`, whose memory it owns. */
+/** A shape of up to eight numbers, and of `data`, whose memory it owns. */
 function made(kind, numbers, data = 0, columns = 0, rows = 0, layers = 0) {
   const owned = data === 0 ? [] : [data];
   try {
-    const wasm = functions('a field');
+    const wasm = functions('a shape');
     const absent = numbers.concat(Array(8 - numbers.length).fill(0));
-    writeNumbers(f64(), desk().a / 8, absent, absent, 8, 'a field');
+    writeNumbers(f64(), desk().a / 8, absent, absent, 8, 'a shape');
     const place = wasm.field(kind, data, columns, rows, layers) >>> 0;
-    if (place === 0) throw new IstError('ist: out of memory for a field');
-    return new Field([place, ...owned], kInside);
+    if (place === 0) throw new IstError('ist: out of memory for a shape');
+    return new Shape([place, ...owned], kInside);
   } catch (error) {
     owned.forEach(give);
     throw error;
@@ -215,7 +215,7 @@ function copied(given, points, what) {
   return place;
 }
 
-export class Field extends Owner {
+export class Shape extends Owner {
   static halfSpace(normal, offset = 0) {
     return made(kHalfSpace, [...three(normal, 'normal'), offset]);
   }
@@ -235,7 +235,7 @@ export class Field extends Owner {
   static heights(heights, columns, rows, spacing) {
     if (spacing?.length !== 2)
       throw new IstError('ist: spacing must have two numbers, along x and y');
-    const data = copied(heights, [columns, rows], 'Field.heights()');
+    const data = copied(heights, [columns, rows], 'Shape.heights()');
     let lowest = Infinity, highest = -Infinity;
     for (const h of heights) {
       lowest = Math.min(lowest, h);
@@ -246,16 +246,16 @@ export class Field extends Owner {
   }
 
   static distanceGrid(distances, points, spacing, options) {
-    checkOptions('Field.distanceGrid()', options);
+    checkOptions('Shape.distanceGrid()', options);
     const along = three(points, 'points');
     const origin = three(options?.origin ?? [0, 0, 0], 'origin');
-    const data = copied(distances, along, 'Field.distanceGrid()');
+    const data = copied(distances, along, 'Shape.distanceGrid()');
     return made(kDistanceGrid, [...origin, spacing, options?.error ?? 0], data, ...along);
   }
 
   /** Its place in WebAssembly. */
   get _at() {
-    if (this._places === null) throw new IstError('ist: a field was used after free()');
+    if (this._places === null) throw new IstError('ist: a shape was used after free()');
     return this._places[0];
   }
 }

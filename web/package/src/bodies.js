@@ -41,17 +41,17 @@ export function patchesWithoutProtrusion(found, a, b, poseB, options) {
   return found;
 }
 
-export function pairFit(a, b, options) {
-  const wasm = functions('pairFit()');
-  two(a, b, 'pairFit()');
-  checkOptions('pairFit()', options);
+export function sizeMatch(a, b, options) {
+  const wasm = functions('sizeMatch()');
+  two(a, b, 'sizeMatch()');
+  checkOptions('sizeMatch()', options);
   writePose(0, {scale: options?.scaleA}, 'scaleA');
   writePose(1, {scale: options?.scaleB}, 'scaleB');
-  check(wasm.pair_fit(a._at, b._at), 'pairFit()');
+  check(wasm.size_match(a._at, b._at), 'sizeMatch()');
   const numbers = f64(), integers = u32(), at = desk().fit / 8 + 1;
   return {
-    grainA: numbers[at],
-    grainB: numbers[at + 1],
+    featureSizeA: numbers[at],
+    featureSizeB: numbers[at + 1],
     ratio: numbers[at + 2],
     aIsCoarser: integers[2 * at + 6] !== 0,
     hasMesh: integers[2 * at + 7] !== 0,

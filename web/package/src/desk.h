@@ -1,7 +1,7 @@
 /* The desk: numbers of questions and answers lie on it, where places() says. */
 #pragma once
 
-#include <ist/ist.h>
+#include <ist/c.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -23,14 +23,14 @@ typedef struct desk {
   ist_penetration_t penetration;
   ist_separation_t separation;
   ist_contact_patch_t patches[kMostPatches];
-  ist_tree_info_t info;
+  ist_asset_info_t info;
   ist_bounds_t bounds;
   ist_mass_properties_t mass;
   uint32_t counts[2];
   ist_motion_t motion_a, motion_b;
   ist_impact_settings_t impact_settings;
   ist_impact_t impact;
-  ist_pair_fit_t fit;
+  ist_size_match_t fit;
   ist_wrenches_t wrenches;
   double numbers[8]; /* of whatever is asked */
   ist_workspace_t workspace;
@@ -44,13 +44,13 @@ _Static_assert(sizeof(ist_ball_t) == 32, "ball");
 _Static_assert(sizeof(ist_lens_t) == 72, "lens");
 _Static_assert(sizeof(ist_outline_segment_t) == 56, "segment");
 
-/* Where a tree lies, or a field, plus 1. */
+/* Where an asset lies, or a shape, plus 1. */
 typedef uintptr_t solid_t;
 
 static inline ist_placed_t placed(solid_t solid, const place_t* place) {
   const int is_field = solid % 2 == 1;
-  const ist_placed_t made = {sizeof made, is_field ? NULL : (const ist_tree_t*)solid,
-                             is_field ? (const ist_field_t*)(solid - 1) : NULL, place->pose,
+  const ist_placed_t made = {sizeof made, is_field ? NULL : (const ist_asset_t*)solid,
+                             is_field ? (const ist_shape_t*)(solid - 1) : NULL, place->pose,
                              place->scale};
   return made;
 }

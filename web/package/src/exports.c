@@ -1,4 +1,4 @@
-/* The C functions as a page's JavaScript calls them: assets, fields, and what is asked of two. */
+/* The C functions as a page's JavaScript calls them: assets, shapes, and what is asked of two. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -39,54 +39,54 @@ EXPORT(give) void give(void* memory) { free(memory); }
 EXPORT(describe) const char* describe(ist_status_t status) { return ist_describe(status); }
 EXPORT(version) uint32_t version(void) { return ist_version(); }
 
-/* --- Trees and fields ------------------------------------------------------------------------- */
+/* --- Trees and shapes ------------------------------------------------------------------------- */
 
 /* `block`: a handle, and on the next 64-byte boundary an asset of `size` bytes. */
 EXPORT(tree) ist_status_t tree(void* block, size_t size) {
-  _Static_assert(sizeof(ist_tree_t) == 64, "handle");
-  return ist_tree_view((char*)block + sizeof(ist_tree_t), size, (ist_tree_t*)block);
+  _Static_assert(sizeof(ist_asset_t) == 64, "handle");
+  return ist_asset_view((char*)block + sizeof(ist_asset_t), size, (ist_asset_t*)block);
 }
 
-EXPORT(info) ist_status_t info(const ist_tree_t* tree) {
-  ist_status_t status = ist_tree_get_info(tree, &desk.info);
-  if (status == IST_OK) status = ist_tree_get_bounds(tree, &desk.bounds);
-  return status == IST_OK ? ist_tree_get_mass_properties(tree, &desk.mass) : status;
+EXPORT(info) ist_status_t info(const ist_asset_t* tree) {
+  ist_status_t status = ist_asset_get_info(tree, &desk.info);
+  if (status == IST_OK) status = ist_asset_get_bounds(tree, &desk.bounds);
+  return status == IST_OK ? ist_asset_get_mass_properties(tree, &desk.mass) : status;
 }
 
 /* The number of balls goes to counts[0]. */
 EXPORT(balls)
-ist_status_t balls(const ist_tree_t* tree, ist_measure_t measure, uint32_t detail, uint32_t level,
+ist_status_t balls(const ist_asset_t* tree, ist_measure_t measure, uint32_t detail, uint32_t level,
                    ist_ball_t* room, size_t capacity) {
   const ist_ball_set_t set = {
       .size = sizeof set, .measure = measure, .detail = detail, .level = level};
   size_t count;
-  const ist_status_t status = ist_tree_get_balls(tree, &set, room, capacity, &count);
+  const ist_status_t status = ist_asset_get_balls(tree, &set, room, capacity, &count);
   desk.counts[0] = (uint32_t)count;
   return status;
 }
 
 /* The numbers of vertices and triangles go to counts. */
-EXPORT(surface)
-ist_status_t surface(const ist_tree_t* tree, double (*vertices)[3], size_t vertex_capacity,
+EXPORT(mesh)
+ist_status_t mesh(const ist_asset_t* tree, double (*vertices)[3], size_t vertex_capacity,
                      uint32_t (*triangles)[3], size_t triangle_capacity) {
-  ist_surface_t all = {.size = sizeof all,
+  ist_mesh_t all = {.size = sizeof all,
                        .vertices = vertices,
                        .triangles = triangles,
                        .vertex_capacity = vertex_capacity,
                        .triangle_capacity = triangle_capacity};
-  const ist_status_t status = ist_tree_get_surface(tree, &all);
+  const ist_status_t status = ist_asset_get_mesh(tree, &all);
   desk.counts[0] = (uint32_t)all.vertex_count;
   desk.counts[1] = (uint32_t)all.triangle_count;
   return status;
 }
 
-/* A field of the eight numbers of place A; null if there is no memory. `data`: heights or
+/* A shape of the eight numbers of place A; null if there is no memory. `data`: heights or
  * distances. `columns`, `rows`, `layers`: of data. */
 EXPORT(field)
-ist_field_t* field(ist_field_kind_t kind, const void* data, uint32_t columns, uint32_t rows,
+ist_shape_t* field(ist_shape_kind_t kind, const void* data, uint32_t columns, uint32_t rows,
                    uint32_t layers) {
   const double* const numbers = (const double*)&desk.a;
-  ist_field_t* const made = calloc(1, sizeof *made);
+  ist_shape_t* const made = calloc(1, sizeof *made);
   if (made == NULL) return NULL;
   made->size = sizeof *made;
   made->kind = kind;
@@ -109,11 +109,11 @@ ist_field_t* field(ist_field_kind_t kind, const void* data, uint32_t columns, ui
   }
   return made;
 }
-_Static_assert(offsetof(ist_field_t, as.heights.highest) ==
-                   offsetof(ist_field_t, as.heights.spacing) + 3 * sizeof(double),
+_Static_assert(offsetof(ist_shape_t, as.heights.highest) ==
+                   offsetof(ist_shape_t, as.heights.spacing) + 3 * sizeof(double),
                "heights");
-_Static_assert(offsetof(ist_field_t, as.distance_grid.error) ==
-                   offsetof(ist_field_t, as.distance_grid.origin) + 4 * sizeof(double),
+_Static_assert(offsetof(ist_shape_t, as.distance_grid.error) ==
+                   offsetof(ist_shape_t, as.distance_grid.origin) + 4 * sizeof(double),
                "grid");
 
 /* --- Queries ---------------------------------------------------------------------------------- */
@@ -159,10 +159,10 @@ ist_status_t overlap_outline(solid_t a, solid_t b, uint32_t most, ist_outline_se
   return status;
 }
 
-/* 0, 1, 2 as ist_overlapping_t, or an error. */
+/* 0, 1, 2 as ist_yes_no_t, or an error. */
 EXPORT(overlap) int32_t overlap(solid_t a, solid_t b) {
   const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
-  ist_overlapping_t answer;
+  ist_yes_no_t answer;
   const ist_status_t status = ist_overlap(&first, &second, &desk.workspace, &answer);
   return status < 0 ? status : answer;
 }

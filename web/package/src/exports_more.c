@@ -17,9 +17,9 @@ ist_status_t patches_without_protrusion(solid_t a, solid_t b, uint32_t count) {
   return ist_patches_without_protrusion(&first, &second, &desk.settings, &found);
 }
 
-EXPORT(pair_fit) ist_status_t pair_fit(solid_t a, solid_t b) {
+EXPORT(size_match) ist_status_t size_match(solid_t a, solid_t b) {
   const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
-  return ist_get_pair_fit(&first, &second, &desk.fit);
+  return ist_get_size_match(&first, &second, &desk.fit);
 }
 
 /* Of the penetration or, if `is_patch`, of the first patch; points lie in `numbers`. */
@@ -44,12 +44,12 @@ ist_status_t closest_point(solid_t solid, const double* points, size_t count,
 }
 EXPORT(contains)
 ist_status_t contains(solid_t solid, const double* points, size_t count,
-                      ist_overlapping_t* inside) {
+                      ist_yes_no_t* inside) {
   const ist_placed_t at = placed(solid, &desk.a);
   return ist_contains(&at, points, count, inside);
 }
 _Static_assert(sizeof(ist_ray_t) == 56 && sizeof(ist_ray_hit_t) == 64, "ray");
-_Static_assert(sizeof(ist_surface_point_t) == 72 && sizeof(ist_overlapping_t) == 4, "point");
+_Static_assert(sizeof(ist_surface_point_t) == 72 && sizeof(ist_yes_no_t) == 4, "point");
 
 /* --- Motions: of place B, from there to place A ------------------------------------------------
  */

@@ -2,9 +2,9 @@
 
 import {functions} from './memory.js';
 
-export {Asset, Field} from './asset.js';
+export {Asset, Shape} from './asset.js';
 export {contactPatchesBatch, penetrationBatch} from './batch.js';
-export {pairFit, patchesWithoutProtrusion, withoutProtrusion, wrenches} from './bodies.js';
+export {sizeMatch, patchesWithoutProtrusion, withoutProtrusion, wrenches} from './bodies.js';
 export {IstError} from './error.js';
 export {motionBetween, moved, timeOfImpact} from './motion.js';
 export {contactPatches, lenses, overlap, overlapOutline, penetration, separation} from './query.js';

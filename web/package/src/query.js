@@ -1,23 +1,23 @@
 // The queries.
 
 import {newGap, newPatches, newPenetration, readGap, readPatches, readPenetration, statusOf} from './answers.js';
-import {Asset, Field} from './asset.js';
+import {Asset, Shape} from './asset.js';
 import {count, desk, kMostPatches, sphereMeasureOf, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
 
-/** As exports.c takes it: a field's place is odd. */
+/** As exports.c takes it: a shape's place is odd. */
 export function solid(given, which, query) {
   if (given instanceof Asset) return given._at;
-  if (given instanceof Field) return given._at + 1;
-  throw new IstError(`ist: ${query}: solid ${which} must be an Asset or a Field`);
+  if (given instanceof Shape) return given._at + 1;
+  throw new IstError(`ist: ${query}: solid ${which} must be an Asset or a Shape`);
 }
 
 function assetsOf(a, b, query, what) {
   for (const [given, which] of [[a, 'A'], [b, 'B']])
     if (!(given instanceof Asset))
-      throw new IstError(`ist: ${query}: solid ${which} must be an Asset: a field has no ${what}`);
+      throw new IstError(`ist: ${query}: solid ${which} must be an Asset: a shape has no ${what}`);
   return [a._at, b._at];
 }
 
@@ -29,8 +29,8 @@ export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);
   checkOptions(who, options);
   const first = solid(a, 'A', who), second = solid(b, 'B', who);
-  if (a instanceof Field && b instanceof Field)
-    throw new IstError(`ist: ${who}: both solids are Fields; one must be an Asset`);
+  if (a instanceof Shape && b instanceof Shape)
+    throw new IstError(`ist: ${who}: both solids are shapes; one must be an Asset`);
   writePose(0, options?.poseA, 'poseA');
   writePose(1, poseB, 'poseB');
   writeSettings(options);

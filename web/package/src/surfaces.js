@@ -60,14 +60,14 @@ export function raycast(given, pose, origins, directions, options) {
   const from = rows(origins, 'origins'), along = rows(directions, 'directions');
   if (from !== along && from !== 1 && along !== 1)
     throw new IstError(`ist: directions has ${along} rows; origins has ${from}`);
-  const count = from === 1 ? along : from, longest = options?.longest ?? Infinity;
-  if (!(longest > 0)) throw new IstError(`ist: longest is ${longest}; it must be > 0`);
+  const count = from === 1 ? along : from, maxDistance = options?.maxDistance ?? Infinity;
+  if (!(maxDistance > 0)) throw new IstError(`ist: maxDistance is ${maxDistance}; it must be > 0`);
   const place = room.of(count * (kRayBytes + 64)), hits = place + count * kRayBytes;
   for (let i = 0; i < count; ++i) {
     const ray = place + i * kRayBytes;
     writeRow(ray, origins, from === 1 ? 0 : i, 'origins');
     writeRow(ray + 24, directions, along === 1 ? 0 : i, 'directions');
-    f64()[ray / 8 + 6] = longest;
+    f64()[ray / 8 + 6] = maxDistance;
   }
   ask('raycast', 'raycast()', given, pose, count, place, hits);
   return read(hits, count, kHit, options?.into ?? {});

@@ -24,7 +24,7 @@ test('init() that nobody called or awaited is told in a sentence', async () => {
   assert.match(
       sentence(() => ist.Asset.from(bytesA)),
       /Asset\.from\(\) was called .* call and await init\(\) first/);
-  assert.match(sentence(() => ist.Field.ball(1)), /await init/);
+  assert.match(sentence(() => ist.Shape.ball(1)), /await init/);
   assert.match(sentence(() => ist.version()), /version\(\) was called/);
   const started = ist.init();
   assert.match(sentence(() => ist.Asset.from(bytesA)), /init\(\) was called, but not awaited/);
@@ -87,7 +87,7 @@ test('what an asset holds', () => {
   assert.equal(info.name, 'bolt.ist');
   assert.equal(info.spheres, info.details[0]);
   assert.ok(info.details.length > 1);
-  assert.ok(info.meshState === 'own' && info.meshTriangles === 4312 && info.countedTwice === 0);
+  assert.ok(info.meshState === 'own' && info.meshTriangles === 4312 && info.selfOverlapVolume === 0);
   const {lower, upper} = asset.bounds();
   const mass = asset.massProperties();
   assert.equal(mass.volume, info.volume);
@@ -129,7 +129,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
   const steps = [1, 2, 3].map(() => ist.penetration(a, b, pose, {...exact, pairId: 5}));
   assert.deepEqual({...steps[2], nodeVisits: found.nodeVisits}, found);
   assert.equal(steps[2].nodeVisits, 0);
-  const floor = ist.Field.halfSpace([0, 0, 1]);
+  const floor = ist.Shape.halfSpace([0, 0, 1]);
   assert.match(
       sentence(() => ist.penetration(floor, b, pose, exact)), /lacks data that the query needs/);
   const [one, other] =
@@ -146,7 +146,7 @@ test('exact is the true volume of two meshes, and refused where there is none', 
 
 test('the stored mesh is closed and holds the volume', () => {
   const asset = ist.Asset.from(bytesA);
-  const {positions, triangles} = asset.surface(), info = asset.info();
+  const {positions, triangles} = asset.mesh(), info = asset.info();
   assert.equal(triangles.length, 3 * info.meshTriangles);
   const edges = new Set();
   let six = 0;
@@ -224,11 +224,11 @@ test('outlines: closed curves, a patch at a time', () => {
   const stopped = ist.overlapOutline(a, b, pose, {maxVisits: 1});
   assert.ok(stopped.contact.whole.status === 'budget-exhausted' && stopped.count === 0);
 
-  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {surface: 'none'})));
+  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {keepMesh: false})));
   const without = sentence(() => ist.overlapOutline(a, bare, pose));
   assert.match(without, /overlapOutline\(\): .*mesh/);
   assert.match(
-      sentence(() => ist.overlapOutline(ist.Field.ball(1), b, pose)), /a field has no mesh/);
+      sentence(() => ist.overlapOutline(ist.Shape.ball(1), b, pose)), /a shape has no mesh/);
   a.free();
   b.free();
   bare.free();
@@ -256,33 +256,33 @@ test('fields', () => {
   const b = ist.Asset.from(bytesB), {volume} = b.info(), {lower, upper} = b.bounds();
   const near = (x, wanted, share) =>
       assert.ok(Math.abs(x / wanted - 1) <= share, `${x} for ${wanted}`);
-  const floor = ist.Field.halfSpace([0, 0, 1], upper[2] + 1);
+  const floor = ist.Shape.halfSpace([0, 0, 1], upper[2] + 1);
   near(ist.penetration(floor, b, {}).volume, volume, 1e-3);
   near(ist.separation(floor, b, {translation: [0, 0, 10 + upper[2] - lower[2]]}).distance, 9, 0.05);
-  near(ist.penetration(ist.Field.box([100, 100, 100]), b, {}).volume, volume, 1e-3);
-  near(ist.penetration(ist.Field.ball(100), b, {}).volume, volume, 1e-3);
-  near(ist.penetration(ist.Field.capsule(100, 1), b, {}).volume, volume, 1e-3);
-  near(ist.penetration(ist.Field.cylinder(100, 100), b, {}).volume, volume, 1e-3);
-  const half = ist.Field.halfSpace([0, 0, 1], 0), cut = ist.penetration(half, b, {}).volume;
-  const ground = ist.Field.heights(new Float32Array(16), 4, 4, [10, 10]);
+  near(ist.penetration(ist.Shape.box([100, 100, 100]), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Shape.ball(100), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Shape.capsule(100, 1), b, {}).volume, volume, 1e-3);
+  near(ist.penetration(ist.Shape.cylinder(100, 100), b, {}).volume, volume, 1e-3);
+  const half = ist.Shape.halfSpace([0, 0, 1], 0), cut = ist.penetration(half, b, {}).volume;
+  const ground = ist.Shape.heights(new Float32Array(16), 4, 4, [10, 10]);
   near(ist.penetration(ground, b, {}).volume, cut, 1e-9);
-  const grid = new Float32Array(27).map((_, i) => 100 * (1 - Math.floor(i / 9)));  // −z
+  const grid = new Float32Array(27).map((_, i) => 100 * (Math.floor(i / 9) - 1));  // z
   near(
       ist.penetration(
-             ist.Field.distanceGrid(grid, [3, 3, 3], 100, {origin: [-100, -100, -100]}), b, {})
+             ist.Shape.distanceGrid(grid, [3, 3, 3], 100, {origin: [-100, -100, -100]}), b, {})
           .volume,
       cut, 1e-6);
   assert.ok(ist.contactPatches(half, b, {}).count > 1);
   assert.equal(ist.overlap(half, b, {}), 'yes');
-  assert.match(sentence(() => ist.lenses(half, b, {})), /a field has no spheres/);
+  assert.match(sentence(() => ist.lenses(half, b, {})), /a shape has no spheres/);
   half.free();
   assert.match(sentence(() => ist.penetration(half, b, {})), /used after free/);
-  assert.match(sentence(() => ist.penetration(ist.Field.ball(-1), b, {})), /out of range/);
+  assert.match(sentence(() => ist.penetration(ist.Shape.ball(-1), b, {})), /out of range/);
   assert.match(
-      sentence(() => ist.Field.heights(new Float32Array(3), 2, 2, [1, 1])),
+      sentence(() => ist.Shape.heights(new Float32Array(3), 2, 2, [1, 1])),
       /2 · 2 = 4 numbers, not 3/);
   assert.match(
-      sentence(() => ist.Field.heights(new Float32Array(3), 3, 1, [1, 1])), /at least two points/);
+      sentence(() => ist.Shape.heights(new Float32Array(3), 3, 1, [1, 1])), /at least two points/);
   b.free();
 });
 
@@ -303,7 +303,7 @@ test('flat faces: what protrudes is taken out', () => {
   assert.equal(ist.withoutProtrusion(whole, a, b, pose, {into: whole}), whole);
   assert.deepEqual(whole, clean);
   assert.match(
-      sentence(() => ist.withoutProtrusion(whole, ist.Field.ball(1), b, pose)),
+      sentence(() => ist.withoutProtrusion(whole, ist.Shape.ball(1), b, pose)),
       /both solids must be Assets/);
   assert.match(
       sentence(() => ist.patchesWithoutProtrusion({count: 3, patches: []}, a, b, pose)),
@@ -323,9 +323,9 @@ test('wrenches about any point, and how two assets suit', () => {
   const found = ist.contactPatches(a, b, pose), into = {onA, onB};
   assert.equal(ist.wrenches(found.patches[0], pose, {b: about}, into), into);
   assert.equal(onB.force[2], found.patches[0].force[2]);
-  const fit = ist.pairFit(a, b);
-  assert.ok(fit.fits && fit.ratio >= 1 && fit.grainA > 0);
-  const small = {scale: 0.01, translation: [4, 0, 10]}, unlike = ist.pairFit(a, b, {scaleB: 0.01});
+  const fit = ist.sizeMatch(a, b);
+  assert.ok(fit.fits && fit.ratio >= 1 && fit.featureSizeA > 0);
+  const small = {scale: 0.01, translation: [4, 0, 10]}, unlike = ist.sizeMatch(a, b, {scaleB: 0.01});
   assert.ok(unlike.needsMesh && unlike.hasMesh && unlike.fits);
   // There the meshes answer, unless it is spheres that are wanted.
   const meshes = ist.penetration(a, b, small, {measure: 'exact'}).volume;
@@ -337,7 +337,7 @@ test('wrenches about any point, and how two assets suit', () => {
 
 test('time of impact: no tunnelling at any speed', () => {
   const b = ist.Asset.from(bytesB), {lower, upper} = b.bounds();
-  const floor = ist.Field.halfSpace([0, 0, 1], 0);
+  const floor = ist.Shape.halfSpace([0, 0, 1], 0);
   const start = {translation: [0, 0, 10 - lower[2]]};
   for (const speed of [1, 1e3, 1e6]) {
     const hit = ist.timeOfImpact(
@@ -371,7 +371,7 @@ test('time of impact: no tunnelling at any speed', () => {
 
 test('a batch: the answers of single calls, a bad pair among them', () => {
   const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB),
-        floor = ist.Field.halfSpace([0, 0, 1]);
+        floor = ist.Shape.halfSpace([0, 0, 1]);
   const pairs = [];
   for (let i = 0; i < 20; ++i) {
     const poseB = {translation: [0.1 * i, 0, i === 7 ? NaN : 9]};
@@ -396,7 +396,7 @@ test('a batch: the answers of single calls, a bad pair among them', () => {
       sentence(() => ist.penetrationBatch([pairs[0], {a, b}])), /pair 1: poseB is missing/);
   assert.match(
       sentence(() => ist.contactPatchesBatch([{a, b: {}, poseB: {}}])),
-      /pair 0: contactPatchesBatch\(\): solid B must be an Asset or a Field/);
+      /pair 0: contactPatchesBatch\(\): solid B must be an Asset or a Shape/);
   a.free();
   b.free();
 });
@@ -414,13 +414,13 @@ test('what is wrong is said', () => {
   assert.match(sentence(ask({scale: 0})), /scale is 0; it must be > 0/);
   assert.match(sentence(ask({}, {measure: 'outer'})), /measure is outer/);
   assert.match(sentence(ask({}, {pairBudget: -1})), /whole number/);
-  assert.match(sentence(() => ist.penetration({}, b, {})), /solid A must be an Asset or a Field/);
+  assert.match(sentence(() => ist.penetration({}, b, {})), /solid A must be an Asset or a Shape/);
   assert.match(
-      sentence(() => ist.penetration(ist.Field.ball(2), ist.Field.ball(1), {})),
-      /both solids are Fields/);
-  const floor = ist.Field.halfSpace([0, 0, 1], 1);
+      sentence(() => ist.penetration(ist.Shape.ball(2), ist.Shape.ball(1), {})),
+      /both solids are shapes/);
+  const floor = ist.Shape.halfSpace([0, 0, 1], 1);
   assert.equal(ist.penetration(a, floor, {}).volume, ist.penetration(floor, a, {}).volume);
-  assert.match(sentence(() => ist.lenses(a, floor, {})), /solid B must be an Asset: a field/);
+  assert.match(sentence(() => ist.lenses(a, floor, {})), /solid B must be an Asset: a shape/);
   assert.match(sentence(() => ist.contactPatches(a, b, {}, {maxPatches: 33})), /from 1 to 32/);
   assert.match(sentence(() => new ist.Asset()), /static functions/);
   a.free();
@@ -431,12 +431,12 @@ test('what is wrong is said', () => {
 });
 
 test('an option that is misspelt is refused by its name', async () => {
-  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), floor = ist.Field.halfSpace([0, 0, 1]);
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), floor = ist.Shape.halfSpace([0, 0, 1]);
   const whole = ist.penetration(a, b, {}), found = ist.contactPatches(a, b, {});
   const calls = {
     'Asset.spheres': (typo) => a.spheres(typo),
-    'Field.distanceGrid': (typo) =>
-        ist.Field.distanceGrid(new Float32Array(8), [2, 2, 2], 1, typo),
+    'Shape.distanceGrid': (typo) =>
+        ist.Shape.distanceGrid(new Float32Array(8), [2, 2, 2], 1, typo),
     penetration: (typo) => ist.penetration(a, b, {}, typo),
     separation: (typo) => ist.separation(floor, b, {}, typo),
     contactPatches: (typo) => ist.contactPatches(a, b, {}, typo),
@@ -449,7 +449,7 @@ test('an option that is misspelt is refused by its name', async () => {
     withoutProtrusion: (typo) => ist.withoutProtrusion(whole, a, b, {}, typo),
     patchesWithoutProtrusion: (typo) => ist.patchesWithoutProtrusion(found, a, b, {}, typo),
     wrenches: (typo) => ist.wrenches(whole, {}, typo),
-    pairFit: (typo) => ist.pairFit(a, b, typo),
+    sizeMatch: (typo) => ist.sizeMatch(a, b, typo),
     timeOfImpact: (typo) => ist.timeOfImpact(a, b, {}, typo),
     penetrationBatch: (typo) => ist.penetrationBatch([], typo),
     contactPatchesBatch: (typo) => ist.contactPatchesBatch([], typo),
@@ -468,8 +468,8 @@ test('memory comes back', () => {
   const freed = () => {
     for (let i = 0; i < 50; ++i) {
       const asset = ist.Asset.from(bytesA);
-      ist.Field.heights(new Float32Array(1e4), 100, 100, [1, 1]).free();
-      asset.surface();
+      ist.Shape.heights(new Float32Array(1e4), 100, 100, [1, 1]).free();
+      asset.mesh();
       asset.free();
       assert.throws(() => ist.Asset.from(bytesA.subarray(1)));
     }
@@ -528,7 +528,7 @@ test('a loop that keeps its answers makes no garbage', () => {
 });
 
 test('rays and points against one solid', () => {
-  const bolt = ist.Asset.from(bytesA, 'bolt'), ball = ist.Field.ball(2);
+  const bolt = ist.Asset.from(bytesA, 'bolt'), ball = ist.Shape.ball(2);
   const {lower, upper, centre} = bolt.bounds();
   // Up the bolt's axis, from below and from inside: to its end, and out of its head.
   const pose = {rotation: [1, 0, 0, 0], translation: [10, 0, 0]};
@@ -538,7 +538,7 @@ test('rays and points against one solid', () => {
   assert.ok(Math.abs(hits.distance[0] - 3) < 1e-9, `${hits.distance}`);
   assert.ok(Math.abs(hits.point[5] - upper[2]) < 1e-9, `${hits.point}`);
   assert.deepEqual(Array.from(hits.normal), [0, 0, -1, 0, 0, 1]);
-  const short = ist.raycast(bolt, pose, below, up, {longest: 2, into: hits});
+  const short = ist.raycast(bolt, pose, below, up, {maxDistance: 2, into: hits});
   assert.equal(short, hits);
   assert.ok(short.count === 1 && short.distance[0] === Infinity);
   assert.equal(short.triangle[0], 2 ** 32 - 1);
@@ -549,7 +549,7 @@ test('rays and points against one solid', () => {
   assert.ok(feet.error.every((error) => error >= 0 && error < 1e-6));
   assert.deepEqual(Array.from(feet.gradient.subarray(0, 3)), [0, 0, -1]);
 
-  // Of a field; NaN among many, a sentence for one alone.
+  // Of a shape; NaN among many, a sentence for one alone.
   const many = ist.closestPoint(ball, {}, [3, 0, 0, NaN, 0, 0]);
   assert.deepEqual(Array.from(many.distance), [1, NaN]);
   assert.deepEqual(Array.from(ist.contains(ball, {}, [1, 0, 0, NaN, 0, 0])), [1, 2]);
@@ -563,9 +563,9 @@ test('rays and points against one solid', () => {
       /directions has 3 rows; origins has 2/);
   assert.match(sentence(() => ist.contains(bolt, {}, ['1', 2, 3])), /points holds 1, not a number/);
   assert.match(
-      sentence(() => ist.raycast(bolt, {}, below, up, {longest: 0})), /longest is 0; it must be > 0/);
-  assert.match(sentence(() => ist.contains(pose, {}, below)), /must be an Asset or a Field/);
-  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {surface: 'none'})), 'bare');
+      sentence(() => ist.raycast(bolt, {}, below, up, {maxDistance: 0})), /maxDistance is 0; it must be > 0/);
+  assert.match(sentence(() => ist.contains(pose, {}, below)), /must be an Asset or a Shape/);
+  const bare = ist.Asset.from(readFileSync(baked('nut', 500, {keepMesh: false})), 'bare');
   assert.match(
       sentence(() => ist.contains(bare, {}, [...below, ...inside])), /lacks data that the query needs/);
   for (const each of [bolt, ball, bare]) each.free();

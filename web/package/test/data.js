@@ -21,17 +21,17 @@ export function sampleMesh(name) {
 }
 
 /** A sample, or a mesh, as an asset, larger by a factor: its path. Baked once. */
-export function baked(name, spheres, {mesh, scale = 1, surface = 'all'} = {}) {
+export function baked(name, spheres, {mesh, scale = 1, keepMesh = true} = {}) {
   const folder = join(buildFolder, 'assets');
   const path = join(
       folder,
-      `${name}${scale === 1 ? '' : `_x${scale}`}_${spheres}${surface === 'all' ? '' : '_bare'}.ist`);
+      `${name}${scale === 1 ? '' : `_x${scale}`}_${spheres}${keepMesh ? '' : '_bare'}.ist`);
   if (existsSync(path)) return path;
   mkdirSync(folder, {recursive: true});
   mesh ??= sampleMesh(name);
   execFileSync(
       program,
-      ['bake', mesh, '-o', path, '--spheres', spheres, '--scale', scale, '--surface', surface,
+      ['bake', mesh, '-o', path, '--spheres', spheres, '--scale', scale, '--keep-mesh', keepMesh ? 'yes' : 'no',
        '--device', 'cpu'],
       {stdio: 'ignore'});
   return path;

@@ -64,9 +64,9 @@ function moreQueries(ist, a, b, halfSpace) {
       bits: (found) => patchBits(found.patches.slice(0, found.count)),
     },
     'fit': {
-      ask: (pose) => ist.pairFit(a, b, {scaleB: pose.scale}),
+      ask: (pose) => ist.sizeMatch(a, b, {scaleB: pose.scale}),
       bits: (f) =>
-          [...hexes([f.grainA, f.grainB, f.ratio]), Number(f.aIsCoarser), Number(f.hasMesh),
+          [...hexes([f.featureSizeA, f.featureSizeB, f.ratio]), Number(f.aIsCoarser), Number(f.hasMesh),
            Number(f.needsMesh), Number(f.fits)],
     },
     'wrenches': {
@@ -120,9 +120,9 @@ function moreQueries(ist, a, b, halfSpace) {
 
 /** By name: what is asked of a row, and its answer as bits. `ist`: a build of the package. */
 export function queries(ist, a, b) {
-  const halfSpace = ist.Field.halfSpace([0, 0.6, 0.8], 0.0625);
-  const box = ist.Field.box([0.25, 0.5, 0.125]);
-  const capsule = ist.Field.capsule(0.25, 0.375);
+  const halfSpace = ist.Shape.halfSpace([0, 0.6, 0.8], 0.0625);
+  const box = ist.Shape.box([0.25, 0.5, 0.125]);
+  const capsule = ist.Shape.capsule(0.25, 0.375);
   const penetrationOf = (solid, options = {}) => {
     const reused = {...options, into: undefined};
     return {
@@ -172,7 +172,7 @@ export function queries(ist, a, b) {
         const [x, y, z] = pose.translation, origin = [2 * x, 2 * y, 2 * z];
         return [
           ist.raycast(b, pose, origin, [-x, -y, -z, 0.125 - x, -y, -z]),
-          ist.raycast(b, pose, origin, [-0.03125 - x, -y, -z], {longest: 100}),
+          ist.raycast(b, pose, origin, [-0.03125 - x, -y, -z], {maxDistance: 100}),
         ];
       },
       bits: (answers) => answers.flatMap(

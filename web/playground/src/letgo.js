@@ -1,9 +1,9 @@
 // B as a free body of density 1: gravity, and a pressure that grows with the depth of each patch.
 //
-// The law is that of <ist/response.h>: springs per area with Hunt and Crossley's damping, and
+// The law is that of <ist/contact_law.h>: springs per area with Hunt and Crossley's damping, and
 // Coulomb's friction that holds by springs until it slides. Steps are small and semi-implicit.
 
-import {contactPatches, Field, overlap} from 'ist-query';
+import {contactPatches, Shape, overlap} from 'ist-query';
 import * as THREE from 'three';
 
 const kStep = 1 / 960;  // [s]
@@ -25,7 +25,7 @@ export class LetGo {
     this.a = a;
     this.b = b;
     this.up = up.clone();
-    this.ground = Field.halfSpace(up.toArray(), floor);
+    this.ground = Shape.halfSpace(up.toArray(), floor);
     this.radius = b.bounds().radius;
     const {volume, centreOfMass, inertia} = b.massProperties();
     this.mass = volume;

@@ -39,8 +39,8 @@ export class Overlap {
       skin.columns = undefined;
       mesh.visible = drawn;
       if (!drawn) return;
-      const columns = skin.columns = new Columns(other.surface().getAttribute('position').array);
-      mesh.geometry = own.surface();
+      const columns = skin.columns = new Columns(other.mesh().getAttribute('position').array);
+      mesh.geometry = own.mesh();
       uniforms.lists.value = columns.lists;
       uniforms.corners.value = columns.corners;
       uniforms.side.value = columns.side;

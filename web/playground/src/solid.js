@@ -107,7 +107,7 @@ export class Solid {
 
   surface() {
     if (this.geometry) return this.geometry;
-    const {positions, triangles} = this.asset.surface();
+    const {positions, triangles} = this.asset.mesh();
     const shared = new THREE.BufferGeometry();
     shared.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
     shared.setIndex(new THREE.BufferAttribute(triangles, 1));

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 #include <ist/bake.h>
-#include <ist/pair_fit.h>
+#include <ist/mass_properties.h>
 
 #include <limits>
 
@@ -19,18 +19,18 @@ Asset cube(bool with_mesh) {
 }
 
 /// What is said of a pair is how the pair is asked.
-TEST(PairFit, TellsWhatIsAskedOfAPair) {
+TEST(SizeMatch, TellsWhatIsAskedOfAPair) {
   Workspace workspace;
   const Asset bare = cube(false), whole = cube(true);
   for (const Asset* large : {&bare, &whole})
     for (const double ratio : {1.0, 1.2, 3.9, 4.1, 30.0})
       for (const bool turned : {false, true}) {
         const Pose near = {{0.6, 0, 0.8, 0}, {0.5, 0.1, 0.4 / ratio}};
-        const PlacedTree a{large->view(), {}, 3}, b{whole.view(), near, 3 / ratio};
-        const PlacedTree &first = turned ? b : a, &second = turned ? a : b;
-        const PairFit fit = pair_fit(first, second);
+        const PlacedAsset a{large->view(), {}, 3}, b{whole.view(), near, 3 / ratio};
+        const PlacedAsset &first = turned ? b : a, &second = turned ? a : b;
+        const SizeMatch fit = size_match(first, second);
         EXPECT_NEAR(fit.ratio, ratio, 1e-12 * ratio);
-        EXPECT_GT(fit.grain_a, 0);
+        EXPECT_GT(fit.feature_size_a, 0);
         EXPECT_EQ(fit.needs_mesh, ratio > 4);
         EXPECT_EQ(fit.has_mesh, large == &whole);
         if (ratio > 1) {
@@ -49,18 +49,18 @@ TEST(PairFit, TellsWhatIsAskedOfAPair) {
       }
 }
 
-TEST(PairFit, SaysNothingOfNothing) {
+TEST(SizeMatch, SaysNothingOfNothing) {
   const testing::NoFloatTraps with_nan;
   const Asset asset = testing::make_random_asset({40, 0.2, {}, 0}, 1);
-  const PlacedTree sound{asset.view(), {}, 1};
-  PlacedTree wrong = sound;
+  const PlacedAsset sound{asset.view(), {}, 1};
+  PlacedAsset wrong = sound;
   for (const double scale : {0.0, -1.0, std::numeric_limits<double>::quiet_NaN()}) {
     wrong.scale = scale;
-    EXPECT_TRUE(pair_fit(sound, wrong).fits());
+    EXPECT_TRUE(size_match(sound, wrong).fits());
   }
-  EXPECT_TRUE(pair_fit(sound, PlacedTree()).fits());
+  EXPECT_TRUE(size_match(sound, PlacedAsset()).fits());
   wrong.scale = 10;
-  EXPECT_FALSE(pair_fit(sound, wrong).fits());
+  EXPECT_FALSE(size_match(sound, wrong).fits());
 }
 
 }  // namespace

@@ -4,29 +4,29 @@
 #include <cstdint>
 #include <variant>
 
-#include <ist/api.h>
+#include <ist/types.h>
 
-// Fields: shapes that a sphere tree collides with and that need no tree themselves: half-spaces,
-// primitives, terrains, distance grids and functions. They are plain views: nothing is copied or
-// allocated, and memory they point to must outlive them. Distances are positive inside the solid
-// and negative outside, as those of Solid. Lengths are [u] in the field's own frame.
+// Solids that need no asset: half-spaces, primitives, terrains, distance grids and functions. They
+// are plain views: nothing is copied or
+// allocated, and memory they point to must outlive them. Distances are negative inside the solid
+// and positive outside, as those of Solid. Lengths are [u] in the shape's own frame.
 
 namespace IST_API ist {
 
 /// The solid normal · x ≤ offset. Exact.
-struct HalfSpaceField {
+struct HalfSpaceShape {
   /// Outward; its length (1e-150 to 1e150) divides the offset too.
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset = 0;  ///< [u] for a unit normal
 };
 
 /// A box around the origin. Exact, also at edges and corners, and for balls thicker than the box.
-struct BoxField {
+struct BoxShape {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< [u] > 0
 };
 
 /// A ball around the origin. Exact.
-struct BallField {
+struct BallShape {
   double radius = 1;  ///< [u] > 0
 };
 
@@ -34,7 +34,7 @@ struct BallField {
 ///
 /// Approximate: a ball is intersected with the tangent plane at the closest point. The relative
 /// error is about the ball's radius over the capsule's.
-struct CapsuleField {
+struct CapsuleShape {
   double radius = 1;       ///< [u] > 0
   double half_height = 1;  ///< [u] ≥ 0, of the segment
 };
@@ -42,7 +42,7 @@ struct CapsuleField {
 /// A cylinder about the z axis. Its lateral surface is approximated as the capsule's. At the rim,
 /// the share of a ball inside is the product of its shares inside the lateral surface and between
 /// the ends.
-struct CylinderField {
+struct CylinderShape {
   double radius = 1;       ///< [u] > 0
   double half_height = 1;  ///< [u] > 0
 };
@@ -51,7 +51,7 @@ struct CylinderField {
 /// (i + 1, j + 1). Exact. Beyond its border it continues level. A height that is not finite gives
 /// QueryStatus::invalid_input where a query samples it; on a GPU it invalidates every query of the
 /// terrain.
-struct HeightField {
+struct HeightFieldShape {
   const float* heights = nullptr;  ///< [u] [rows · columns], columns (x) run fastest
   std::uint32_t columns = 0;       ///< ≥ 2, along x
   std::uint32_t rows = 0;          ///< ≥ 2, along y
@@ -63,7 +63,7 @@ struct HeightField {
 /// Distances at the points of a grid, interpolated linearly in each cell: the gradient jumps from
 /// cell to cell. Points outside the grid are outside the solid. A distance that is not finite gives
 /// QueryStatus::invalid_input where a query samples it.
-struct DistanceGridField {
+struct DistanceGridShape {
   const float* distances = nullptr;  ///< [u] [size[0] · size[1] · size[2]], x runs fastest
   std::uint32_t size[3] = {};        ///< points along x, y, z, each ≥ 2
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< [u] of the first point
@@ -71,22 +71,23 @@ struct DistanceGridField {
   double error = 0;  ///< [u] bound on the error of the interpolated distance
 };
 
-/// A sample of a field.
-struct FieldSample {
-  double distance = 0;                                 ///< [u] to the surface, positive inside
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance
+/// A sample of a shape.
+struct ShapeSample {
+  double distance = 0;                                 ///< [u] to the surface, negative inside
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< of the distance: outward
 };
 
-/// A field by a function of the caller's. It is called once for every node and ball that is
-/// visited, on the thread of the query. It must be 1-Lipschitz and never exceed the true distance
-/// by more than `error`. A sample that is not finite gives QueryStatus::invalid_input.
-struct FunctionField {
-  FieldSample (*sample)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
+/// A shape by a function of the caller's. It is called once for every node and ball that is
+/// visited, on the thread of the query. It must be 1-Lipschitz, and its magnitude must never exceed
+/// the true distance by more than `error`. A sample that is not finite gives
+/// QueryStatus::invalid_input.
+struct FunctionShape {
+  ShapeSample (*sample)(const void* context, const Eigen::Vector3d& x) noexcept = nullptr;
   const void* context = nullptr;  ///< passed to `sample`
   double error = 0;               ///< [u] bound on the error of distances
 };
 
-using Field = std::variant<HalfSpaceField, BoxField, BallField, CapsuleField, CylinderField,
-                           HeightField, DistanceGridField, FunctionField>;
+using Shape = std::variant<HalfSpaceShape, BoxShape, BallShape, CapsuleShape, CylinderShape,
+                           HeightFieldShape, DistanceGridShape, FunctionShape>;
 
 }  // namespace ist

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <ist/overlap.h>
+#include <ist/query.h>
 
 #include <algorithm>
 #include <type_traits>
@@ -8,16 +8,16 @@
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/open_runs.h"
-#include "query/field/shapes.h"
+#include "query/shape/shapes.h"
 
 namespace ist {
 
-/// Whether a field and a tree overlap: best first, the ball that reaches deepest for its size. All
-/// in the field's frame.
-template <class Shape>
-class FieldMeetingSearch {
+/// Whether a shape and a tree overlap: best first, the ball that reaches deepest for its size. All
+/// in the shape's frame.
+template <class Sampler>
+class ShapeMeetingSearch {
  public:
-  FieldMeetingSearch(Shape& shape, const SphereTree& tree, const RelativePose& pose,
+  ShapeMeetingSearch(Sampler& shape, const SphereTree& tree, const RelativePose& pose,
                      Workspace::Impl& scratch) noexcept
       : shape_(shape), tree_(tree), map_(pose.a_from_b), waiting_(scratch) {
     const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
@@ -25,33 +25,32 @@ class FieldMeetingSearch {
     error_ = shape_.error() + distance_error(Precision::float64, reach) + pose.rounding_of_world();
   }
 
-  Overlapping run() noexcept {
+  YesNo run() noexcept {
     NodePair pair{0, 0, tree_.top, 0};
-    if (gap(tree_.ball(tree_.top, 0).centre, tree_.header->root_cover) > error_)
-      return Overlapping::no;
+    if (gap(tree_.ball(tree_.top, 0).centre, tree_.header->root_cover) > error_) return YesNo::no;
     do {
-      if (!waiting_.grant()) return Overlapping::unknown;
-      if (open(pair)) return Overlapping::yes;
+      if (!waiting_.grant()) return YesNo::unknown;
+      if (open(pair)) return YesNo::yes;
     } while (waiting_.take_best(covers_meet_, pair));
-    return covers_meet_ ? Overlapping::unknown : Overlapping::no;
+    return covers_meet_ ? YesNo::unknown : YesNo::no;
   }
 
  private:
   /// Grids beyond their border and functions tell no more than that the surface is not nearer.
   static constexpr bool kTrueDistances =
-      !std::is_same_v<Shape, GridShape> && !std::is_same_v<Shape, FunctionShape>;
+      !std::is_same_v<Sampler, GridSampler> && !std::is_same_v<Sampler, FunctionSampler>;
 
-  /// How deep a point is in the field, negative outside.
+  /// How deep a point is in the shape, negative outside.
   double depth_at(const double (&centre)[3]) noexcept {
     double at[3];
     map_.apply(centre, at);
-    return shape_.nearest({at[0], at[1], at[2]}).distance;
+    return -shape_.nearest({at[0], at[1], at[2]}).distance;
   }
   double gap(const double (&centre)[3], double radius) noexcept {
     return -depth_at(centre) - radius * map_.scale;
   }
 
-  /// True if something below is certain to be in the field.
+  /// True if something below is certain to be in the shape.
   bool open(const NodePair& pair) noexcept {
     const int level = pair.level_a;
     const std::uint32_t below = tree_.count(level - 1);
@@ -62,7 +61,7 @@ class FieldMeetingSearch {
       const double cover = level == 0 ? static_cast<double>(tree_.sphere_cover[child])
                                       : tree_.cover(level - 1, child);
       const double depth = depth_at(ball.centre), radius = ball.r * map_.scale;
-      // All of the ball is in the field; or the centre of a sphere is, or a part of it.
+      // All of the ball is in the shape; or the centre of a sphere is, or a part of it.
       if (depth - radius > error_) return true;
       if (level == 0 && (depth > error_ || (kTrueDistances && depth + radius > error_)))
         return true;
@@ -80,10 +79,10 @@ class FieldMeetingSearch {
     return false;
   }
 
-  Shape& shape_;
+  Sampler& shape_;
   const SphereTree& tree_;
   const Similarity& map_;
-  double error_;  ///< of a gap, the field's and by rounding
+  double error_;  ///< of a gap, the shape's and by rounding
   OpenRuns waiting_;
   bool covers_meet_ = false;
 };

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <limits>
 
-#include "query/field/patch_shapes.h"
-#include "query/field/shapes.h"
 #include "query/impact/convex_core.h"
 #include "query/impact/impact_loop.h"
 #include "query/impact/impact_side.h"
 #include "query/impact/node_key.h"
 #include "query/impact/pair_search.h"
+#include "query/shape/patch_shapes.h"
+#include "query/shape/shapes.h"
 
 namespace ist {
 
@@ -38,11 +38,11 @@ struct TrianglePart {
   }
 };
 
-/// A field and a tree on their ways.
-template <class Shape>
-class FieldSearch {
+/// A shape and a tree on their ways.
+template <class Sampler>
+class ShapeSearch {
  public:
-  FieldSearch(Shape& shape, const MovingFrame& frame, const ImpactSide& b,
+  ShapeSearch(Sampler& shape, const MovingFrame& frame, const ImpactSide& b,
               ImpactLoop& loop) noexcept
       : shape_(shape), frame_(frame), b_(b), loop_(loop) {}
 
@@ -54,7 +54,7 @@ class FieldSearch {
         look_at_node(node, at);
       } else if (b_.mesh() == nullptr) {
         look_at_sphere(node, at);
-      } else if constexpr (kConvex<Shape>) {
+      } else if constexpr (kConvex<Sampler>) {
         look_at_triangle(node, at);
       } else {
         look_at_part(part, node, at);
@@ -65,16 +65,16 @@ class FieldSearch {
  private:
   using Vector3d = Eigen::Vector3d;
 
-  /// The field seen from a place of the frame.
+  /// The shape seen from a place of the frame.
   struct Sight {
-    double distance;  ///< from the field, negative inside; no less by more than the field's error
-    Vector3d normal;  ///< from the field to the place; zero where it tells none
+    double distance;  ///< from the shape, negative inside; no less by more than the shape's error
+    Vector3d normal;  ///< from the shape to the place; zero where it tells none
   };
   Sight sight(const Vector3d& x, const Placement& at) const noexcept {
-    const FieldSample sample = shape_.nearest(at.a.transpose() * x + frame_.a.centre);
+    const ShapeSample sample = shape_.nearest(at.a.transpose() * x + frame_.a.centre);
     const double length = sample.gradient.norm();
-    const Vector3d out = length > 0 ? Vector3d(-sample.gradient / length) : Vector3d::Zero().eval();
-    return {-sample.distance, at.a * out};
+    const Vector3d out = length > 0 ? Vector3d(sample.gradient / length) : Vector3d::Zero().eval();
+    return {sample.distance, at.a * out};
   }
   double lost(const Placement& at) const noexcept { return shape_.error() + at.error; }
 
@@ -96,7 +96,7 @@ class FieldSearch {
 
   /// Likewise of a ball around a point of B.
   double ball_step(double gap, const Sight& seen, const TurningPoint& point) const noexcept {
-    if (kConvex<Shape> && frame_.a.spin_speed == 0 && !seen.normal.isZero(0))
+    if (kConvex<Sampler> && frame_.a.spin_speed == 0 && !seen.normal.isZero(0))
       return clear_step(frame_, seen.normal, gap, -seen.normal.dot(point.velocity), 0,
                         point.velocity.norm());
     return any_step(gap, point, point.place.norm());
@@ -109,7 +109,7 @@ class FieldSearch {
 
   void meet(const Vector3d& x) noexcept {
     ImpactFound found;
-    found.status = ImpactStatus::overlapping;
+    found.kind = ImpactKind::overlapping;
     found.point_a = found.point_b = x;
     loop_.found(found);
   }
@@ -148,8 +148,8 @@ class FieldSearch {
     ImpactFound found;
     found.gap = part.gap;
     found.distance = part.distance;
-    found.status = part.distance <= loop_.tolerance && part.gap > 0 ? ImpactStatus::impact
-                                                                    : ImpactStatus::unresolved;
+    found.kind = part.distance <= loop_.tolerance && part.gap > 0 ? ImpactKind::impact
+                                                                  : ImpactKind::unresolved;
     found.normal = part.normal;
     found.point_b = part.point;
     found.point_a = part.point - std::max(0.0, part.distance) * part.normal;
@@ -175,7 +175,7 @@ class FieldSearch {
     loop_.count_surface_pair();
     const ConvexPiece piece = b_.piece(node.number);
     TurningPoint corner[3];
-    ConvexPiece triangle = piece;  // in the field's frame
+    ConvexPiece triangle = piece;  // in the shape's frame
     TurningPoint fastest{Vector3d::Zero(), Vector3d::Zero(), 0};
     double way = 0;
     for (int k = 0; k < 3; ++k) {
@@ -230,7 +230,7 @@ class FieldSearch {
 
   static constexpr double kSmallPart = 1.0 / 16;
 
-  Shape& shape_;
+  Sampler& shape_;
   const MovingFrame& frame_;
   const ImpactSide& b_;
   ImpactLoop& loop_;

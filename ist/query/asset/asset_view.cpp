@@ -1,4 +1,4 @@
-#include <ist/tree_view.h>
+#include <ist/asset.h>
 
 #include <algorithm>
 #include <cmath>
@@ -148,7 +148,7 @@ bool sound_values(const AssetHeader& header) noexcept {
   for (const double error : header.predicted_error)
     if (!is_finite_sum(error)) return false;
   if (!is_finite_sum(header.measured_error) || header.worst_partner >= kTrialPartners) return false;
-  if (!is_finite_sum(header.counted_twice) || !sound_state(header)) return false;
+  if (!is_finite_sum(header.self_overlap_volume) || !sound_state(header)) return false;
   if (header.mesh != 0 && !sound_mesh(header, *at<MeshHeader>(header, header.mesh))) return false;
   const DetailLevel* const details = at<DetailLevel>(header, header.details);
   for (std::uint32_t i = 0; i < header.detail_count; ++i) {
@@ -167,8 +167,8 @@ bool sound_values(const AssetHeader& header) noexcept {
 
 constinit const AssetHeader detail::kEmptyAsset;
 
-AssetStatus TreeView::from_bytes(std::span<const std::byte> bytes, TreeView& out) noexcept {
-  out = TreeView();
+AssetStatus AssetView::from_bytes(std::span<const std::byte> bytes, AssetView& out) noexcept {
+  out = AssetView();
   if (reinterpret_cast<std::uintptr_t>(bytes.data()) % kAssetAlignment != 0)
     return AssetStatus::misaligned;
   if (bytes.size() < sizeof(kAssetMagic)) return AssetStatus::too_short;
@@ -187,41 +187,41 @@ AssetStatus TreeView::from_bytes(std::span<const std::byte> bytes, TreeView& out
   return AssetStatus::ok;
 }
 
-std::size_t TreeView::sphere_count() const noexcept {
+std::size_t AssetView::sphere_count() const noexcept {
   return header_ == nullptr ? 0 : static_cast<std::size_t>(header_->sphere_count);
 }
 
-double TreeView::volume() const noexcept {
+double AssetView::volume() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->volume, 3 * header_->exponent);
 }
 
-double TreeView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
+double AssetView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
 
-double TreeView::protrusion() const noexcept {
+double AssetView::protrusion() const noexcept {
   return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
 }
 
-bool TreeView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }
+bool AssetView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }
 
-std::uint32_t TreeView::mesh_triangles() const noexcept {
+std::uint32_t AssetView::mesh_triangles() const noexcept {
   return has_mesh() ? at<MeshHeader>(*header_, header_->mesh)->triangle_count : 0;
 }
 
-double TreeView::mesh_error() const noexcept {
+double AssetView::mesh_error() const noexcept {
   if (!has_mesh()) return 0;
   const MeshHeader& mesh = *at<MeshHeader>(*header_, header_->mesh);
   return std::ldexp(mesh.error + mesh.rounding, header_->exponent);
 }
 
-MeshState TreeView::mesh_state() const noexcept {
+MeshState AssetView::mesh_state() const noexcept {
   return static_cast<MeshState>(header().mesh_state);
 }
 
-double TreeView::counted_twice() const noexcept {
-  return std::ldexp(header().counted_twice, 3 * header().exponent);
+double AssetView::self_overlap_volume() const noexcept {
+  return std::ldexp(header().self_overlap_volume, 3 * header().exponent);
 }
 
-PredictedErrors TreeView::predicted_errors() const noexcept {
+PredictedErrors AssetView::predicted_errors() const noexcept {
   PredictedErrors result;
   if (header_ == nullptr) return result;
   static_assert(std::tuple_size_v<decltype(result.classes)> == kOverlapClasses);

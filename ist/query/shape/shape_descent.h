@@ -4,19 +4,19 @@
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/descent/workspace.h"
-#include "query/field/patch_shapes.h"
-#include "query/field/probe_tally.h"
+#include "query/shape/patch_shapes.h"
+#include "query/shape/probe_tally.h"
 
 namespace ist {
 
-/// The volume that the spheres of a tree have inside a field that tells how far its surface is.
+/// The volume that the spheres of a tree have inside a shape that tells how far its surface is.
 /// Level by level; a node whose ball the surface does not reach is in or out as a whole.
-template <class Shape>
-class FieldDescent {
+template <class Sampler>
+class ShapeDescent {
  public:
-  /// `pose`: of the field, in its own frame, and of the tree. All arguments must outlive the
+  /// `pose`: of the shape, in its own frame, and of the tree. All arguments must outlive the
   /// descent.
-  FieldDescent(Shape& shape, const SphereTree& probes, const RelativePose& pose,
+  ShapeDescent(Sampler& shape, const SphereTree& probes, const RelativePose& pose,
                const DescentLimits& limits, Workspace::Impl& scratch,
                ContactBins* bins = nullptr) noexcept
       : shape_(shape),
@@ -70,8 +70,8 @@ class FieldDescent {
         const double d = shape_.sample(x).distance;
         const double reach = sure_reach(balls.r[lane], shape_.error());
         const std::uint32_t child = kWidth * block + lane;
-        if (d <= -reach) continue;
-        if (d >= reach) {
+        if (d >= reach) continue;
+        if (d <= -reach) {
           held[count++] = child;
         } else {
           next.a[next.size++] = child;
@@ -112,7 +112,7 @@ class FieldDescent {
     for (std::size_t i = from; i < now.size; ++i) tally_.leave(level, now.a[i]);
   }
 
-  Shape& shape_;
+  Sampler& shape_;
   const SphereTree& probes_;
   const Similarity& map_;
   Workspace::Impl& scratch_;

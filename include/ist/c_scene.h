@@ -1,12 +1,12 @@
-#ifndef IST_IST_SCENE_H
-#define IST_IST_SCENE_H
+#ifndef IST_C_SCENE_H
+#define IST_C_SCENE_H
 
 /* Scenes in C11: scene.h, with the same bits. Many solids, and which of them meet. Links
  * ist::query; the rules are those of ist.h. A scene belongs to one call at a time, but functions
  * that take it as const may run on several threads. ist_scene_set_poses(), ist_scene_set_motions()
  * and ist_scene_take_step() neither allocate nor lock. */
 
-#include <ist/ist.h>
+#include <ist/c.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -91,10 +91,10 @@ ist_status_t ist_scene_set_filter(ist_scene_t* scene,
 
 /* Two bodies that meet. */
 typedef struct ist_scene_pair {
-  uint32_t a, b;                 /* numbers, a < b; A of the query is `a` */
-  uint32_t stays;                /* 0: they did not meet in the step before */
-  ist_overlapping_t overlapping; /* IST_SCENE_OVERLAP alone; else unknown */
-  uint32_t slot;                 /* where its answers are */
+  uint32_t a, b;            /* numbers, a < b; A of the query is `a` */
+  uint32_t stays;           /* 0: they did not meet in the step before */
+  ist_yes_no_t overlapping; /* IST_SCENE_OVERLAP alone; else unknown */
+  uint32_t slot;            /* where its answers are */
   uint32_t patch_count;
 } ist_scene_pair_t;
 

@@ -1,4 +1,4 @@
-#include "query/field/patch_shapes.h"
+#include "query/shape/patch_shapes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -47,8 +47,8 @@ class PatchFiller {
 
 }  // namespace
 
-ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
-                           std::uint32_t& pairs) noexcept {
+ProbeTotal BoxSampler::block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
+                             std::uint32_t& pairs) noexcept {
   int axis;
   double side;
   const int faces = faces_near(balls.origin, balls.reach, axis, side);
@@ -103,18 +103,18 @@ ProbeTotal BoxShape::block(const ProbeBalls& balls, std::uint32_t used, const do
   return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
 }
 
-double HeightShape::height(std::int64_t i, std::int64_t j) noexcept {
+double HeightSampler::height(std::int64_t i, std::int64_t j) noexcept {
   const double height = PlainTerrain::height(i, j);
   if (std::isfinite(height)) return height;
   sound = false;
   return 0;
 }
 
-double HeightShape::surface(double x, double y) noexcept {
+double HeightSampler::surface(double x, double y) noexcept {
   return PlainTerrain::surface(x, y, [&](std::int64_t i, std::int64_t j) { return height(i, j); });
 }
 
-FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
+ShapeSample HeightSampler::nearest(const Eigen::Vector3d& x) noexcept {
   const double gap = x.z() - surface(x.x(), x.y());
   const exact::Point at = {x.x(), x.y(), x.z()};
   Eigen::Vector3d point(x.x(), x.y(), x.z() - gap);
@@ -157,10 +157,11 @@ FieldSample HeightShape::nearest(const Eigen::Vector3d& x) noexcept {
   const double distance = std::sqrt(best2);
   const Eigen::Vector3d up =
       distance > 0 ? Eigen::Vector3d((x - point) / distance) : Eigen::Vector3d::UnitZ().eval();
-  return gap > 0 ? FieldSample{-distance, -up} : FieldSample{distance, up};
+  return gap > 0 ? ShapeSample{distance, up} : ShapeSample{-distance, -up};
 }
 
-void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) noexcept {
+void HeightSampler::add_cells(const ProbeBalls& balls, std::uint32_t used,
+                              ProbeSums& sums) noexcept {
   PatchFiller filler(balls, used, sums);
   std::int64_t from[2], to[2];
   for (int k = 0; k < 2; ++k) cells_near(k, balls.origin[k], balls.reach, from[k], to[k]);
@@ -183,8 +184,8 @@ void HeightShape::add_cells(const ProbeBalls& balls, std::uint32_t used, ProbeSu
   filler.flush();
 }
 
-ProbeTotal HeightShape::block(const ProbeBalls& balls, std::uint32_t used,
-                              const double (&origin)[3], std::uint32_t& pairs) noexcept {
+ProbeTotal HeightSampler::block(const ProbeBalls& balls, std::uint32_t used,
+                                const double (&origin)[3], std::uint32_t& pairs) noexcept {
   ProbeSums sums;
   add_cells(balls, used, sums);
   pairs += sums.pairs;

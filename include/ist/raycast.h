@@ -5,18 +5,19 @@
 #include <limits>
 #include <span>
 
-#include <ist/api.h>
 #include <ist/query.h>
+#include <ist/types.h>
 
-// Rays and points against one solid: an asset that keeps its mesh (TreeView::has_mesh), or a field.
+// Rays and points against one solid: an asset that keeps its mesh (AssetView::has_mesh), or a
+// shape.
 //
-// For an asset, the kept triangles are queried; exact signs decide. An asset
-// without a mesh returns not_held; an invalid pose, scale, ray or point returns invalid_input. All
-// numbers of these answers are NaN.
+// An asset is queried by its stored mesh, with exact predicates. An asset without a mesh returns
+// missing_data; an invalid pose, scale, ray or point returns invalid_input. All numbers of these
+// answers are NaN.
 //
-// For a field: MeshField is queried as its asset. Half-space, box, ball, capsule and cylinder are
-// exact. Terrains, distance grids and functions support points only, by the distances that queries
-// of solids use; a ray returns not_held.
+// Of shapes the half-space, box, ball, capsule and cylinder are exact. Terrains, distance grids and
+// functions support points only, by the distances that queries of solids use; a ray returns
+// missing_data.
 //
 // No allocation, lock or exception, and no workspace: threads may share everything. Lengths are
 // [u], vectors in world coordinates.
@@ -25,8 +26,8 @@ namespace IST_API ist {
 
 struct Ray {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();      ///< of any length but 0
-  double longest = std::numeric_limits<double>::infinity();  ///< [u] > 0, its length
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitX();           ///< of any length but 0
+  double max_distance = std::numeric_limits<double>::infinity();  ///< [u] > 0, its length
 };
 
 /// Where a ray meets a solid's surface first. One that starts inside meets it on its way out:
@@ -35,7 +36,7 @@ struct RayHit {
   double distance = std::numeric_limits<double>::infinity();  ///< [u] ≥ 0; infinite: no hit
   Eigen::Vector3d point = Eigen::Vector3d::Zero();            ///< zero without a hit
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();           ///< unit, outward; likewise
-  /// Of the kept mesh: 16 · MeshBlock + lane, the same in every answer. ~0: no hit, or a field.
+  /// Of the kept mesh: 16 · MeshBlock + lane, the same in every answer. ~0: no hit, or a shape.
   std::uint32_t triangle = ~0u;
   QueryStatus status = QueryStatus::ok;
 
@@ -52,20 +53,14 @@ struct SurfacePoint {
   QueryStatus status = QueryStatus::ok;
 };
 
-/// Whether a point is inside. For a point on the surface either answer is possible, always the same
-/// one.
-struct Containment {
-  bool inside = false;  ///< false unless the status is ok
-  QueryStatus status = QueryStatus::ok;
-};
-
 /// The first hit of a ray. No ray passes between two triangles.
 RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept;
 
 /// Signed distance, nearest point and gradient. Returns one of several equally near points.
 SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
-Containment contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
+/// Whether a point is inside. For a point on the surface yes or no, always the same one.
+YesNoAnswer contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
 /// answers[i] is that of rays[i] or points[i], bit for bit, for i < answers.size().
 void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
@@ -73,6 +68,6 @@ void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
 void closest_point(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,
                    std::span<SurfacePoint> answers) noexcept;
 void contains(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,
-              std::span<Containment> answers) noexcept;
+              std::span<YesNoAnswer> answers) noexcept;
 
 }  // namespace ist

@@ -2,26 +2,26 @@
 
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
-#include "query/field/field_descent.h"
-#include "query/field/gap_search.h"
-#include "query/field/meeting_search.h"
-#include "query/field/with_shape.h"
+#include "query/shape/gap_search.h"
+#include "query/shape/meeting_search.h"
+#include "query/shape/shape_descent.h"
+#include "query/shape/with_shape.h"
 #include "query/solid_queries.h"
 
 namespace ist {
 namespace {
 
 /// `tree`: of B, which bins refer to.
-Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTree& tree,
+Penetration penetrate(const PlacedShape& a, const PlacedAsset& b, const SphereTree& tree,
                       const DescentLimits& limits, Workspace& workspace,
                       ContactBins* bins) noexcept {
   const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (bins != nullptr) bins->start(tree, true);
   return with_shape(
-      a.field,
+      a.shape,
       [&](auto& shape) {
-        FieldDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
+        ShapeDescent descent(shape, tree, *pose, limits, *workspace.impl(), bins);
         descent.run();
         return descent.penetration();
       },
@@ -30,46 +30,51 @@ Penetration penetrate(const PlacedField& a, const PlacedTree& b, const SphereTre
 
 }  // namespace
 
-Penetration find_penetration(const PlacedField& a, const PlacedTree& b,
+Penetration find_penetration(const PlacedShape& a, const PlacedAsset& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
-  if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<Penetration>();
-  const SphereTree tree = sphere_tree(b.tree, settings.measure);
+  if (settings.measure == Measure::exact || lack_spheres(a, b)) return missing_data<Penetration>();
+  const SphereTree tree = sphere_tree(b.asset, settings.measure);
   return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
 }
 
-Separation find_separation(const PlacedField& a, const PlacedTree& b,
+Separation find_separation(const PlacedShape& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return not_held<Separation>();
+  if (lack_spheres(a, b)) return missing_data<Separation>();
   const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
-  const SphereTree tree = sphere_tree(b.tree, Measure::inner);
+  const SphereTree tree = sphere_tree(b.asset, Measure::inner);
   const auto search = [&](auto& shape) {
     const Separation gap = GapSearch(shape, tree, *pose, settings, *workspace.impl()).run();
     const bool farther = settings.max_distance > 0 && gap.distance_min > settings.max_distance;
     return farther ? farther_than(settings.max_distance) : gap;
   };
-  return with_shape(a.field, search, invalid_input<Separation>);
+  return with_shape(a.shape, search, invalid_input<Separation>);
 }
 
-Overlapping find_overlap(const PlacedField& a, const PlacedTree& b, Workspace& workspace) noexcept {
-  if (lack_spheres(a, b)) return Overlapping::unknown;
+YesNoAnswer find_overlap(const PlacedShape& a, const PlacedAsset& b,
+                         Workspace& workspace) noexcept {
+  if (lack_spheres(a, b)) return {YesNo::unknown, QueryStatus::missing_data};
   const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
-  if (!pose || workspace.impl() == nullptr) return Overlapping::unknown;
-  const SphereTree tree = sphere_tree(b.tree, Measure::inner);
+  if (!pose || workspace.impl() == nullptr) return {YesNo::unknown, QueryStatus::invalid_input};
+  const SphereTree tree = sphere_tree(b.asset, Measure::inner);
   const auto search = [&](auto& shape) {
-    return FieldMeetingSearch(shape, tree, *pose, *workspace.impl()).run();
+    return YesNoAnswer{ShapeMeetingSearch(shape, tree, *pose, *workspace.impl()).run(),
+                       QueryStatus::ok};
   };
-  return with_shape(a.field, search, [] { return Overlapping::unknown; });
+  return with_shape(a.shape, search, [] {
+    return YesNoAnswer{YesNo::unknown, QueryStatus::invalid_input};
+  });
 }
 
-ContactPatches find_patches(const PlacedField& a, const PlacedTree& b,
+ContactPatches find_patches(const PlacedShape& a, const PlacedAsset& b,
                             const ContactSettings& settings, Workspace& workspace,
                             std::span<ContactPatch> patches) noexcept {
-  if (settings.measure == Measure::exact || lack_spheres(a, b)) return not_held<ContactPatches>();
+  if (settings.measure == Measure::exact || lack_spheres(a, b))
+    return missing_data<ContactPatches>();
   if (workspace.impl() == nullptr) return invalid_input<ContactPatches>();
   ContactPatches result;
   ContactBins& bins = workspace.impl()->contact;
-  const SphereTree tree = sphere_tree(b.tree, settings.measure);
+  const SphereTree tree = sphere_tree(b.asset, settings.measure);
   result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);
   if (result.penetration.status == QueryStatus::invalid_input) return result;
   const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);

@@ -11,18 +11,19 @@
 #include "query/kernel/lens.h"
 #include "query/probe/cap.h"
 
-// The shapes of ist/field.h in plain numbers, the same on CPU and GPU. sample(x) gives the
-// distance, positive inside and never more than the true one, with its gradient; part(x, r) what of
+// The shapes of ist/shapes.h in plain numbers, the same on CPU and GPU. sample(x) gives the
+// distance, negative inside and never further from 0 than the true one, with its gradient; part(x,
+// r) what of
 // a ball is inside. Without part() a shape is flat_part() of its sample.
 
 namespace ist {
 
-struct DistanceSample {
+struct PlainSample {
   double distance;
   double gradient[3];
 };
 
-/// What of a ball is inside a field.
+/// What of a ball is inside a shape.
 struct BallPart {
   double volume;
   double area;         ///< of the surface in the ball
@@ -31,12 +32,12 @@ struct BallPart {
 };
 
 /// A ball before a plane at the closest point of the surface.
-IST_HD inline BallPart flat_part(const DistanceSample& at, double r) {
-  const Cap in = cap(r, at.distance);
+IST_HD inline BallPart flat_part(const PlainSample& at, double r) {
+  const Cap in = cap(r, -at.distance);
   BallPart part = {in.volume, in.derivative, {}, {}};
   for (int k = 0; k < 3; ++k) {
-    part.gradient[k] = in.derivative * at.gradient[k];
-    part.moment[k] = in.moment * at.gradient[k];
+    part.gradient[k] = in.derivative * -at.gradient[k];
+    part.moment[k] = in.moment * -at.gradient[k];
   }
   return part;
 }
@@ -45,25 +46,25 @@ IST_HD inline BallPart flat_part(const DistanceSample& at, double r) {
 IST_HD inline double sure_reach(double r, double error) { return r * (1 + 1e-6) + error; }
 
 /// A point `away` from the core of a shape that is all within `radius` of it.
-IST_HD inline DistanceSample core_sample(double radius, const double (&away)[3]) {
+IST_HD inline PlainSample core_sample(double radius, const double (&away)[3]) {
   const double d = norm(away);
-  if (!(d > 0)) return {radius - d, {}};
-  return {radius - d, {-away[0] / d, -away[1] / d, -away[2] / d}};
+  if (!(d > 0)) return {d - radius, {}};
+  return {d - radius, {away[0] / d, away[1] / d, away[2] / d}};
 }
 
 struct PlainHalfSpace {
   double normal[3];  ///< unit
   double offset;
 
-  IST_HD DistanceSample sample(const double (&x)[3]) const {
-    return {offset - dot(normal, x), {-normal[0], -normal[1], -normal[2]}};
+  IST_HD PlainSample sample(const double (&x)[3]) const {
+    return {dot(normal, x) - offset, {normal[0], normal[1], normal[2]}};
   }
 };
 
 struct PlainBall {
   double radius;
 
-  IST_HD DistanceSample sample(const double (&x)[3]) const { return core_sample(radius, x); }
+  IST_HD PlainSample sample(const double (&x)[3]) const { return core_sample(radius, x); }
   IST_HD BallPart part(const double (&x)[3], double r) const {
     const double d = norm(x);
     const Lens<double> both = lens(radius, r, d);
@@ -80,7 +81,7 @@ struct PlainBall {
 struct PlainCapsule {
   double radius, half;
 
-  IST_HD DistanceSample sample(const double (&x)[3]) const {
+  IST_HD PlainSample sample(const double (&x)[3]) const {
     const double away[3] = {x[0], x[1], x[2] - clamped(x[2], -half, half)};
     return core_sample(radius, away);
   }
@@ -91,21 +92,21 @@ struct PlainCylinder {
 
   /// Past the rim the farther of mantle and end: a ball that reaches both has a part of each,
   /// though it may miss the rim.
-  IST_HD DistanceSample sample(const double (&x)[3]) const {
-    return {-most(std::fabs(x[2]) - half, from_axis(x) - radius), {}};
+  IST_HD PlainSample sample(const double (&x)[3]) const {
+    return {most(std::fabs(x[2]) - half, from_axis(x) - radius), {}};
   }
-  IST_HD DistanceSample nearest(const double (&x)[3]) const {
+  IST_HD PlainSample nearest(const double (&x)[3]) const {
     const double d = from_axis(x);
     const double mantle[3] = {d > 0 ? x[0] / d : 1, d > 0 ? x[1] / d : 0, 0};
     const double end[3] = {0, 0, x[2] < 0 ? -1.0 : 1.0};
     const double side = d - radius, above = std::fabs(x[2]) - half;
     const double out = most(0, side), over = most(0, above);
     const double away = std::sqrt(out * out + over * over);
-    DistanceSample at = {away > 0 ? -away : -most(side, above), {}};
+    PlainSample at = {away > 0 ? away : most(side, above), {}};
     for (int k = 0; k < 3; ++k)
-      at.gradient[k] = away > 0       ? -(out * mantle[k] + over * end[k]) / away
-                       : side > above ? -mantle[k]
-                                      : -end[k];
+      at.gradient[k] = away > 0       ? (out * mantle[k] + over * end[k]) / away
+                       : side > above ? mantle[k]
+                                      : end[k];
     return at;
   }
   /// The share of the mantle times that of the slab between the ends.
@@ -139,16 +140,16 @@ struct PlainGrid {
   double error;
 
   /// `sound` becomes false where the grid holds what is no number.
-  IST_HD DistanceSample sample(const double (&x)[3], bool& sound) const {
-    const DistanceSample at = interpolated(x);
+  IST_HD PlainSample sample(const double (&x)[3], bool& sound) const {
+    const PlainSample at = interpolated(x);
     if (std::fabs(at.distance) <= kLongestLength && dot(at.gradient, at.gradient) <= 1e300)
       return at;
     sound = false;
-    return {-kLongestLength, {}};
+    return {kLongestLength, {}};
   }
 
  private:
-  IST_HD DistanceSample interpolated(const double (&x)[3]) const {
+  IST_HD PlainSample interpolated(const double (&x)[3]) const {
     double t[3], beyond[3];
     std::uint64_t cell[3];
     for (int k = 0; k < 3; ++k) {
@@ -170,12 +171,12 @@ struct PlainGrid {
     for (int k = 0; k < 2; ++k)
       for (int j = 0; j < 2; ++j) e[k][j] = mix(c[k][j][0], c[k][j][1], t[0]);
     for (int k = 0; k < 2; ++k) f[k] = mix(e[k][0], e[k][1], t[1]);
-    DistanceSample at = {mix(f[0], f[1], t[2]), {}};
+    PlainSample at = {mix(f[0], f[1], t[2]), {}};
     const double away = norm(beyond);
     if (away > 0) {
       // Whoever is outside of the grid is outside of the solid, at least so far from it.
-      at.distance = least(0, at.distance) - away;
-      for (int k = 0; k < 3; ++k) at.gradient[k] = -beyond[k] / away;
+      at.distance = most(0, at.distance) + away;
+      for (int k = 0; k < 3; ++k) at.gradient[k] = beyond[k] / away;
       return at;
     }
     const auto slope = [&](int k, int j) { return c[k][j][1] - c[k][j][0]; };
@@ -192,20 +193,20 @@ struct PlainGrid {
 struct PlainBox {
   double half[3];
 
-  IST_HD DistanceSample sample(const double (&x)[3]) const {
+  IST_HD PlainSample sample(const double (&x)[3]) const {
     double out[3] = {std::fabs(x[0]) - half[0], std::fabs(x[1]) - half[1],
                      std::fabs(x[2]) - half[2]};
     const double deepest = most(most(out[2], out[1]), out[0]);
-    DistanceSample at = {-deepest, {}};
+    PlainSample at = {deepest, {}};
     if (deepest <= 0) {
       const int face = out[0] == deepest ? 0 : out[1] == deepest ? 1 : 2;
       for (int k = 0; k < 3; ++k) out[k] = k == face ? 1 : 0;
     } else {
       for (double& o : out) o = most(o, 0);
-      at.distance = -norm(out);
-      for (double& o : out) o /= -at.distance;
+      at.distance = norm(out);
+      for (double& o : out) o /= at.distance;
     }
-    for (int k = 0; k < 3; ++k) at.gradient[k] = x[k] < 0 ? out[k] : -out[k];
+    for (int k = 0; k < 3; ++k) at.gradient[k] = x[k] < 0 ? -out[k] : out[k];
     return at;
   }
 
@@ -254,10 +255,10 @@ struct PlainTerrain {
   double lowest, highest;
 
   /// Only what is beyond all heights is told at once; 0: a closer look tells.
-  IST_HD DistanceSample sample(const double (&x)[3]) const {
-    DistanceSample at = {};
-    if (x[2] > highest) at.distance = highest - x[2];
-    if (x[2] < lowest) at.distance = lowest - x[2];
+  IST_HD PlainSample sample(const double (&x)[3]) const {
+    PlainSample at = {};
+    if (x[2] > highest) at.distance = x[2] - highest;
+    if (x[2] < lowest) at.distance = x[2] - lowest;
     return at;
   }
 

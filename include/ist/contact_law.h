@@ -3,15 +3,89 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
+#include <variant>
 
-#include <ist/api.h>
 #include <ist/query.h>
-#include <ist/wrench.h>
+#include <ist/types.h>
+
+// Wrenches of a contact on both bodies, about points of the caller's choice, in the world frame.
+// Nothing here allocates or throws; values of a stopped query carry its error.
+
+namespace IST_API ist {
+
+/// Force and moment on one body for a pressure of 1: −dV/d(its motion). Multiplied by a pressure
+/// [force/u²] they are those of a penalty potential pressure · V.
+struct Wrench {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< [u²] points out of the other body
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< [u³] about the given point
+};
+
+/// The wrenches on both bodies.
+struct Wrenches {
+  Wrench on_a, on_b;  ///< equal and opposite: about the same point their sum is zero
+};
+
+/// The same wrench about another point.
+inline Wrench about(const Wrench& wrench, const Eigen::Vector3d& from,
+                    const Eigen::Vector3d& to) noexcept {
+  return {wrench.force, wrench.torque + (from - to).cross(wrench.force)};
+}
+
+/// Both wrenches from the one on B about B's origin, as queries return it.
+inline Wrenches both_wrenches(const Wrench& on_b, const Eigen::Vector3d& origin_b,
+                              const Eigen::Vector3d& point_a,
+                              const Eigen::Vector3d& point_b) noexcept {
+  return {about({-on_b.force, -on_b.torque}, origin_b, point_a), about(on_b, origin_b, point_b)};
+}
+
+/// Wrenches of a whole contact, on A about `point_a`, on B about `point_b` [u], usually the
+/// centres of mass.
+///
+/// `b`: B's pose in the query.
+inline Wrenches wrenches(const Penetration& contact, const Pose& b, const Eigen::Vector3d& point_a,
+                         const Eigen::Vector3d& point_b) noexcept {
+  return both_wrenches({contact.force, contact.torque}, Eigen::Vector3d(b.t), point_a, point_b);
+}
+
+/// Of one patch of a contact. Those of all patches sum to the whole contact's.
+inline Wrenches wrenches(const ContactPatch& patch, const Pose& b, const Eigen::Vector3d& point_a,
+                         const Eigen::Vector3d& point_b) noexcept {
+  return both_wrenches({patch.force, patch.torque}, Eigen::Vector3d(b.t), point_a, point_b);
+}
+
+/// [u] Where a point of a solid's own frame is in the world.
+inline Eigen::Vector3d world_point(const PlacedSolid& solid, const Eigen::Vector3d& own) noexcept {
+  return std::visit(
+      [&](const auto& placed) -> Eigen::Vector3d {
+        const auto& [q, t] = placed.pose;
+        return Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized() * (placed.scale * own) +
+               Eigen::Vector3d(t);
+      },
+      solid.placed);
+}
+
+/// [u³/T] dV/dt while both solids of a query move: > 0 while the overlap grows.
+///
+/// For a patch, its share. A solid at rest has a Motion().
+template <class Contact>
+double volume_rate(const Contact& contact, const PlacedSolid& a, const PlacedSolid& b,
+                   const Motion& motion_a, const Motion& motion_b) noexcept {
+  const Wrenches push =
+      both_wrenches({contact.force, contact.torque}, world_point(b, Eigen::Vector3d::Zero()),
+                    world_point(a, motion_a.about), world_point(b, motion_b.about));
+  return -(push.on_a.force.dot(motion_a.velocity) +
+           push.on_a.torque.dot(motion_a.angular_velocity)) -
+         (push.on_b.force.dot(motion_b.velocity) + push.on_b.torque.dot(motion_b.angular_velocity));
+}
+
+}  // namespace ist
 
 // Contact laws: from a volume to a force, for loops and engines without a contact solver of their
 // own. docs/engines.md explains which to choose.
@@ -19,7 +93,7 @@
 // Units: [u] the meshes' length, [s] time, [force], and [mass] = [force·s²/u]. With u = m and force
 // = N mass is kg; with u = mm and force = mN mass is kg too.
 //
-// A force of k · −translation_gradient is not a contact law (docs/engines.md, *What a volume
+// A force of k · Penetration::force is not a contact law (docs/engines.md, *What a volume
 // provides*). Here the pressure grows with depth.
 
 namespace IST_API ist {
@@ -63,20 +137,17 @@ struct ContactMemory {
   std::uint32_t count = 0;  ///< of stored patches
 };
 
-/// Motion of B relative to A, in axes that do not turn with A: differences of world velocities.
-struct RelativeMotion {
-  /// [u/s] Velocity of B's origin minus that of the point of A at the same place.
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< [rad/s] B's minus A's
-};
-
-/// The relative motion of two bodies. `origin_b`: [u] of B's pose, world.
-inline RelativeMotion relative_motion(const Twist& a, const Twist& b,
-                                      const Eigen::Vector3d& origin_b) noexcept {
-  const auto at_origin = [&](const Twist& t) -> Eigen::Vector3d {
-    return t.velocity + t.angular_velocity.cross(origin_b - t.point);
+/// Motion of B relative to A about B's origin, in axes that do not turn with A: differences of
+/// world velocities there. `a`, `b`: the solids of the query.
+inline Motion relative_motion(const PlacedSolid& a, const PlacedSolid& b, const Motion& motion_a,
+                              const Motion& motion_b) noexcept {
+  const Eigen::Vector3d origin = world_point(b, Eigen::Vector3d::Zero());
+  const auto at_origin = [&](const PlacedSolid& solid, const Motion& motion) -> Eigen::Vector3d {
+    return motion.velocity +
+           motion.angular_velocity.cross(origin - world_point(solid, motion.about));
   };
-  return {at_origin(b) - at_origin(a), b.angular_velocity - a.angular_velocity};
+  return {at_origin(b, motion_b) - at_origin(a, motion_a),
+          motion_b.angular_velocity - motion_a.angular_velocity};
 }
 
 /// Force and torque of a contact on B. A receives the opposite, about the same point.
@@ -92,8 +163,8 @@ struct ContactForce {
 inline ContactPatch whole_patch(const Penetration& contact) noexcept {
   ContactPatch patch;
   patch.centroid = patch.point = contact.centroid;
-  patch.force = -contact.translation_gradient;
-  patch.torque = -contact.rotation_gradient;
+  patch.force = contact.force;
+  patch.torque = contact.torque;
   patch.volume = contact.volume;
   patch.area = patch.force.norm();
   if (patch.area > 0) {
@@ -135,6 +206,7 @@ inline Eigen::Vector3d friction_force(const ContactLaw& law, double limit,
 
 /// Force of the contact on B in this step. Updates `memory`.
 ///
+/// `motion`: of B relative to A about B's origin [u/s, rad/s], as relative_motion() returns it.
 /// `origin_b`: [u] of B's pose, world. `step`: [s] since the last call, by which the friction
 /// springs are stretched. `patches`: as contact_patches() wrote them. Patches beyond
 /// ContactMemory::kPatches have no friction. Patches that are gone are forgotten.
@@ -143,7 +215,7 @@ inline Eigen::Vector3d friction_force(const ContactLaw& law, double limit,
 ///
 /// No allocation, lock or exception. Any thread; a memory belongs to one contact.
 inline ContactForce contact_force(const ContactLaw& law, std::span<const ContactPatch> patches,
-                                  const RelativeMotion& motion, const Eigen::Vector3d& origin_b,
+                                  const Motion& motion, const Eigen::Vector3d& origin_b,
                                   double step, ContactMemory& memory) noexcept {
   ContactMemory next;
   ContactForce sum;
@@ -256,5 +328,86 @@ inline double largest_stable_step(double stiffness, double damping, double mass)
 inline double largest_stable_stiffness(double step, double mass) noexcept {
   return 4 * mass / (step * step);
 }
+
+}  // namespace ist
+
+// Flat contacts by the corners of their support polygon, for engines that solve contact points.
+
+namespace IST_API ist {
+
+/// A contact of two flat faces as points at the corners of the hull of what the faces share.
+///
+/// The patches of contact_patches() lie within their parts of a face. A body at the edge of a table
+/// then tips before its centre is over the edge, since no point there can push. The corners span
+/// all forces and torques that the face can transmit. By Measure::exact they sum to the contact's
+/// volume, force and torque. By spheres they sum to those of the overlap between the two planes,
+/// which spheres blur.
+///
+/// Give it the whole contact, then the faces of both sides near it, then ask for the corners.
+/// Without allocation, lock or exception; a polygon belongs to one thread.
+class SupportPolygon {
+ public:
+  static constexpr std::size_t kFaces = 256;  ///< of a side
+
+  /// `origin_b`: [u] of B's pose, world. `axes`: columns are those of the body on which the corners
+  /// keep their names, world. `reach`: [u] no point of the contact is further from its centroid.
+  /// `blur`: [u] how far the spheres of both stick out (AssetView::protrusion() times the scale);
+  /// 0: the contact is by Measure::exact.
+  SupportPolygon(const Penetration& whole, const Eigen::Vector3d& origin_b,
+                 const Eigen::Matrix3d& axes, double reach, double blur) noexcept;
+
+  /// The faces of an asset that keeps a mesh, of a half-space or of a box. False for others.
+  bool add(bool of_b, const PlacedSolid& solid) noexcept;
+  /// [u] World, anticlockwise from outside. What does not face the contact is left out.
+  void add_triangle(bool of_b, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+                    const Eigen::Vector3d& r) noexcept;
+  /// A face without end. `normal`: unit, outward.
+  void add_plane(bool of_b, const Eigen::Vector3d& normal, const Eigen::Vector3d& point) noexcept;
+
+  /// Writes the corners, those of the true hull if they fit and of as many directions as fit if
+  /// not. Returns how many, or nothing if the contact is not flat or if there is no room for three:
+  /// then use the patches. Where the faces are apart, and spheres alone reach from one to the
+  /// other, the depths are negative, the gaps, and no corner has a volume or a force. Ids are those
+  /// of directions in `axes`, with the highest bit set: patches have others.
+  std::optional<std::size_t> corners(std::span<ContactPatch> patches) const noexcept;
+
+ private:
+  struct Corner {
+    double u, v, z;  // [u] from the middle along the polygon's axes and the normal
+  };
+  using Face = std::array<Corner, 3>;
+  /// Of the plane of one side's faces: z = height + u · slope[0] + v · slope[1].
+  struct Plane {
+    double height = 0, slope[2] = {0, 0};
+    double at(const Corner& x) const { return height + x.u * slope[0] + x.v * slope[1]; }
+  };
+  struct Side {
+    std::array<Face, kFaces> faces;
+    std::size_t count = 0;
+    bool endless = false;
+    Plane plane;  // of an endless one, or of the first face
+  };
+  struct Hull;
+
+  Corner corner(const Eigen::Vector3d& x) const;
+  static Plane plane_of(const Face& face);
+  bool choose_plane(bool of_b, Plane& plane) const;
+  bool is_near(const Face& face, const Plane& plane) const;
+  void add_mesh(bool of_b, const PlacedAsset& solid) noexcept;
+
+  Penetration whole_;
+  Eigen::Vector3d origin_b_, middle_, normal_, axis_[2];
+  double area_ = 0, torsion_ = 0, reach_ = 0, near_ = 0;
+  bool blurred_ = false;
+  bool flat_ = true;  // as far as is known
+  std::array<Side, 2> sides_;
+};
+
+/// contact_patches() for engines that solve contact points: the corners of the support polygon if
+/// the contact is flat (SupportPolygon), else the patches as they are. The whole contact stays that
+/// of contact_patches().
+ContactPatches contact_points(const PlacedSolid& a, const PlacedSolid& b,
+                              const ContactSettings& settings, Workspace& workspace,
+                              std::span<ContactPatch> patches) noexcept;
 
 }  // namespace ist

@@ -3,22 +3,22 @@
 #include <algorithm>
 #include <limits>
 
-#include <ist/field.h>
+#include <ist/shapes.h>
 
 #include "query/base/budget.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
 #include "query/descent/workspace.h"
-#include "query/field/shapes.h"
+#include "query/shape/shapes.h"
 
 namespace ist {
 
-/// Depth first, nearest child first, for two minima at once: the gap between a field and a tree's
-/// inner spheres, and that of their cover balls. All in the field's frame.
-template <class Shape>
+/// Depth first, nearest child first, for two minima at once: the gap between a shape and a tree's
+/// inner spheres, and that of their cover balls. All in the shape's frame.
+template <class Sampler>
 class GapSearch {
  public:
-  GapSearch(Shape& shape, const SphereTree& tree, const RelativePose& pose,
+  GapSearch(Sampler& shape, const SphereTree& tree, const RelativePose& pose,
             const SeparationSettings& settings, Workspace::Impl& scratch) noexcept
       : shape_(shape),
         tree_(tree),
@@ -62,7 +62,7 @@ class GapSearch {
       double at[3];
       map_.apply(ball.centre, at);
       const Eigen::Vector3d x(at[0], at[1], at[2]);
-      const double distance = -shape_.nearest(x).distance;
+      const double distance = shape_.nearest(x).distance;
       const double gap = distance - ball.r * map_.scale;
       const double cover = distance - cover_radius * map_.scale;
       if (!wanted(gap, cover)) continue;
@@ -104,17 +104,17 @@ class GapSearch {
     }
     result.distance = unit * gap_;
     result.distance_max = unit * (gap_ + off);
-    const Eigen::Vector3d inward = shape_.nearest(centre_).gradient;
-    const double length = inward.norm();
+    const Eigen::Vector3d outward = shape_.nearest(centre_).gradient;
+    const double length = outward.norm();
     const Eigen::Vector3d out =
-        length > 0 ? Eigen::Vector3d(-inward / length) : Eigen::Vector3d::Zero().eval();
+        length > 0 ? Eigen::Vector3d(outward / length) : Eigen::Vector3d::Zero().eval();
     result.point_b = pose_.to_world(centre_ - radius_ * out);
     result.point_a = pose_.to_world(centre_ - (radius_ + gap_) * out);
     result.normal = pose_.rotation() * out;
     return result;
   }
 
-  Shape& shape_;
+  Sampler& shape_;
   const SphereTree& tree_;
   const RelativePose& pose_;
   const Similarity& map_;

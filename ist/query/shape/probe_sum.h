@@ -12,11 +12,11 @@
 
 namespace ist {
 
-/// What the parts of balls inside a field add up to, in its frame; positions are relative to the
+/// What the parts of balls inside a shape add up to, in its frame; positions are relative to the
 /// probing tree's unit-frame origin.
 struct ProbeTotal {
   Overlap overlap;     ///< its error is left to the descent
-  double area = 0;     ///< of the field's surface inside the balls
+  double area = 0;     ///< of the shape's surface inside the balls
   double crossed = 0;  ///< volume of the balls that the surface crosses
 
   void add(const ProbeTotal& other) noexcept {

@@ -8,8 +8,8 @@
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/descent/answer.h"
-#include "query/field/probe_sum.h"
 #include "query/kernel/subtree_kernel.h"
+#include "query/shape/probe_sum.h"
 
 namespace ist {
 
@@ -30,7 +30,7 @@ class ProbeTally {
     if (bins_ != nullptr) bins_->add_guess(0, 0, 0, block, part.overlap);
   }
 
-  /// Spheres that meet a triangle, or that a field was asked about.
+  /// Spheres that meet a triangle, or that a shape was asked about.
   void count(std::uint32_t pairs) noexcept { pairs_ += pairs; }
 
   /// Nodes that are inside.

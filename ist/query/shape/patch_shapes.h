@@ -1,16 +1,16 @@
 #pragma once
 
-#include "query/field/probe_sum.h"
-#include "query/field/shapes.h"
+#include "query/shape/probe_sum.h"
+#include "query/shape/shapes.h"
 
-// Fields with a surface of triangles, which balls meet exactly.
+// Shapes with a surface of triangles, which balls meet exactly.
 
 namespace ist {
 
 /// A box, as twelve triangles where a ball comes near more than one of its faces.
-class BoxShape : public ShapeOf<PlainBox> {
+class BoxSampler : public SamplerOf<PlainBox> {
  public:
-  using ShapeOf::ShapeOf;
+  using SamplerOf::SamplerOf;
 
   /// Adds what of a block of balls is inside.
   ProbeTotal block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
@@ -22,12 +22,12 @@ class BoxShape : public ShapeOf<PlainBox> {
 };
 
 /// Terrain: the triangles under a block of balls.
-class HeightShape : public ShapeOf<PlainTerrain> {
+class HeightSampler : public SamplerOf<PlainTerrain> {
  public:
-  using ShapeOf::ShapeOf;
+  using SamplerOf::SamplerOf;
 
   /// The distance from the triangles of the grid, and from the point straight below.
-  FieldSample nearest(const Eigen::Vector3d& x) noexcept;
+  ShapeSample nearest(const Eigen::Vector3d& x) noexcept;
   ProbeTotal block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
                    std::uint32_t& pairs) noexcept;
 
