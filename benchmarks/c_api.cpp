@@ -131,17 +131,17 @@ int main(int argc, char** argv) {
                                             &c_separation);
                              sum -= bits(c_separation.distance);
                            }));
-    note("overlap", measure(
-                        rows.size(), rounds,
-                        [&](std::size_t i) {
-                          sum +=
-                              static_cast<std::uint64_t>(overlap(rows[i].a, rows[i].b, workspace));
-                        },
-                        [&](std::size_t i) {
-                          ist_yes_no_t answer;
-                          ist_overlap(&rows[i].c_a, &rows[i].c_b, &c_workspace, &answer);
-                          sum -= static_cast<std::uint64_t>(answer);
-                        }));
+    note("overlap",
+         measure(
+             rows.size(), rounds,
+             [&](std::size_t i) {
+               sum += static_cast<std::uint64_t>(overlap(rows[i].a, rows[i].b, workspace).answer);
+             },
+             [&](std::size_t i) {
+               ist_yes_no_t answer;
+               ist_overlap(&rows[i].c_a, &rows[i].c_b, &c_workspace, &answer);
+               sum -= static_cast<std::uint64_t>(answer);
+             }));
     // A field: what is asked is made anew each time, as of the trees.
     note("half-space",
          measure(

@@ -6,6 +6,7 @@
 #include <fcl/geometry/shape/box.h>
 #include <fcl/geometry/shape/halfspace.h>
 #include <ist/bake.h>
+#include <ist/query.h>
 #include <ist/shapes.h>
 
 #include <Eigen/Geometry>
