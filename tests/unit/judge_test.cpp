@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <hwy/highway.h>
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -65,6 +66,31 @@ TEST(SoupWinding, IsTheWindingNumberOfClosedSurfaces) {
       EXPECT_NEAR(winding.at(x), solid.winding_number(x), 0.01) << name;
     }
   }
+}
+
+TEST(SoupWinding, HasTheSameBitsOnEveryInstructionSet) {
+  TriangleMesh open = make_sample("gear");
+  open.triangles.resize(open.triangles.size() / 2);
+  const auto solid = triangles_as_solid(open);
+  const SoupWinding winding(solid->view());
+  const auto numbers = [&] {
+    std::mt19937_64 random(3);
+    std::vector<double> all;
+    for (int i = 0; i < 200; ++i) {
+      WindingPlaces places;
+      for (double& x : places.reshaped()) x = 2 * uniform(random) - 1;
+      for (const double w : winding.at_each(places)) all.push_back(w);
+    }
+    return all;
+  };
+  const std::vector<double> first = numbers();
+  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    EXPECT_EQ(numbers(), first) << hwy::TargetName(target);
+  }
+  hwy::SetSupportedTargetsForTest(0);
+  hwy::GetChosenTarget().Update(hwy::SupportedTargets());
 }
 
 TEST(SoupWinding, IsTheSolidAngleOfAnOpenSurface) {
