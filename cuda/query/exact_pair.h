@@ -62,15 +62,14 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
       parts[s] |= (height[s][k].sign != height[s][(k + 1) % 3].sign ? 1u : 0u) << k;
   std::uint32_t positive[3] = {0, 0, 0};  // of A's edge, a bit an edge of B's: the way round
   IST_ROLLED
-  for (int i = 0; i < 3; ++i)
-    IST_ROLLED
-    for (int j = 0; j < 3; ++j) {
-      if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
-      const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
-      const int sign = exact::determinant_of<kExactly>(r, p, q, p, s, r, 1, aside).sign;
-      unsure = unsure || sign == 0;
-      positive[i] |= (sign > 0 ? 1u : 0u) << j;
-    }
+  for (int i = 0; i < 3; ++i) IST_ROLLED
+  for (int j = 0; j < 3; ++j) {
+    if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
+    const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
+    const int sign = exact::determinant_of<kExactly>(r, p, q, p, s, r, 1, aside).sign;
+    unsure = unsure || sign == 0;
+    positive[i] |= (sign > 0 ? 1u : 0u) << j;
+  }
   if (unsure) return PairSays::unsure;
   int count[2] = {0, 0};
   const auto pierces = [&](int s, int k) {
@@ -81,22 +80,21 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
     return bits == 0 || bits == 3;
   };
   IST_ROLLED
-  for (int s = 0; s < 2; ++s)
-    IST_ROLLED
-    for (int k = 0; k < 3; ++k) {
-      if (!pierces(s, k)) continue;
-      const int next = (k + 1) % 3;
-      const bool down = height[s][k].sign > 0;  // enters the other solid
-      const int e = down == (s == 0) ? 1 : 0;
-      ++count[e];
-      end[e] = {static_cast<std::uint32_t>(s),
-                static_cast<std::uint32_t>(k),
-                s == 0 ? a[k] : b[k],
-                s == 0 ? a[next] : b[next],
-                height[s][k].value,
-                height[s][next].value,
-                height[s][k].error + height[s][next].error};
-    }
+  for (int s = 0; s < 2; ++s) IST_ROLLED
+  for (int k = 0; k < 3; ++k) {
+    if (!pierces(s, k)) continue;
+    const int next = (k + 1) % 3;
+    const bool down = height[s][k].sign > 0;  // enters the other solid
+    const int e = down == (s == 0) ? 1 : 0;
+    ++count[e];
+    end[e] = {static_cast<std::uint32_t>(s),
+              static_cast<std::uint32_t>(k),
+              s == 0 ? a[k] : b[k],
+              s == 0 ? a[next] : b[next],
+              height[s][k].value,
+              height[s][next].value,
+              height[s][k].error + height[s][next].error};
+  }
   if (count[0] == 0 && count[1] == 0) return PairSays::apart;
   return count[0] == 1 && count[1] == 1 ? PairSays::crosses : PairSays::wrong;
 }

@@ -307,6 +307,8 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
     gpu::ExactArrays batch = room.exact;
     static_cast<gpu::SolidPairs&>(batch) = asked;
     batch.most_blocks = solids.impl().most_blocks;
+    if (batch.room_bytes < gpu::least_exact_bytes(batch.most_blocks))
+      throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
     const gpu::DeviceGuard guard(room.device);
     gpu::launch_exact(batch, room.grids, stream);
     return;

@@ -32,7 +32,7 @@ def overlap(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: torch
         queries, 0.05 % of the scale to either side: accurate to 2e-4, at three times the cost.
     settings: measure, spheres_only, pair_budget, threads, … of ist.penetration. If a limit stops a query, the
         gradient lacks the estimated part. With measure="exact" volumes and gradients are the true
-        ones. A GPU takes measure ("matched", "inner") and pair_budget. It gives the CPU's answers for
+        ones. A GPU takes measure and pair_budget. By spheres it gives the CPU's answers for
         spheres_only=True, of two Assets also by default.
 
     Returns a tensor (n,) or (w, n) of the dtype and the device of `poses`. Pairs with an invalid pose

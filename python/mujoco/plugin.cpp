@@ -340,16 +340,16 @@ bool find_way_out(const ist_placed_t& a, const ist_placed_t& b, const ist_penetr
                   mjPreContact& out) {
   constexpr double kWhole = 0.99, kNone = 0.01;
   const double size = std::cbrt(whole.volume);
-  if (a.tree == nullptr || !(mju_norm3(whole.translation_gradient) < kNone * size * size))
+  if (a.asset == nullptr || !(mju_norm3(whole.force) < kNone * size * size))
     return false;
   for (const bool inner_is_b : {false, true}) {
     const ist_placed_t &inner = inner_is_b ? b : a, &outer = inner_is_b ? a : b;
-    ist_tree_info_t info = {};
+    ist_asset_info_t info = {};
     info.size = sizeof info;
     ist_bounds_t box = {};
     box.size = sizeof box;
     ist_surface_point_t near = {};
-    if (ist_tree_get_info(inner.tree, &info) < 0 || ist_placed_bounds(&inner, &box) < 0 ||
+    if (ist_asset_get_info(inner.asset, &info) < 0 || ist_placed_bounds(&inner, &box) < 0 ||
         !(whole.volume > kWhole * info.volume * std::pow(inner.scale, 3)) ||
         ist_closest_point(&outer, box.centre, 1, &near, sizeof near) < 0)
       continue;

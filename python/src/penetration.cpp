@@ -201,8 +201,7 @@ void add_penetration(py::module_& module) {
           refuse_given("not on a GPU", {{"scale_gradients", scale_gradients},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          const GpuPenetrationSettings settings{named(measure, "measure", kGpuMeasures),
-                                                pair_budget};
+          const GpuPenetrationSettings settings{named(measure, "measure", kMeasures), pair_budget};
           return ask<GpuPenetrations>(
               sides, pair, given, {},
               [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,

@@ -19,7 +19,7 @@ namespace ist::python {
 
 inline constexpr std::pair<const char*, Measure> kMeasures[] = {
     {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
-/// What a GPU's batches answer.
+/// What a GPU's contact patches answer.
 inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", Measure::matched},
                                                                    {"inner", Measure::inner}};
 

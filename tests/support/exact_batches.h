@@ -77,10 +77,8 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
     const double most = std::max(size_of(a), size_of(b));
     worst.met += cpu.volume > 0 ? 1 : 0;
     worst.volume = std::max(worst.volume, std::abs(gpu.volume - cpu.volume) / (size2 * size));
-    worst.push =
-        std::max(worst.push, (gpu.force - cpu.force).norm() / size2);
-    worst.turn = std::max(worst.turn,
-                          (gpu.torque - cpu.torque).norm() / (size2 * most));
+    worst.push = std::max(worst.push, (gpu.force - cpu.force).norm() / size2);
+    worst.turn = std::max(worst.turn, (gpu.torque - cpu.torque).norm() / (size2 * most));
     if (cpu.volume > 1e-6 * size2 * size)
       worst.centre = std::max(worst.centre, (gpu.centroid - cpu.centroid).norm() / size);
     EXPECT_LE(gpu.volume_min, cpu.volume_max) << i;
