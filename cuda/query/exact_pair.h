@@ -62,8 +62,8 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
       parts[s] |= (height[s][k].sign != height[s][(k + 1) % 3].sign ? 1u : 0u) << k;
   std::uint32_t positive[3] = {0, 0, 0};  // of A's edge, a bit an edge of B's: the way round
   IST_ROLLED
-  for (int i = 0; i < 3; ++i) IST_ROLLED
-  for (int j = 0; j < 3; ++j) {
+  for (int n = 0; n < 9; ++n) {
+    const int i = n / 3, j = n % 3;
     if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
     const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
     const int sign = exact::determinant_of<kExactly>(r, p, q, p, s, r, 1, aside).sign;
@@ -80,8 +80,8 @@ IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3
     return bits == 0 || bits == 3;
   };
   IST_ROLLED
-  for (int s = 0; s < 2; ++s) IST_ROLLED
-  for (int k = 0; k < 3; ++k) {
+  for (int n = 0; n < 6; ++n) {
+    const int s = n / 3, k = n % 3;
     if (!pierces(s, k)) continue;
     const int next = (k + 1) % 3;
     const bool down = height[s][k].sign > 0;  // enters the other solid

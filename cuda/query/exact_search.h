@@ -92,7 +92,6 @@ class ExactSearch {
  private:
   static constexpr int kLevelShift = 28;
   static constexpr float kError = 4e-7f;  ///< relative, of a few operations
-  static constexpr float kLarger = 2;     ///< nodes that are so much larger are opened alone
 
   IST_HD static std::uint32_t node_of(int level, std::uint32_t number) {
     return static_cast<std::uint32_t>(level) << kLevelShift | number;
@@ -112,8 +111,8 @@ class ExactSearch {
                                    static_cast<std::uint32_t>(pair)};
     const int level[2] = {level_of(node[0]), level_of(node[1])};
     const float size[2] = {size_of(0, level[0]), size_of(1, level[1])};
-    const bool opens[2] = {level[0] > 0 && (level[1] == 0 || size[1] <= kLarger * size[0]),
-                           level[1] > 0 && (level[0] == 0 || size[0] <= kLarger * size[1])};
+    const bool opens[2] = {level[0] > 0 && (level[1] == 0 || size[1] <= kOpenedAlone * size[0]),
+                           level[1] > 0 && (level[0] == 0 || size[0] <= kOpenedAlone * size[1])};
     --waiting_;
     team_.sync();
     for (int k = team_.lane(); k < 2 * static_cast<int>(kWidth); k += Team::kWidth) {

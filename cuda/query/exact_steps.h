@@ -77,7 +77,7 @@ IST_HD void load_meshes(const Team& team, const ExactArrays& batch, std::uint32_
     const auto offset = [&](const GpuPlacedSolids& side) {
       return scale_of(side, i) * norm(solid_of(batch, side, i).frame.centre);
     };
-    const Aside aside = aside_of(a, b, place.a_from_b);
+    const MoveAside aside = aside_of(a, b, place.a_from_b);
     memory.aside = aside.by;
     memory.origin = {0, 0, 0};
     memory.moved[0] = moved_in_mesh(a);

@@ -44,9 +44,9 @@ class BlockSearch {
         open_b(pair);
       else if (pair.level_b == 0)
         open_a(pair);
-      else if (size_a_[pair.level_a] > kLarger * size_b_[pair.level_b])
+      else if (size_a_[pair.level_a] > kOpenedAlone * size_b_[pair.level_b])
         open_larger_a(pair);
-      else if (size_b_[pair.level_b] > kLarger * size_a_[pair.level_a])
+      else if (size_b_[pair.level_b] > kOpenedAlone * size_a_[pair.level_a])
         open_larger_b(pair);
       else
         open_both(pair);
@@ -56,8 +56,6 @@ class BlockSearch {
   }
 
  private:
-  static constexpr float kLarger = 2;  ///< nodes that are so much larger are opened alone
-
   void push(int level_a, std::uint32_t a, int level_b, std::uint32_t b) {
     if (level_a == 0 && level_b == 0) {
       if (found_.count == scratch_.most_pairs())

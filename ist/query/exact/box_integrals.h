@@ -91,7 +91,7 @@ IST_HD inline double moved_layer(double moved, double area, double width) noexce
 }
 
 /// Signs of a pair are those of B moved by this.
-struct Aside {
+struct MoveAside {
   exact::Point by = {0, 0, 0};  ///< A's unit frame
   double far = 0;               ///< its length
 };
@@ -102,8 +102,8 @@ struct Aside {
 /// no direction of a part is like it. What A and B see of each other is opposite if they change
 /// places: the first and the last term are, and the sign of the other is by the middles, or where
 /// these do not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
-IST_HD inline Aside aside_of(const MeshTree& a, const MeshTree& b,
-                             const Similarity& a_from_b) noexcept {
+IST_HD inline MoveAside aside_of(const MeshTree& a, const MeshTree& b,
+                                 const Similarity& a_from_b) noexcept {
   using exact::Point;
   const auto unit = [](const Point& x) {
     const double length = std::sqrt(dot(x, x));

@@ -24,7 +24,7 @@ double ExactQuery::nearness() const noexcept {
 }
 
 void ExactQuery::move_aside() noexcept {
-  const Aside aside = aside_of(sides_[0].mesh, sides_[1].mesh, a_from_b_);
+  const MoveAside aside = aside_of(sides_[0].mesh, sides_[1].mesh, a_from_b_);
   search_.aside = aside.by;
   search_.touch = sides_[0].moved + sides_[1].moved +
                   4 * kHalfUnit *

@@ -76,6 +76,9 @@ struct MeshTree : MeshParts {
   float low[3] = {}, high[3] = {};  ///< a box around it
 };
 
+/// Nodes that are so much larger than the other side's are opened alone.
+inline constexpr float kOpenedAlone = 2;
+
 /// What rounding may do to a box of a mesh that is placed in floats, by x ↦ scale · R x + t.
 IST_HD inline float placing_pad(double scale, const double (&t)[3], const MeshTree& mesh) noexcept {
   const double shift = std::fmax(std::abs(t[0]), std::fmax(std::abs(t[1]), std::abs(t[2])));
