@@ -27,7 +27,7 @@ using namespace ist::benchmark;
 using ist::testing::DeviceBatch;
 
 Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
-  return bake_surface(close_mesh(mesh, name), 0);
+  return bake_mesh_only(close_mesh(mesh, name), 0);
 }
 
 /// [ms] of the device's work, the median of some.
@@ -162,11 +162,11 @@ TriangleMesh small_body(std::size_t triangles, unsigned seed) {
 int measure(Report& report) {
   const std::size_t many = report.quick() ? 50'000 : 1'000'000;
   bool right = true;
-  const Asset elephant = mesh_of(load_mesh(testing::oracle_mesh_path("elephant")), "elephant");
-  const Asset dino = mesh_of(load_mesh(testing::oracle_mesh_path("dino")), "dino");
+  const Asset elephant = mesh_of(load_mesh(ist::testing::oracle_mesh_path("elephant")), "elephant");
+  const Asset dino = mesh_of(load_mesh(ist::testing::oracle_mesh_path("dino")), "dino");
   const Solids two = {{&elephant, &dino}};
   std::map<std::string, std::vector<BatchPair>> classes;
-  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
+  for (const ist::testing::OracleRow& row : ist::testing::read_oracle_rows("eledino")) {
     const double share = row.fraction_of_smaller;
     const std::string name = row.volume == 0               ? "apart"
                              : row.pose_class == "contain" ? "contained"
@@ -203,14 +203,14 @@ int measure(Report& report) {
   std::vector<Asset> parts;
   std::map<std::string, std::uint32_t> number;
   std::map<std::string, std::vector<BatchPair>> mates;
-  const std::vector<testing::MatedRow> rows = testing::read_mated_rows();
-  for (const testing::MatedRow& row : rows)
+  const std::vector<ist::testing::MatedRow> rows = ist::testing::read_mated_rows();
+  for (const ist::testing::MatedRow& row : rows)
     for (const std::string& mesh : {row.mesh_a, row.mesh_b})
       if (number.try_emplace(mesh, static_cast<std::uint32_t>(parts.size())).second)
-        parts.push_back(mesh_of(load_mesh(testing::mated_mesh_path(mesh)), mesh));
+        parts.push_back(mesh_of(load_mesh(ist::testing::mated_mesh_path(mesh)), mesh));
   Solids mated;
   for (const Asset& part : parts) mated.assets.push_back(&part);
-  for (const testing::MatedRow& row : rows) {
+  for (const ist::testing::MatedRow& row : rows) {
     BatchPair pair;
     pair.a = number[row.mesh_a];
     pair.b = number[row.mesh_b];
