@@ -33,6 +33,8 @@ class Penetration:
     status: Final[_DeviceArray | None]  # (n,) QueryStatus
     node_visits: Final[_DeviceArray | None]  # (n,)
     sphere_pairs: Final[_DeviceArray | None]  # (n,)
+    volume_min: Final[_DeviceArray | None]  # (n,) [u³] of the true volume; by spheres: the volume
+    volume_max: Final[_DeviceArray | None]  # (n,) [u³]
 
 @final
 class Separation:

@@ -192,9 +192,12 @@ def test_what_cannot_be_answered_is_not_held(solids, some_fields):
         assert found.status.numpy().tolist() == held, query
 
 
-def test_wrong_solids_are_named(solids):
-    with pytest.raises(ist.Error, match=r"GPU: solid 1 is an asset without spheres: bake it with"):
-        ist.Solids([solids[0], ist.bake_mesh_only(ist.sample_mesh("cube"))], device="cuda")
+def test_a_mesh_alone_has_no_spheres_to_sum(solids):
+    there = ist.Solids([solids[0], ist.bake_mesh_only(ist.sample_mesh("cube"))], device="cuda")
+    poses = np.array([[1.0, 0, 0, 0, 0, 0, 0]])
+    for measure, status in [("matched", 3), ("exact", 0)]:
+        found = batch(there, a=0, b=1, poses=OnDevice(poses.copy()), measure=measure)
+        assert found.status.numpy().tolist() == [status], measure
 
 
 def test_nothing_is_given_back_before_the_batch_is_done(solids, arguments):

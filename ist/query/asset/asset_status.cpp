@@ -17,7 +17,7 @@ const char* describe(AssetStatus status) noexcept {
     case AssetStatus::corrupt_hash:
       return "the content does not match its checksum; bake again";
     case AssetStatus::corrupt_layout:
-      return "a shape or offset is out of range; bake again";
+      return "a field or offset is out of range; bake again";
   }
   return "unknown status";
 }
