@@ -100,6 +100,7 @@ class ExactInsides {
   IST_HD void flood(int side) {
     const MeshTree& mesh = memory_.mesh[side];
     const std::uint32_t shells = mesh.header->shell_count;
+    team_.sync();  // all have read what the other side left there
     if (team_.lane() == 0) memory_.flooded = 0;
     team_.sync();
     bool any = false;

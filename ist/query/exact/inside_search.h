@@ -69,6 +69,7 @@ IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exac
   constexpr std::uint32_t kNumber = (1u << 28) - 1;
   bool doubtful = false;
   int entered = 0, waiting = 1;
+  team.sync();  // all have read what is overwritten now
   if (team.lane() == 0) stack.node[0] = static_cast<std::uint32_t>(mesh.top) << 28;
   team.sync();
   while (waiting > 0) {
