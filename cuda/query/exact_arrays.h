@@ -15,7 +15,7 @@ namespace ist::gpu {
 constexpr int kExactPasses = 3;
 /// [bytes] of a team's room beside what the largest mesh takes.
 IST_HD constexpr std::size_t exact_room(int pass) {
-  return pass == 0 ? 24u << 10 : pass == 1 ? 96u << 10 : 4u << 20;
+  return pass == 0 ? 24u << 10 : pass == 1 ? 96u << 10 : 16u << 20;
 }
 
 /// Zero at first.

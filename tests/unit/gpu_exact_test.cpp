@@ -31,6 +31,20 @@ TEST(GpuExact, AlignedAnswersAreTheCpus) {
   expect_near(worst);
 }
 
+/// Copies about one middle: in place and next to it few blocks cross, turned all do, for which the
+/// first two passes have no room.
+TEST(GpuExact, LargeCopiesAreAnswered) {
+  std::vector<Asset> assets;
+  assets.push_back(surface(icosphere_mesh(4), "ball"));
+  std::vector<BatchPair> pairs(3);
+  pairs[1].pose_b.t[0] = 1e-9;
+  pairs[2].pose_b.q[3] = 0.1;
+  HostBatch batch(views_of(assets));
+  const std::vector<Penetration> answers = batch.run(pairs, Measure::exact);
+  EXPECT_EQ(batch.exact_counters.listed[2], 1u);
+  expect_near(compare_exactly(assets, pairs, answers));
+}
+
 /// Which lane does what, and when, must not show.
 TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = exact_pairs(34, 30);

@@ -18,9 +18,9 @@ export const codeOf = (status) => status === 'budget-exhausted' ? 1 :
     status === 'error-exceeded'                                 ? kErrorExceeded :
                                                                   0;
 
-// Vectors of answers: after how many numbers each begins; < 0: it lies there with the other sign.
+// Vectors of answers: after how many numbers each begins.
 // Other numbers are named one by one: through such a table each would make garbage.
-const kPenetration = {centroid: 3, force: -6, torque: -9, contactNormal: 13};
+const kPenetration = {centroid: 3, force: 6, torque: 9, contactNormal: 13};
 const kPatch = {centroid: 1, normal: 4, force: 10, torque: 13, point: 16};
 const kGap = {pointA: 3, pointB: 6, normal: 9};
 export const kMotion = {velocity: 0, angularVelocity: 3, about: 6};
@@ -34,15 +34,13 @@ export function newVectors(table) {
 
 export function readVectors(table, at, out) {
   const numbers = f64();
-  for (const name in table)
-    copy3(numbers, at + Math.abs(table[name]), out[name], table[name] < 0 ? -1 : 1);
+  for (const name in table) copy3(numbers, at + table[name], out[name]);
   return out;
 }
 
 function writeVectors(table, at, answer) {
   const numbers = f64();
-  for (const name in table)
-    copy3(answer[name], 0, numbers, table[name] < 0 ? -1 : 1, at + Math.abs(table[name]));
+  for (const name in table) copy3(answer[name], 0, numbers, at + table[name]);
 }
 
 export const newPenetration = () => ({

@@ -93,6 +93,6 @@ export function writeSettings(options) {
 }
 
 /** Copies three numbers, which is shorter than set() and makes no view. */
-export function copy3(from, at, to, sign = 1, place = 0) {
-  for (let k = 0; k < 3; ++k) to[place + k] = sign * from[at + k];
+export function copy3(from, at, to, place = 0) {
+  for (let k = 0; k < 3; ++k) to[place + k] = from[at + k];
 }

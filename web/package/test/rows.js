@@ -9,7 +9,6 @@ function hex(number) {
 }
 const hexes = (numbers) => Array.from(numbers, hex);
 const row = (numbers, i) => numbers.subarray(3 * i, 3 * i + 3);
-const negated = (numbers) => Array.from(numbers, (x) => hex(-x));
 
 /** Rows of a pose table of the oracle. */
 export function parseRows(csv) {
@@ -29,8 +28,8 @@ function penetrationBits(p) {
   return [
     kStatus[p.status],
     ...hexes([p.volume, p.volumeMin, p.volumeMax, ...p.centroid]),
-    ...negated(p.force),
-    ...negated(p.torque),
+    ...hexes(p.force),
+    ...hexes(p.torque),
     p.nodeVisits,
     p.spherePairs,
   ];

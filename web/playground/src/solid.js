@@ -105,7 +105,7 @@ export class Solid {
 
   // --- Below: what lies in the group
 
-  surface() {
+  mesh() {
     if (this.geometry) return this.geometry;
     const {positions, triangles} = this.asset.mesh();
     const shared = new THREE.BufferGeometry();
@@ -120,7 +120,7 @@ export class Solid {
     const {mode, level} = this.shown, {asset} = this;
     this.clear();
     this.parts = mode === 'surface' ?
-        [new THREE.Mesh(this.surface(), this.material)] :
+        [new THREE.Mesh(this.mesh(), this.material)] :
         balls(
             mode === 'spheres' ? asset.spheres({detail: level}) : asset.level(level),
             this.bounds.radius, this.material);
