@@ -340,8 +340,7 @@ bool find_way_out(const ist_placed_t& a, const ist_placed_t& b, const ist_penetr
                   mjPreContact& out) {
   constexpr double kWhole = 0.99, kNone = 0.01;
   const double size = std::cbrt(whole.volume);
-  if (a.asset == nullptr || !(mju_norm3(whole.force) < kNone * size * size))
-    return false;
+  if (a.asset == nullptr || !(mju_norm3(whole.force) < kNone * size * size)) return false;
   for (const bool inner_is_b : {false, true}) {
     const ist_placed_t &inner = inner_is_b ? b : a, &outer = inner_is_b ? a : b;
     ist_asset_info_t info = {};

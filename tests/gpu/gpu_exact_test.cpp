@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include <ist/types.h>
 #include <ist/gpu_query.h>
+#include <ist/types.h>
 
 #include "support/device_batch.h"
 #include "support/exact_batches.h"
