@@ -46,7 +46,7 @@ struct CrossedRef {
 /// A team's memory on the device.
 struct ExactRoom {
   std::uint32_t* record[2];   ///< [blocks] of a block of A, of B: its record + 1; 0: none
-  std::uint32_t* near[2];     ///< a bit a block: boxes of triangles meet others
+  std::uint32_t* near[2];     ///< a bit a block: signs of it might differ if points moved
   std::uint32_t* pierced[2];  ///< a bit a block: edges of it are pierced
   std::uint32_t* inside[2];   ///< a bit a block: no edge is pierced, and it lies inside
   std::uint32_t* flood;       ///< [blocks]

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "cuda/atomics.h"
@@ -8,7 +9,7 @@
 
 namespace ist::gpu {
 
-/// Sums of a pair's work, how it stands.
+/// How the work on a pair stands.
 enum class ExactState : std::uint32_t {
   ok,
   unsure,   ///< doubles do not tell
@@ -65,7 +66,7 @@ class ExactCrossings {
       const int side = k / static_cast<int>(kWidth);
       const auto v = static_cast<std::uint32_t>(k) % kWidth;
       const exact::Point x =
-          place(side, in_global_memory(memory_.mesh[side].blocks)[block[side]].vertex[v]);
+          memory_.vertex(side, in_global_memory(memory_.mesh[side].blocks)[block[side]].vertex[v]);
       for (int axis = 0; axis < 3; ++axis)
         memory_.triangles[side].at[axis][v] = static_cast<float>(x[axis]);
     }
@@ -90,7 +91,6 @@ class ExactCrossings {
     at_ = 0;
     pairs_ = narrow_sides(team_, memory_, a.low, a.high, b.low, b.high, memory_.slack, b.low,
                           b.high, a.low, a.high, memory_.slack);
-    marked_ = false;
   }
 
   /// The next of their pairs of triangles whose boxes meet.
@@ -105,15 +105,11 @@ class ExactCrossings {
       meets = meets && a.low[axis][i] - reach <= b.high[axis][j] &&
               a.high[axis][i] + reach >= b.low[axis][j];
     at_ += Team::kWidth;
-    if (push(0, meets, kWidth * block_[0] + i, kWidth * block_[1] + j) == 0 || marked_) return;
-    marked_ = true;
-    if (team_.lane() == 0)
-      for (int side = 0; side < 2; ++side)
-        room_.near[side][block_[side] / 32] |= 1u << block_[side] % 32;
+    push(0, meets, kWidth * block_[0] + i, kWidth * block_[1] + j);
   }
 
-  /// Appends to a stage's queue, in the order of the lanes; how many.
-  IST_HD std::uint32_t push(int stage, bool adds, std::uint32_t a, std::uint32_t b) {
+  /// Appends to a stage's queue, in the order of the lanes.
+  IST_HD void push(int stage, bool adds, std::uint32_t a, std::uint32_t b) {
     int total = 0;
     const auto before = static_cast<std::uint32_t>(team_.exclusive_count(adds, total));
     if (adds) {
@@ -123,7 +119,6 @@ class ExactCrossings {
       slot[1] = b;
     }
     queued_[stage] += static_cast<std::uint32_t>(total);
-    return static_cast<std::uint32_t>(total);
   }
   /// The next of a stage's queue, one a lane; whether this lane has one.
   IST_HD bool pop(int stage, std::uint32_t (&pair)[2]) {
@@ -141,16 +136,11 @@ class ExactCrossings {
     return has;
   }
 
-  IST_HD exact::Point place(int side, std::uint32_t vertex) const {
-    const double* const x = in_global_memory(memory_.mesh[side].vertices) + std::size_t{3} * vertex;
-    const exact::Point at = {x[0], x[1], x[2]};
-    return side == 0 ? at : map_point(memory_.place.a_from_b, at);
-  }
   IST_HD void load(int side, std::uint32_t triangle, exact::Point (&corners)[3]) const {
     const MeshBlock& block = in_global_memory(memory_.mesh[side].blocks)[triangle / kWidth];
     IST_ROLLED
     for (int k = 0; k < 3; ++k)
-      corners[k] = place(side, block.vertex[block.corner[k][triangle % kWidth]]);
+      corners[k] = memory_.vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
 
   /// Blocks of which triangles cross others get records, in the order of the lanes.
@@ -175,27 +165,58 @@ class ExactCrossings {
     }
   }
 
-  /// Leaves out what a plane keeps apart.
+  /// Leaves out what a plane keeps apart. Blocks of which a pair might cross, or not, if points
+  /// moved by the room are marked as near.
   IST_HD void sift() {
     std::uint32_t pair[2];
-    bool left = pop(0, pair);
-    if (left) left = !(is_beside(1, pair) || is_beside(0, pair));
-    push(1, left, pair[0], pair[1]);
+    const bool has = pop(0, pair);
+    Apart apart = Apart::no;
+    if (has) {
+      apart = by_plane(1, pair);
+      if (apart != Apart::settled) {
+        const Apart other = by_plane(0, pair);
+        if (other > apart) apart = other;
+      }
+      if (apart != Apart::settled)
+        for (int side = 0; side < 2; ++side) {
+          const std::uint32_t block = pair[side] / kWidth;
+          atomic_or(&room_.near[side][block / 32], 1u << block % 32);
+        }
+    }
+    push(1, has && apart == Apart::no, pair[0], pair[1]);
   }
 
-  /// Whether doubles tell that a side's triangle lies on one side of the other's plane, B moved
-  /// aside.
-  IST_HD bool is_beside(int side, const std::uint32_t (&pair)[2]) const {
+  enum class Apart {
+    no,
+    certain,  ///< as doubles tell, B moved aside
+    settled,  ///< wherever points move by the room, too
+  };
+
+  /// Whether the plane of the other side's triangle has a side's on one side.
+  IST_HD Apart by_plane(int side, const std::uint32_t (&pair)[2]) const {
     exact::Point plane[3];
     load(1 - side, pair[1 - side], plane);
+    const auto largest = [](const exact::Point& x) {
+      return std::fmax(std::abs(x.x), std::fmax(std::abs(x.y), std::abs(x.z)));
+    };
+    const double room = memory_.reach[0];
+    const double longest =
+        std::fmax(largest(plane[1] - plane[0]), largest(plane[2] - plane[0])) + room;
     const MeshBlock& block = in_global_memory(memory_.mesh[side].blocks)[pair[side] / kWidth];
     int sum = 0;
+    bool settled = true;
     IST_ROLLED
     for (int k = 0; k < 3; ++k) {
-      const exact::Point p = place(side, block.vertex[block.corner[k][pair[side] % kWidth]]);
-      sum += height_of<false>(p, plane, side == 1, memory_.aside).sign;
+      const exact::Point p =
+          memory_.vertex(side, block.vertex[block.corner[k][pair[side] % kWidth]]);
+      const exact::Determinant height = height_of<false>(p, plane, side == 1, memory_.aside);
+      sum += height.sign;
+      // What the room moves: six products of three numbers; moving aside is within the room too.
+      const double moved = 12 * room * longest * (2 * largest(p - plane[0]) + longest);
+      settled = settled && std::abs(height.value) > height.error + moved;
     }
-    return sum == 3 || sum == -3;
+    if (sum != 3 && sum != -3) return Apart::no;
+    return settled ? Apart::settled : Apart::certain;
   }
 
   IST_HD void cross() {
@@ -266,18 +287,11 @@ class ExactCrossings {
                          {end[0].of_b != 0, end[1].of_b != 0}, counts, {end[0].error, end[1].error},
                          terms);
     const int lane = team_.lane();
-    double(&sum)[ExactSum::kCount][32] = memory_.sum;
-    for (const double six : terms.six_volumes) {
-      double rest;
-      exact::two_sum(sum[ExactSum::kHigh][lane], six, sum[ExactSum::kHigh][lane], rest);
-      sum[ExactSum::kLow][lane] += rest;
-    }
-    sum[ExactSum::kRounding][lane] += terms.rounding;
-    for (int k = 0; k < 3; ++k) {
-      sum[ExactSum::kMoment + k][lane] += terms.moment[k];
-      sum[ExactSum::kPush + k][lane] += terms.force[k];
-      sum[ExactSum::kTurn + k][lane] += terms.torque[k];
-    }
+    for (const double six : terms.six_volumes) memory_.add(lane, six);
+    memory_.sum[ExactSum::kRounding][lane] += terms.rounding;
+    memory_.add(lane, ExactSum::kMoment, terms.moment);
+    memory_.add(lane, ExactSum::kPush, terms.force);
+    memory_.add(lane, ExactSum::kTurn, terms.torque);
   }
 
   /// An edge is pierced.
@@ -296,7 +310,6 @@ class ExactCrossings {
   ExactState state_ = ExactState::ok;
   std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
   int at_ = 0, pairs_ = 0;           ///< pairs of them
-  bool marked_ = false;
   std::uint32_t head_[2] = {0, 0}, queued_[2] = {0, 0};
   std::uint32_t crossings_ = 0, records_ = 0;
 };

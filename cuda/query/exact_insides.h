@@ -19,9 +19,8 @@ class ExactInsides {
   IST_HD bool run() {
     settle();
     for (int side = 0; side < 2; ++side) {
-      const MeshTree& mesh = memory_.mesh[side];
       flood(side);
-      sum_inside(side, static_cast<std::uint32_t>(mesh.top) << kShift);
+      sum_inside(side);
     }
     sum_records();
     bound_near();
@@ -29,14 +28,8 @@ class ExactInsides {
   }
 
  private:
-  static constexpr int kShift = 28;
-
   IST_HD bool has(const std::uint32_t* bits, std::uint32_t b) const {
     return (bits[b / 32] >> b % 32 & 1) != 0;
-  }
-  IST_HD exact::Point place(int side, std::uint32_t vertex) const {
-    const exact::Point x = memory_.mesh[side].vertex(vertex);
-    return side == 0 ? x : map_point(memory_.place.a_from_b, x);
   }
   /// All of the team together.
   IST_HD bool is_inside_other(int side, std::uint32_t vertex) {
@@ -44,8 +37,8 @@ class ExactInsides {
     const MeshOfPair solid =
         side == 1 ? MeshOfPair{other}
                   : MeshOfPair{other, &memory_.place.a_from_b, &memory_.place.b_from_a};
-    return is_inside<kExactly>(team_, solid, place(side, vertex), memory_.aside, memory_.stack,
-                               unsure_);
+    return is_inside<kExactly>(team_, solid, memory_.vertex(side, vertex), memory_.aside,
+                               memory_.stack, unsure_);
   }
 
   /// Which vertices of records are inside.
@@ -123,7 +116,7 @@ class ExactInsides {
       if (!is_inside_other(side, mesh.blocks[block].vertex[0])) continue;
       if (!crossed_) {
         crossed_ = true;
-        const exact::Point here = place(side, mesh.blocks[block].vertex[0]);
+        const exact::Point here = memory_.vertex(side, mesh.blocks[block].vertex[0]);
         team_.sync();
         if (team_.lane() == 0) memory_.origin = here;
       }
@@ -158,19 +151,19 @@ class ExactInsides {
     return team_.any(pierced);
   }
 
-  /// Blocks inside as a whole, as few lanes of boxes as hold them; `root` is a node.
-  IST_HD void sum_inside(int side, std::uint32_t root) {
+  /// Blocks inside as a whole, as few lanes of boxes as hold them.
+  IST_HD void sum_inside(int side) {
     const MeshTree& mesh = memory_.mesh[side];
     if (memory_.flooded == 0) return;
-    std::uint32_t* const stack = memory_.stack.node;
+    MeshNode* const stack = memory_.stack.node;
     std::uint32_t waiting = 1;
     team_.sync();
-    if (team_.lane() == 0) stack[0] = root;
+    if (team_.lane() == 0) stack[0] = MeshNode::at(mesh.top, 0);
     team_.sync();
     while (waiting > 0) {
-      const std::uint32_t node = stack[--waiting];
-      const int level = static_cast<int>(node >> kShift);
-      const std::uint32_t number = node & ((1u << kShift) - 1);
+      const MeshNode node = stack[--waiting];
+      const int level = node.level();
+      const std::uint32_t number = node.number();
       const std::uint32_t used = mesh.level[level - 1].count - kWidth * number;
       team_.sync();
       for (int first = 0; first < static_cast<int>(kWidth); first += Team::kWidth) {
@@ -182,7 +175,7 @@ class ExactInsides {
         const int before = team_.exclusive_count(!all && !none, total);
         if (!all && !none)
           stack[waiting + static_cast<std::uint32_t>(before)] =
-              static_cast<std::uint32_t>(level - 1) << kShift | (kWidth * number + l);
+              MeshNode::at(level - 1, kWidth * number + l);
         waiting += static_cast<std::uint32_t>(total);
       }
       team_.sync();
@@ -205,23 +198,12 @@ class ExactInsides {
     }
   }
 
-  IST_HD void add(double six) {
-    double(&sum)[ExactSum::kCount][32] = memory_.sum;
-    const int lane = team_.lane();
-    double rest;
-    exact::two_sum(sum[ExactSum::kHigh][lane], six, sum[ExactSum::kHigh][lane], rest);
-    sum[ExactSum::kLow][lane] += rest;
-  }
-  IST_HD void add(int of, const exact::Point& x) {
-    for (int k = 0; k < 3; ++k) memory_.sum[of + k][team_.lane()] += x[k];
-  }
-
   IST_HD void add_lane(int side, int level, std::uint32_t i, std::uint32_t lane) {
     const MeshTree::Level& of = memory_.mesh[side].level[level];
     const LaneSums found = lane_sums(of.boxes[i], of.sums[i], lane,
                                      side == 0 ? nullptr : &memory_.place.a_from_b, memory_.origin);
-    add(found.six_volumes);
-    add(ExactSum::kMoment, found.moment);
+    memory_.add(team_.lane(), found.six_volumes);
+    memory_.add(team_.lane(), ExactSum::kMoment, found.moment);
     memory_.sum[ExactSum::kRounding][team_.lane()] += found.six_volume_rounding;
     memory_.sum[ExactSum::kLayers][team_.lane()] +=
         moved_layer(memory_.moved[side], found.area, found.width);
@@ -247,9 +229,9 @@ class ExactInsides {
       const MeshBlock& block = memory_.mesh[side].blocks[record.block];
       if (t >= block.triangles || record.all_pierced() == 0) continue;
       const exact::Point corner[3] = {
-          place(side, block.vertex[block.corner[0][t]]) - memory_.origin,
-          place(side, block.vertex[block.corner[1][t]]) - memory_.origin,
-          place(side, block.vertex[block.corner[2][t]]) - memory_.origin};
+          memory_.vertex(side, block.vertex[block.corner[0][t]]) - memory_.origin,
+          memory_.vertex(side, block.vertex[block.corner[1][t]]) - memory_.origin,
+          memory_.vertex(side, block.vertex[block.corner[2][t]]) - memory_.origin};
       const auto apex = static_cast<std::uint32_t>(exact::apex_of(exact::length_bound(corner[0]),
                                                                   exact::length_bound(corner[1]),
                                                                   exact::length_bound(corner[2])));
@@ -260,8 +242,8 @@ class ExactInsides {
       if (count == 0) continue;
       exact::PieceTerms terms;
       exact::cone_terms(count, corner[apex], corner[(apex + 1) % 3], corner[(apex + 2) % 3], terms);
-      add(terms.six_volumes[0]);
-      add(ExactSum::kMoment, terms.moment);
+      memory_.add(team_.lane(), terms.six_volumes[0]);
+      memory_.add(team_.lane(), ExactSum::kMoment, terms.moment);
       memory_.sum[ExactSum::kRounding][team_.lane()] += terms.rounding;
     }
   }

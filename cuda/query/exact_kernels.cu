@@ -13,8 +13,8 @@ namespace {
 constexpr unsigned kSiftThreads = 128;
 constexpr unsigned kWarps = 2;
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr int kBlocksEach =
-    8;  ///< a multiprocessor, of the first pass; more leave too few registers
+/// A multiprocessor, of the first pass; more leave too few registers.
+constexpr int kBlocksEach = 8;
 
 /// Places every pair and lists those whose boxes meet.
 __global__ void __launch_bounds__(kSiftThreads) sift_meshes(const ExactArrays batch) {

@@ -9,7 +9,7 @@
 namespace ist::gpu {
 
 constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles, of a stage
-constexpr float kExactFar = 1e30f;           ///< where what is not there lies
+constexpr float kExactFar = 3e38f;  ///< where what is not there lies: beyond any ratio of sizes
 
 /// Children of a node, or a node alone: boxes and slabs.
 struct ExactBoxes {
@@ -49,6 +49,7 @@ struct ExactMemory {
   float pad[2];      ///< what rounding does to boxes of A in B's frame, of B in A's
   float slack;       ///< and to slabs
   float map[2][12];  ///< to the other's frame: 3 × 3 row by row, then the shift
+  float turn[9];     ///< A's axes from B's
   union {
     ExactBoxes boxes[2];
     ExactTriangles triangles[2];
@@ -58,8 +59,23 @@ struct ExactMemory {
   int count[2];                              ///< how many
   std::uint32_t queue[2][kExactWaiting][2];  ///< of each stage: triangles, 16 · block + lane
   double sum[ExactSum::kCount][32];
-  // Of the pair's work so far; the first lane writes.
-  std::uint32_t flooded;
+  std::uint32_t flooded;  ///< blocks, of one side
+
+  /// Six times a volume that a lane adds.
+  IST_HD void add(int lane, double six) {
+    double rest;
+    exact::two_sum(sum[ExactSum::kHigh][lane], six, sum[ExactSum::kHigh][lane], rest);
+    sum[ExactSum::kLow][lane] += rest;
+  }
+  IST_HD void add(int lane, int of, const exact::Point& x) {
+    for (int k = 0; k < 3; ++k) sum[of + k][lane] += x[k];
+  }
+  /// A vertex in A's frame.
+  IST_HD exact::Point vertex(int side, std::uint32_t number) const {
+    const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
+    const exact::Point at = {x[0], x[1], x[2]};
+    return side == 0 ? at : map_point(place.a_from_b, at);
+  }
 };
 
 }  // namespace ist::gpu

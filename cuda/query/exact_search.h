@@ -72,7 +72,7 @@ class ExactSearch {
       : team_(team), memory_(memory), room_(room) {
     if (team_.lane() == 0)
       room_.waiting[0] =
-          std::uint64_t{node_of(memory_.mesh[0].top, 0)} << 32 | node_of(memory_.mesh[1].top, 0);
+          pair_of(MeshNode::at(memory_.mesh[0].top, 0), MeshNode::at(memory_.mesh[1].top, 0));
   }
 
   /// How many are in the room's list now, in an order that the pair alone decides: all that are
@@ -90,15 +90,10 @@ class ExactSearch {
   IST_HD std::uint32_t visits() const { return visits_; }  ///< pairs of nodes opened
 
  private:
-  static constexpr int kLevelShift = 28;
   static constexpr float kError = 4e-7f;  ///< relative, of a few operations
 
-  IST_HD static std::uint32_t node_of(int level, std::uint32_t number) {
-    return static_cast<std::uint32_t>(level) << kLevelShift | number;
-  }
-  IST_HD static int level_of(std::uint32_t node) { return static_cast<int>(node >> kLevelShift); }
-  IST_HD static std::uint32_t number_of(std::uint32_t node) {
-    return node & ((1u << kLevelShift) - 1);
+  IST_HD static std::uint64_t pair_of(MeshNode a, MeshNode b) {
+    return std::uint64_t{a.word} << 32 | b.word;
   }
   /// Nodes tile a surface.
   IST_HD float size_of(int side, int level) const {
@@ -107,9 +102,9 @@ class ExactSearch {
   }
 
   IST_HD bool open(std::uint64_t pair) {
-    const std::uint32_t node[2] = {static_cast<std::uint32_t>(pair >> 32),
-                                   static_cast<std::uint32_t>(pair)};
-    const int level[2] = {level_of(node[0]), level_of(node[1])};
+    const MeshNode node[2] = {{static_cast<std::uint32_t>(pair >> 32)},
+                              {static_cast<std::uint32_t>(pair)}};
+    const int level[2] = {node[0].level(), node[1].level()};
     const float size[2] = {size_of(0, level[0]), size_of(1, level[1])};
     const bool opens[2] = {level[0] > 0 && (level[1] == 0 || size[1] <= kOpenedAlone * size[0]),
                            level[1] > 0 && (level[0] == 0 || size[0] <= kOpenedAlone * size[1])};
@@ -117,7 +112,7 @@ class ExactSearch {
     team_.sync();
     for (int k = team_.lane(); k < 2 * static_cast<int>(kWidth); k += Team::kWidth) {
       const int side = k / static_cast<int>(kWidth);
-      load(side, static_cast<std::uint32_t>(k) % kWidth, level[side], number_of(node[side]),
+      load(side, static_cast<std::uint32_t>(k) % kWidth, level[side], node[side].number(),
            opens[side]);
     }
     team_.sync();
@@ -139,8 +134,7 @@ class ExactSearch {
         return false;
       if (meets)
         (leaves ? room_.pairs : room_.waiting)[count + before] =
-            std::uint64_t{child(below[0], number_of(node[0]), i, opens[0])} << 32 |
-            child(below[1], number_of(node[1]), j, opens[1]);
+            pair_of(child(node[0], i, opens[0]), child(node[1], j, opens[1]));
       count += static_cast<std::uint32_t>(total);
     }
     return true;
@@ -154,8 +148,8 @@ class ExactSearch {
                         b.low, b.high, a.other_low, a.other_high, memory_.reach[1]);
   }
 
-  IST_HD static std::uint32_t child(int level, std::uint32_t number, std::uint32_t l, bool opened) {
-    return node_of(level, opened ? kWidth * number + l : number);
+  IST_HD static MeshNode child(MeshNode of, std::uint32_t l, bool opened) {
+    return opened ? MeshNode::at(of.level() - 1, kWidth * of.number() + l) : of;
   }
 
   /// Of a node's children the l-th, or the node alone as the first.
@@ -205,24 +199,24 @@ class ExactSearch {
       out.other_high[k][l] = c + h;
     }
     // What a side of B's box, as long as 1 in its frame, reaches along a normal of A's.
-    const float(&from_b)[12] = memory_.map[1];
+    const float(&turn)[9] = memory_.turn;
     const auto scale = static_cast<float>(memory_.place.a_from_b.scale);
     if (side == 0) {
       for (int k = 0; k < 3; ++k) {
         out.normal[k][l] = normal[k];
-        out.turned[k][l] = std::abs((from_b[k] * normal[0] + from_b[3 + k] * normal[1]) +
-                                    from_b[6 + k] * normal[2]) +
-                           kError * scale;
+        out.turned[k][l] =
+            scale *
+            (std::abs((turn[k] * normal[0] + turn[3 + k] * normal[1]) + turn[6 + k] * normal[2]) +
+             kError);
       }
       out.slab_low[l] = slab_low, out.slab_high[l] = slab_high;
     } else {
       float shift = 0;
       for (int k = 0; k < 3; ++k) {
-        const float turned = ((from_b[3 * k] * normal[0] + from_b[3 * k + 1] * normal[1]) +
-                              from_b[3 * k + 2] * normal[2]) /
-                             scale;
+        const float turned =
+            (turn[3 * k] * normal[0] + turn[3 * k + 1] * normal[1]) + turn[3 * k + 2] * normal[2];
         out.normal[k][l] = turned;
-        shift += turned * from_b[9 + k];
+        shift += turned * memory_.map[1][9 + k];
       }
       out.slab_low[l] = scale * slab_low + shift - 2 * memory_.pad[1];
       out.slab_high[l] = scale * slab_high + shift + 2 * memory_.pad[1];

@@ -96,6 +96,7 @@ IST_HD void load_meshes(const Team& team, const ExactArrays& batch, std::uint32_
     const Similarity& map = k < 12 ? place.b_from_a : place.a_from_b;
     const int n = k % 12;
     memory.map[k / 12][n] = static_cast<float>(n < 9 ? map.m[n] : map.t[n - 9]);
+    if (k >= 12 && n < 9) memory.turn[n] = static_cast<float>(map.m[n] / map.scale);
   }
   team.sync();
 }

@@ -108,7 +108,7 @@ struct GpuPenetrationSettings {
 /// may capture it.
 ///
 /// Throws Error if a batch is larger than the workspace, if the devices differ, if a mesh is too
-/// large for the workspace (some 50 million triangles), or if a launch fails.
+/// large for the workspace (tens of millions of triangles), or if a launch fails.
 void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream);

@@ -31,6 +31,27 @@ TEST(GpuExact, AlignedAnswersAreTheCpus) {
   expect_near(worst);
 }
 
+/// Boxes and slabs are placed in floats, which end long before the range of ratios does.
+TEST(GpuExact, AnyRatioOfSizes) {
+  std::vector<BatchPair> pairs;
+  for (int power = -50; power <= 50; power += 5)
+    for (BatchPair pair : exact_pairs(37, 25)) {
+      // A place on the larger one's surface, or near it.
+      const double scale = std::pow(10.0, power), reach = 0.9 + 0.01 * (power % 7);
+      pair.scale_a = 1;
+      pair.scale_b = scale;
+      pair.pose_a = {{1, 0, 0, 0}, {0, 0, 0}};
+      for (int k = 0; k < 3; ++k)
+        pair.pose_b.t[k] = (k == 0 ? reach : 0.01) * std::max(1.0, scale);
+      pairs.push_back(pair);
+    }
+  HostBatch batch(exact_solids());
+  const Differences worst =
+      compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));
+  EXPECT_GT(worst.met, 100u);
+  expect_near(worst);
+}
+
 /// Copies about one middle: in place and next to it few blocks cross, turned all do, for which the
 /// first two passes have no room.
 TEST(GpuExact, LargeCopiesAreAnswered) {

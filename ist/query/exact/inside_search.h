@@ -22,7 +22,7 @@ struct MeshOfPair {
 
 /// Nodes of a mesh that wait, of a search depth first.
 struct InsideStack {
-  std::uint32_t node[kWidth * kMaxLevels];  ///< level << 28 | number
+  MeshNode node[kWidth * kMaxLevels];
 };
 
 /// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
@@ -66,14 +66,15 @@ IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exac
   const Point beyond = {to[0], to[1], to[2]};
   const Point q = solid.is_b() ? map_point(*solid.to_a, beyond) : beyond;
 
-  constexpr std::uint32_t kNumber = (1u << 28) - 1;
   bool doubtful = false;
   int entered = 0, waiting = 1;
   team.sync();  // all have read what is overwritten now
-  if (team.lane() == 0) stack.node[0] = static_cast<std::uint32_t>(mesh.top) << 28;
+  if (team.lane() == 0) stack.node[0] = MeshNode::at(mesh.top, 0);
   team.sync();
   while (waiting > 0) {
-    const std::uint32_t node = stack.node[--waiting], level = node >> 28, number = node & kNumber;
+    const MeshNode node = stack.node[--waiting];
+    const int level = node.level();
+    const std::uint32_t number = node.number();
     if (level == 0) {
       const MeshBlock& block = mesh.blocks[number];
       for (int t = team.lane(); t < block.triangles; t += Team::kWidth) {
@@ -94,7 +95,7 @@ IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exac
         meets = meets && boxes.low[k][l] <= high[k] && boxes.high[k][l] >= low[k];
       int total = 0;
       const int place = waiting + team.exclusive_count(meets, total);
-      if (meets) stack.node[place] = (level - 1) << 28 | (kWidth * number + l);
+      if (meets) stack.node[place] = MeshNode::at(level - 1, kWidth * number + l);
       waiting += total;
     }
     team.sync();

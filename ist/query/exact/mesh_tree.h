@@ -76,6 +76,18 @@ struct MeshTree : MeshParts {
   float low[3] = {}, high[3] = {};  ///< a box around it
 };
 
+/// A node of a mesh in a word: its level, and its number there.
+struct MeshNode {
+  static constexpr int kShift = 28;
+  std::uint32_t word;
+
+  IST_HD static MeshNode at(int level, std::uint32_t number) {
+    return {static_cast<std::uint32_t>(level) << kShift | number};
+  }
+  IST_HD int level() const { return static_cast<int>(word >> kShift); }
+  IST_HD std::uint32_t number() const { return word & ((1u << kShift) - 1); }
+};
+
 /// Nodes that are so much larger than the other side's are opened alone.
 inline constexpr float kOpenedAlone = 2;
 
