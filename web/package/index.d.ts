@@ -673,10 +673,10 @@ export interface Pair {
 
 /**
  * `invalid-input`: this pair's pose is out of range; its numbers are NaN. Other pairs are not affected.
- * `not-held`: a solid of the pair lacks what the measure needs; its numbers are NaN.
+ * `missing-data`: a solid of the pair lacks what the measure needs; its numbers are NaN.
  */
 export interface BatchPenetration extends Omit<Penetration, 'status'> {
-  status: Status | 'invalid-input' | 'not-held';
+  status: Status | 'invalid-input' | 'missing-data';
 }
 export interface BatchContactPatches extends Omit<ContactPatches, 'whole'> {
   whole: BatchPenetration;

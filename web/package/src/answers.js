@@ -4,13 +4,13 @@ import {copy3} from './desk.js';
 import {f64, u32} from './memory.js';
 
 export const kInvalidInput = -1;  // IST_INVALID_INPUT
-export const kNotHeld = -15;      // IST_MISSING_DATA
+export const kMissingData = -15;  // IST_MISSING_DATA
 const kErrorExceeded = 2;         // IST_ERROR_EXCEEDED
 
 export const statusOf = (status) => status === 0 ? 'ok' :
     status === 1                                 ? 'budget-exhausted' :
     status === kErrorExceeded                    ? 'error-exceeded' :
-    status === kNotHeld                          ? 'not-held' :
+    status === kMissingData                      ? 'missing-data' :
                                                    'invalid-input';
 
 /** Of an answer, which is one. */

@@ -1,6 +1,6 @@
 // Assets and shapes: what lies in WebAssembly's memory and is given back.
 
-import {kNotHeld} from './answers.js';
+import {kMissingData} from './answers.js';
 import {count, desk, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
@@ -125,7 +125,7 @@ export class Asset extends Owner {
     const detail = count(set?.detail, 0, 'detail');
     const measure = sphereMeasureOf(set?.measure);
     const status = functions('an asset').balls(this._at, measure, detail, level, room, capacity);
-    if (status === kNotHeld)
+    if (status === kMissingData)
       throw new IstError(`ist: ${this._name}: is a mesh alone, without spheres`, status);
     if (status < 0)
       throw new IstError(
