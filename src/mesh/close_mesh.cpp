@@ -226,8 +226,8 @@ void keep_facing(const Surface& surface, MeshReport& report) {
   }
 }
 
-void judge_repair(const TriangleMesh& unrepaired, ClosedMesh& closed) {
-  const RepairQuality judged = judge(unrepaired, closed, kKept);
+void judge_repair(const TriangleMesh& unrepaired, const TwoMeshes& both, ClosedMesh& closed) {
+  const RepairQuality judged = judge(unrepaired, closed, both, kKept);
   if (judged.confidence < kLeastConfidence)
     throw OpenMeshError(closed.name + ": repaired with a confidence below " +
                         shortest(kLeastConfidence) + " (" + describe(judged) +
@@ -272,14 +272,19 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
   } else {
     keep_facing(surface, report);
   }
+  if (report.repaired || mesh.triangles.size() != report.triangles) drop_unused(mesh);
   // Dropped degenerate triangles never counted; other changes may add or remove intersections.
-  if (report.repaired || report.coincident_triangles > 0) look_for_intersections();
+  std::optional<TwoMeshes> both;
+  if (report.repaired) both.emplace(unrepaired, mesh);
+  if (report.repaired && met && met->count == 0)
+    met = find_self_intersections(mesh.vertices, mesh.triangles, both->shared_of_b());
+  else if (report.repaired || report.coincident_triangles > 0)
+    look_for_intersections();
   report.meets_itself = !met || met->count > 0;
   report.closed = true;
-  if (report.repaired || mesh.triangles.size() != report.triangles) drop_unused(mesh);
   ClosedMesh closed = {std::move(mesh), std::move(report), name,
                        met ? std::move(met->pairs) : std::nullopt};
-  if (closed.report.repaired) judge_repair(unrepaired, closed);
+  if (both) judge_repair(unrepaired, *both, closed);
   return closed;
 }
 

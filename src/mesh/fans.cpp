@@ -80,12 +80,17 @@ bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertic
 }  // namespace
 
 std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
-                                       const std::vector<Triangle>& triangles) {
+                                       const std::vector<Triangle>& triangles,
+                                       const std::vector<std::uint8_t>& left_out) {
+  const auto is_asked = [&](const std::uint32_t triangle) {
+    return left_out.empty() || left_out[triangle] == 0;
+  };
   const ItemGroups<> fans = triangles_at_vertices(vertices.size(), triangles);
   std::vector<std::uint32_t> spread(vertices.size(), 0);
   tbb::enumerable_thread_specific<Fan> of_threads;
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(vertices.size()),
                     [&](const std::uint32_t v) {
+                      if (std::ranges::none_of(fans[v], is_asked)) return;
                       Fan& fan = of_threads.local();
                       if (find_ring(v, fans[v], triangles, fan) && is_spread(v, vertices, fan))
                         spread[v] = static_cast<std::uint32_t>(fan.ring.size());

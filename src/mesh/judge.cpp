@@ -16,6 +16,7 @@
 
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
+#include "mesh/two_meshes.h"
 #include "mesh/weld.h"
 #include "mesh/winding.h"
 
@@ -50,57 +51,12 @@ VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {
   return {a.agreed + b.agreed, a.all + b.all, a.solid + b.solid, a.wound + b.wound};
 }
 
-/// The triangles of two meshes by the numbers of their corners, which are the same where the
-/// coordinates are.
-class TwoMeshes {
- public:
-  using Corners = std::array<std::uint32_t, 3>;
-
-  TwoMeshes(const TriangleMesh& a, const TriangleMesh& b) : first_of_b_(a.vertices.size()) {
-    std::vector<Eigen::Vector3d> points = a.vertices;
-    points.insert(points.end(), b.vertices.begin(), b.vertices.end());
-    number_ = first_equal(points, std::vector<std::uint8_t>(points.size(), 1));
-  }
-
-  /// A triangle of either by those numbers, turned so that the smallest comes first.
-  Corners corners(const Corners& t, const bool of_b) const {
-    Corners named;
-    for (std::size_t k = 0; k < 3; ++k) named[k] = number_[t[k] + (of_b ? first_of_b_ : 0)];
-    std::rotate(named.begin(), std::min_element(named.begin(), named.end()), named.end());
-    return named;
-  }
-
-  std::vector<Corners> sorted(const std::vector<Corners>& triangles, const bool of_b) const {
-    std::vector<Corners> all(triangles.size());
-    tbb::parallel_for(std::size_t{0}, all.size(),
-                      [&](const std::size_t t) { all[t] = corners(triangles[t], of_b); });
-    tbb::parallel_sort(all.begin(), all.end());
-    return all;
-  }
-
-  /// [triangle] 1 where the other mesh has it too, whichever way it faces.
-  std::vector<std::uint8_t> shared(const std::vector<Corners>& triangles, const bool of_b,
-                                   const std::vector<Corners>& sorted_others) const {
-    std::vector<std::uint8_t> has(triangles.size());
-    tbb::parallel_for(std::size_t{0}, has.size(), [&](const std::size_t t) {
-      const Corners same = corners(triangles[t], of_b), turned = {same[0], same[2], same[1]};
-      has[t] = std::binary_search(sorted_others.begin(), sorted_others.end(), same) ||
-               std::binary_search(sorted_others.begin(), sorted_others.end(), turned);
-    });
-    return has;
-  }
-
- private:
-  std::size_t first_of_b_;
-  std::vector<std::uint32_t> number_;  ///< of a's and b's vertices
-};
-
 /// The triangles of `outward` less those of `made`, which is closed: where both have most in
 /// common, few. Their winding number and that of `made` are the sum's. Nothing where they are many.
 std::optional<TriangleMesh> difference(const TriangleMesh& outward, const TriangleMesh& made,
-                                       const TwoMeshes& both,
-                                       const std::vector<TwoMeshes::Corners>& of_made) {
-  const std::vector<TwoMeshes::Corners> of_outward = both.sorted(outward.triangles, false);
+                                       const TwoMeshes& both) {
+  const std::vector<Triangle> of_outward = both.sorted(outward.triangles, false);
+  const std::vector<Triangle>& of_made = both.of_b();
   TriangleMesh rest;
   std::set_difference(of_made.begin(), of_made.end(), of_outward.begin(), of_outward.end(),
                       std::back_inserter(rest.triangles));
@@ -121,36 +77,53 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
                                        const MeshSolid& made) {
   const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
   const Eigen::Vector3d low = box.min(), size = box.sizes();
+  const Eigen::Vector3d& centre = made.frame().centre;
+  const double scale = made.frame().scale();
+  const auto start_of = [&](const std::size_t line) -> Eigen::Vector3d {
+    return low + size.cwiseProduct(cube_point(line));
+  };
   std::vector<VolumeSums> blocks;
   double met = 0;
   while (blocks.size() < kMost && met < kEnough) {
     const std::size_t first = blocks.size(), last = std::max(kFewest, 2 * first);
     blocks.resize(last);
+    std::vector<std::array<double, 2>> lines((last - first) * kLines);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const Eigen::Vector3d unit = made.frame().to_unit(start_of(first * kLines + i));
+      lines[i] = {unit.y(), unit.z()};
+    }
+    const auto crossings = line_crossings(made.arrays(), lines);
     tbb::parallel_for(first, last, [&](std::size_t b) {
-      WindingPlaces x;
-      std::vector<Crossing> crossings;
-      for (std::size_t line = b * kLines; line < (b + 1) * kLines; ++line) {
-        const Eigen::Vector3d place = cube_point(line);
-        const Eigen::Vector3d start = low + size.cwiseProduct(place);
-        const Eigen::Vector3d unit = made.frame().to_unit(start);
-        line_crossings(made.view(), unit.y(), unit.z(), crossings);
-        for (int i = 0; i < kOnLine; ++i) {
-          const double along = place.x() + static_cast<double>(i) / kOnLine;
-          x.row(i) = start.transpose();
-          x(i, 0) = low.x() + size.x() * (along - std::floor(along));
-        }
+      WindingPlaces x = WindingPlaces::Zero();
+      std::array<int, kWindingPoints> solid{};  // winding numbers
+      std::size_t count = 0;
+      const auto add = [&] {
         const WindingNumbers of_rest = rest.at_each(x);
-        for (int i = 0; i < kOnLine; ++i) {
-          const double here = made.frame().to_unit(x.row(i).transpose()).x();
-          int winding = 0;
-          for (const Crossing& crossing : crossings)
-            if (crossing.x <= here) winding += crossing.sign;
-          const bool inside = winding >= 1;
-          const double w = std::clamp(of_rest[i] + (add_solid ? winding : 0), 0.0, 1.0);
-          const double s = inside ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          const double w =
+              std::clamp(of_rest[Eigen::Index(i)] + (add_solid ? solid[i] : 0), 0.0, 1.0);
+          const double s = solid[i] >= 1 ? 1 : 0, wound = w >= 0.5 ? 1 : 0;
           blocks[b] = blocks[b] + VolumeSums{s * w, std::max(s, wound), s, wound};
         }
+        count = 0;
+      };
+      for (std::size_t line = b * kLines; line < (b + 1) * kLines; ++line) {
+        const double begin = cube_point(line).x();
+        Eigen::Vector3d place = start_of(line);
+        for (int i = 0; i < kOnLine; ++i) {
+          const double along = begin + static_cast<double>(i) / kOnLine;
+          place.x() = low.x() + size.x() * (along - std::floor(along));
+          const double here = (place.x() - centre.x()) / scale;
+          int winding = 0;
+          for (const Crossing& crossing : crossings[line - first * kLines])
+            if (crossing.x <= here) winding += crossing.sign;
+          if (winding < 1 && rest.surely_less_than_half(place)) continue;  // adds nothing
+          x.row(Eigen::Index(count)) = place.transpose();
+          solid[count] = winding;
+          if (++count == kWindingPoints) add();
+        }
       }
+      if (count > 0) add();
     });
     for (std::size_t b = first; b < last; ++b) met += blocks[b].all;
   }
@@ -163,9 +136,34 @@ struct Distances {
   double near = 0;           ///< share of the area within `limit`
 };
 
-/// `shared`: [triangle] 1 where it is one of `to`, too.
+/// The part of `mesh` in which the closest points of some places lie: there is a corner of its
+/// triangles no further from places[i] than reach[i].
+std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
+                                     const std::vector<Eigen::Vector3d>& places,
+                                     const std::vector<double>& reach) {
+  constexpr double kRounding = 1 + 1e-9;
+  Eigen::AlignedBox3d about;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const Eigen::Vector3d off = Eigen::Vector3d::Constant(kRounding * reach[i]);
+    about.extend(places[i] - off);
+    about.extend(places[i] + off);
+  }
+  TriangleMesh part{mesh.vertices, {}, {}};
+  std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(part.triangles),
+               [&](const Triangle& t) {
+                 Eigen::AlignedBox3d box;
+                 for (const std::uint32_t v : t) box.extend(mesh.vertices[v]);
+                 return box.intersects(about);
+               });
+  drop_unused(part);
+  return triangles_as_solid(std::move(part));
+}
+
+/// `shared`: [triangle] 1 where it is one of `to`, too; `corners`: [vertex] 1 where it is one of
+/// those of its triangles.
 Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
-                    const MeshSolid& to, double limit) {
+                    const std::vector<std::uint8_t>& corners, const TriangleMesh& to,
+                    double limit) {
   std::vector<double> area_to(from.triangles.size());  // of all triangles up to this one
   double area = 0;
   for (std::size_t t = 0; t < area_to.size(); ++t) {
@@ -174,15 +172,13 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
     area += (from.vertices[b] - corner).cross(from.vertices[c] - corner).norm() / 2;
     area_to[t] = area;
   }
-  std::vector<std::array<std::size_t, 2>> apart;  // sample, triangle
+  std::vector<std::size_t> apart;       // samples
+  std::vector<Eigen::Vector3d> places;  // of these
+  std::vector<double> reach;            // from them to a corner that `to` has
   for (std::size_t i = 0, t = 0; i < kSurface; ++i) {
     const double place = (static_cast<double>(i) + 0.5) / double{kSurface} * area;
     while (t + 1 < area_to.size() && area_to[t] < place) ++t;
-    if (shared[t] == 0) apart.push_back({i, t});
-  }
-  std::vector<double> distance(kSurface);
-  tbb::parallel_for(std::size_t{0}, apart.size(), [&](std::size_t which) {
-    const auto [i, t] = apart[which];
+    if (shared[t] != 0) continue;
     double u = spread(i, 0.7548776662466927), v = spread(i, 0.5698402909980532);
     if (u + v > 1) {
       u = 1 - u;
@@ -190,10 +186,21 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
     }
     const auto& [a, b, c] = from.triangles[t];
     const Eigen::Vector3d& corner = from.vertices[a];
-    const Eigen::Vector3d x =
-        corner + u * (from.vertices[b] - corner) + v * (from.vertices[c] - corner);
-    distance[i] = to.closest_point(to.frame().to_unit(x)).distance * to.frame().scale();
-  });
+    apart.push_back(i);
+    places.emplace_back(corner + u * (from.vertices[b] - corner) + v * (from.vertices[c] - corner));
+    reach.push_back(HUGE_VAL);
+    for (const std::uint32_t w : from.triangles[t])
+      if (corners[w] != 0)
+        reach.back() = std::min(reach.back(), (from.vertices[w] - places.back()).norm());
+  }
+  std::vector<double> distance(kSurface);
+  if (!apart.empty()) {
+    const auto part = part_near(to, places, reach);
+    tbb::parallel_for(std::size_t{0}, apart.size(), [&](std::size_t i) {
+      const UnitFrame& frame = part->frame();
+      distance[apart[i]] = part->closest_point(frame.to_unit(places[i])).distance * frame.scale();
+    });
+  }
   Distances result;
   for (const double d : distance) {
     result.mean += d / double{kSurface};
@@ -205,18 +212,17 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
 
 }  // namespace
 
-RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, double kept) {
-  const std::unique_ptr<MeshSolid> surface = triangles_as_solid(soup);
+RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, const TwoMeshes& both,
+                    double kept) {
+  Eigen::AlignedBox3d bounds;
+  for (const Triangle& t : soup.triangles)
+    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
   const MeshSolid solid(made);
-  const TwoMeshes both(soup, made.mesh);
-  const std::vector<TwoMeshes::Corners> of_soup = both.sorted(soup.triangles, false),
-                                        of_made = both.sorted(made.mesh.triangles, true);
   TriangleMesh outward = turned_outward(soup);
-  std::optional<TriangleMesh> rest = difference(outward, made.mesh, both, of_made);
+  std::optional<TriangleMesh> rest = difference(outward, made.mesh, both);
   const TriangleWinding winding(rest ? std::move(*rest) : std::move(outward));
 
-  const std::vector<VolumeSums> blocks =
-      sample_volumes(surface->bounds(), winding, rest.has_value(), solid);
+  const std::vector<VolumeSums> blocks = sample_volumes(bounds, winding, rest.has_value(), solid);
   VolumeSums all;
   for (const VolumeSums& block : blocks) all = all + block;
   RepairQuality judged;
@@ -233,11 +239,10 @@ RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, double kep
   }
   if (all.solid > 0) judged.volume_ratio = all.wound / all.solid;
 
-  const double diagonal = surface->bounds().diagonal().norm();
-  const Distances lost =
-      distances(soup, both.shared(soup.triangles, false, of_made), solid, kept * diagonal);
-  const Distances added = distances(made.mesh, both.shared(made.mesh.triangles, true, of_soup),
-                                    *surface, kept * diagonal);
+  const double limit = kept * bounds.diagonal().norm();
+  const Distances lost = distances(soup, both.shared_of_a(), both.corners_of_a(), made.mesh, limit);
+  const Distances added =
+      distances(made.mesh, both.shared_of_b(), both.corners_of_b(), soup, limit);
   judged.kept_surface = lost.near;
   judged.input_mean = lost.mean;
   judged.input_max = lost.max;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -161,8 +162,7 @@ std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
 /// the three axes both ways, twice as much is backs as fronts. Where neither prevails so, as in a
 /// bowl, the side that it bulges to is its front. Patches that nobody sees go with the majority: as
 /// authored, unless most of what is seen had to be turned. The same for any threads.
-void orient_soup(TriangleMesh& soup) {
-  const EdgeTable edges(soup.triangles);
+void orient_soup(TriangleMesh& soup, const EdgeTable& edges) {
   make_consistent(soup.triangles, manifold_partners(edges));
   DisjointSets patches = connected_pieces(edges, 2);
   const UnitFrame frame = frame_of(soup);
@@ -307,23 +307,31 @@ std::vector<bool> inner_walls(const TriangleMesh& soup, DisjointSets& patches,
 }
 
 TriangleMesh turned_outward(TriangleMesh mesh) {
-  reduce_coincident(mesh.triangles, EdgeTable(mesh.triangles));
-  if (!mesh.triangles.empty()) orient_soup(mesh);
+  EdgeTable edges(mesh.triangles);
+  if (reduce_coincident(mesh.triangles, edges) > 0) edges = EdgeTable(mesh.triangles);
+  if (!mesh.triangles.empty()) orient_soup(mesh, edges);
   return mesh;
 }
 
 TriangleWinding::TriangleWinding(TriangleMesh mesh) {
   if (mesh.triangles.empty()) return;
+  double area = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]],
+                          &c = mesh.vertices[t[2]];
+    area += (b - a).cross(c - a).norm() / 2;
+    for (const Eigen::Vector3d* p : {&a, &b, &c}) bounds_.extend(*p);
+  }
+  constexpr double kRounding = 1.01;
+  least_distance2_ = kRounding * area / (2 * std::numbers::pi);
   surface_ = triangles_as_solid(std::move(mesh));
   winding_.emplace(surface_->view());
 }
 
 WindingNumbers TriangleWinding::at_each(const WindingPlaces& x) const {
   if (!winding_) return WindingNumbers::Zero();
-  WindingPlaces unit;
-  for (int i = 0; i < x.rows(); ++i)
-    unit.row(i) = surface_->frame().to_unit(x.row(i).transpose()).transpose();
-  return winding_->at_each(unit);
+  const UnitFrame& frame = surface_->frame();
+  return winding_->at_each((x.rowwise() - frame.centre.transpose()) / frame.scale());
 }
 
 }  // namespace ist

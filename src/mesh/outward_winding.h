@@ -53,6 +53,11 @@ class [[gnu::visibility("hidden")]] TriangleWinding {
  public:
   explicit TriangleWinding(TriangleMesh mesh);
 
+  /// Whether the winding number's magnitude is surely less than ½, as it is far from little area.
+  bool surely_less_than_half(const Eigen::Vector3d& x) const {
+    return !winding_ || bounds_.squaredExteriorDistance(x) > least_distance2_;
+  }
+
   /// `x`: [u]. 0 where there are no triangles.
   WindingNumbers at_each(const WindingPlaces& x) const;
   double at(const Eigen::Vector3d& x) const {
@@ -62,6 +67,8 @@ class [[gnu::visibility("hidden")]] TriangleWinding {
  private:
   std::unique_ptr<MeshSolid> surface_;
   std::optional<SoupWinding> winding_;
+  Eigen::AlignedBox3d bounds_;   ///< [u]
+  double least_distance2_ = -1;  ///< [u²] from the bounds, from where all area covers less than 2π
 };
 
 /// The same of any triangles, however they face.

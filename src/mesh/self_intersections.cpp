@@ -60,6 +60,9 @@ class TriangleBoxes {
                 const std::vector<std::uint32_t>& spread = {}, double margin = 0,
                 bool oriented = false);
 
+  /// Pairs of two triangles that are marked need not be visited. [triangle]
+  void leave_out(const std::vector<std::uint8_t>& marked);
+
   std::size_t size() const { return order_.size(); }
   bool oriented() const { return !slabs_.empty(); }
   /// The triangle at a place of the curve.
@@ -79,11 +82,18 @@ class TriangleBoxes {
     for (std::size_t block = part / 8; block < above.size(); ++block) {
       unsigned met = above[block].met_by(above[part / 8], part % 8);
       if (block == part / 8) met &= ~1u << part % 8;
+      met &= wanted(start_ + 1, part, block);
       for (; met != 0; met &= met - 1) between(start_, part, 8 * block + lowest(met), visit);
     }
   }
 
  private:
+  /// Bit k: whether pairs of node `a` of the level below and box k of a node are to be visited.
+  unsigned wanted(const std::size_t level, const std::size_t a, const std::size_t node) const {
+    if (wanted_.empty() || (wanted_[level][a / 8] >> a % 8 & 1) != 0) return ~0u;
+    return wanted_[level][node];
+  }
+
   static std::size_t lowest(const unsigned bits) {
     return static_cast<std::size_t>(std::countr_zero(bits));
   }
@@ -91,11 +101,13 @@ class TriangleBoxes {
   template <class Visit>
   void within(const std::size_t level, const std::size_t node, Visit& visit) const {
     if (!slabs_.empty() && slabs_[level][node].spread) return;
+    if (!wanted_.empty() && wanted_[level][node] == 0) return;
     const EightBoxes& boxes = levels_[level][node];
     const std::size_t below = level == 0 ? order_.size() : levels_[level - 1].size();
     for (std::size_t k = 0; k < 8 && 8 * node + k < below; ++k) {
       if (level > 0) within(level - 1, 8 * node + k, visit);
-      for (unsigned met = boxes.met_by(boxes, k) & ~1u << k; met != 0; met &= met - 1)
+      for (unsigned met = boxes.met_by(boxes, k) & ~1u << k & wanted(level, 8 * node + k, node);
+           met != 0; met &= met - 1)
         pair(level, 8 * node + k, 8 * node + lowest(met), visit);
     }
   }
@@ -111,9 +123,12 @@ class TriangleBoxes {
     }
     const EightBoxes &of_a = levels_[level][a], &of_b = levels_[level][b];
     unsigned near_b = of_a.met_by(levels_[level + 1][b / 8], b % 8);
-    for (; near_b != 0; near_b &= near_b - 1)
-      for (unsigned met = of_b.met_by(of_a, lowest(near_b)); met != 0; met &= met - 1)
-        pair(level, 8 * a + lowest(near_b), 8 * b + lowest(met), visit);
+    for (; near_b != 0; near_b &= near_b - 1) {
+      const std::size_t child = 8 * a + lowest(near_b);
+      for (unsigned met = of_b.met_by(of_a, lowest(near_b)) & wanted(level, child, b); met != 0;
+           met &= met - 1)
+        pair(level, child, 8 * b + lowest(met), visit);
+    }
   }
 
   /// Children of a level's nodes.
@@ -130,6 +145,8 @@ class TriangleBoxes {
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
   /// Of the nodes up to the starting level, where there are large fans or needles; or none at all.
   std::vector<std::vector<Slab>> slabs_;
+  /// [level][node] Bit k: box k holds a triangle that is not marked. Or none at all.
+  std::vector<std::vector<std::uint8_t>> wanted_;
 };
 
 constexpr std::uint64_t kLeftOut = UINT64_MAX;
@@ -249,6 +266,17 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   }
 }
 
+void TriangleBoxes::leave_out(const std::vector<std::uint8_t>& marked) {
+  for (std::size_t level = 0; level < levels_.size(); ++level) {
+    const std::size_t count = level == 0 ? order_.size() : levels_[level - 1].size();
+    std::vector<std::uint8_t> bits(levels_[level].size(), 0);
+    for (std::size_t i = 0; i < count; ++i)
+      if (level == 0 ? marked[order_[i]] == 0 : wanted_[level - 1][i] != 0)
+        bits[i / 8] = static_cast<std::uint8_t>(bits[i / 8] | 1 << i % 8);
+    wanted_.push_back(std::move(bits));
+  }
+}
+
 /// Whether the exact boxes of two triangles meet.
 bool boxes_meet(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                 const Triangle& b) {
@@ -348,14 +376,50 @@ std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt
   return result;
 }
 
+/// Triangles whose boxes meet the box around those that are not known to be apart from others.
+std::vector<std::uint32_t> near_others(const std::vector<Eigen::Vector3d>& vertices,
+                                       const std::vector<Triangle>& triangles,
+                                       const std::vector<std::uint8_t>& known_apart) {
+  const auto box_of = [&](const std::size_t t) {
+    Eigen::AlignedBox3d box;
+    for (const std::uint32_t v : triangles[t]) box.extend(vertices[v]);
+    return box;
+  };
+  Eigen::AlignedBox3d others;
+  for (std::size_t t = 0; t < known_apart.size(); ++t)
+    if (known_apart[t] == 0) others.extend(box_of(t));
+  std::vector<std::uint32_t> near;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t)
+    if (box_of(t).intersects(others)) near.push_back(t);
+  return near;
+}
+
 }  // namespace
 
 std::optional<SelfIntersections> find_self_intersections(
-    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles) {
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+    const std::vector<std::uint8_t>& known_apart) {
   if (triangles.size() > kMostTriangles) return std::nullopt;
-  const std::vector<std::uint32_t> fans = spread_fans(vertices, triangles);
+  if (!known_apart.empty()) {
+    const std::vector<std::uint32_t> near = near_others(vertices, triangles, known_apart);
+    if (near.empty()) return SelfIntersections{0, {{}}};
+    if (near.size() < triangles.size() / 2) {
+      std::vector<Triangle> some(near.size());
+      std::vector<std::uint8_t> some_apart(near.size());
+      for (std::size_t i = 0; i < near.size(); ++i) {
+        some[i] = triangles[near[i]];
+        some_apart[i] = known_apart[near[i]];
+      }
+      auto found = find_self_intersections(vertices, some, some_apart);
+      if (found && found->pairs)
+        for (auto& pair : *found->pairs) pair = {near[pair[0]], near[pair[1]]};
+      return found;
+    }
+  }
+  const std::vector<std::uint32_t> fans = spread_fans(vertices, triangles, known_apart);
   for (const bool oriented : {false, true}) {
-    const TriangleBoxes boxes(vertices, triangles, fans, 0, oriented);
+    TriangleBoxes boxes(vertices, triangles, fans, 0, oriented);
+    if (!known_apart.empty()) boxes.leave_out(known_apart);
     const std::vector<Triangle> spread = spread_corners(triangles, fans, boxes);
     auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
       if (share_corner(spread[i], spread[j])) return Look::candidates;

@@ -25,9 +25,11 @@ bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle
 /// [vertex] The number of triangles about it where these are proven not to meet elsewhere than in
 /// the corners and sides they share: they follow one another in a closed fan that, seen from some
 /// direction, goes once around the vertex and has all its triangles facing the viewer. 0 says
-/// nothing. On the caller's TBB threads.
+/// nothing, as of vertices whose triangles are all left out ([triangle] 1, or none at all). On the
+/// caller's TBB threads.
 std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
-                                       const std::vector<Triangle>& triangles);
+                                       const std::vector<Triangle>& triangles,
+                                       const std::vector<std::uint8_t>& left_out = {});
 
 /// Pairs of triangles that meet elsewhere than in shared corners and sides.
 struct SelfIntersections {
@@ -39,8 +41,10 @@ struct SelfIntersections {
 /// Degenerate triangles are left out. Nothing where looking would take too long: more than two
 /// million triangles, or a soup in which the boxes of more than 50 million pairs, and of 600 a
 /// triangle, meet. Runs on the caller's TBB threads; the answer does not depend on their number.
+/// `known_apart`: [triangle] 1: two of these are known not to meet; none at all: nothing is known.
 std::optional<SelfIntersections> find_self_intersections(
-    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles);
+    const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+    const std::vector<std::uint8_t>& known_apart = {});
 
 /// Pairs of triangles, the smaller index first, sorted, whose boxes are no further than `margin`
 /// [u] apart and for which `wanted` holds, which several threads ask at once. Limits and threads as

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <vector>
 
-#include "mesh/mesh_solid.h"
+#include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
+#include "mesh/ray_crossing.h"
 
 // Winding numbers by rays parallel to x. A ray is thought to be moved by an infinitesimal amount in
 // z and a larger infinitesimal in y, so that it meets no edge and no vertex; every predicate is
@@ -17,5 +20,10 @@ int winding_number(const MeshView& mesh, const double p[3]);
 
 /// All crossings of the line (·, y, z), sorted by x, +1 first among equals.
 void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out);
+
+/// [line] The same of many lines (y, z), without the hierarchy, which costs more to build than some
+/// thousand lines do. On the caller's TBB threads.
+ItemGroups<std::uint32_t, Crossing> line_crossings(const MeshView& mesh,
+                                                   const std::vector<std::array<double, 2>>& lines);
 
 }  // namespace ist

@@ -201,7 +201,7 @@ ClosedMesh wrap_mesh(TriangleMesh mesh, const std::string& name, double detail) 
   const Wrap wrap(mesh, step);
   ClosedMesh made = level_set_surface(sample(wrap, bounds, step), name);
   made.report.wrapped = true;
-  made.report.judged = judge(mesh, made, kKeptByWrap * detail);
+  made.report.judged = judge(mesh, made, TwoMeshes(mesh, made.mesh), kKeptByWrap * detail);
   made.report.notes.insert(made.report.notes.begin(), mesh.notes.begin(), mesh.notes.end());
   std::string note = "wrapped on a lattice of " + shortest(step);
   if (wrap.thin_count() > 0)

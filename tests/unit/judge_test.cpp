@@ -136,7 +136,7 @@ TEST(OutwardWinding, TurnsWhatFacesInward) {
 
 TEST(Judge, AClosedMeshAgreesWithItself) {
   const ClosedMesh gear = close_mesh(make_sample("gear"), "gear");
-  const RepairQuality judged = judge(gear.mesh, gear, kKept);
+  const RepairQuality judged = judge(gear.mesh, gear, TwoMeshes(gear.mesh, gear.mesh), kKept);
   EXPECT_GT(judged.confidence, 0.98);
   EXPECT_NEAR(judged.volume_ratio, 1, 0.01);
   EXPECT_EQ(judged.kept_surface, 1);

@@ -51,6 +51,32 @@ void expect_all_found(const TriangleMesh& mesh) {
     EXPECT_EQ(found->count, pairs.size());
     EXPECT_EQ(*found->pairs, pairs);
   }
+  // Where it is known of many that they do not meet each other.
+  std::vector<std::uint8_t> apart(mesh.triangles.size(), 1);
+  for (const auto& [a, b] : pairs)
+    if (apart[a] != 0) apart[b] = 0;
+  const auto found = find_self_intersections(mesh.vertices, mesh.triangles, apart);
+  ASSERT_TRUE(found && found->pairs);
+  EXPECT_EQ(*found->pairs, pairs);
+}
+
+/// What is added to a large mesh is looked for nearby alone.
+TEST(SelfIntersections, OfFewAddedTriangles) {
+  TriangleMesh mesh = torus_mesh(2, 0.7, 60, 30);
+  std::vector<std::uint8_t> apart(mesh.triangles.size(), 1);
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), {{1, 0, 0}, {3, 0.01, 0.02}, {2, 0.3, 0.1}});
+  mesh.triangles.push_back({first, first + 1, first + 2});
+  apart.push_back(0);
+  const auto found = find_self_intersections(mesh.vertices, mesh.triangles, apart);
+  const auto all = find_self_intersections(mesh.vertices, mesh.triangles);
+  ASSERT_TRUE(found && all);
+  EXPECT_GT(all->count, 2);
+  EXPECT_EQ(*found->pairs, *all->pairs);
+  EXPECT_EQ(find_self_intersections(mesh.vertices, mesh.triangles,
+                                    std::vector<std::uint8_t>(apart.size(), 1))
+                ->count,
+            0);
 }
 
 /// Triangles between corners of a small lattice: many touch exactly.

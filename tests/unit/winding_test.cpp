@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <list>
 #include <numbers>
@@ -159,6 +161,27 @@ TEST(LineCrossings, SumToZeroAndAgreeWithTheWindingNumber) {
         ASSERT_EQ(solid.winding_number({middle, y, z}), winding);
       }
       ASSERT_EQ(winding, 0);
+    }
+  }
+}
+
+TEST(LineCrossings, OfManyLinesAreThoseOfEach) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> coordinate(-1.2, 1.2);
+  for (const MeshSolid& solid : random_solids()) {
+    std::vector<std::array<double, 2>> lines(500);
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      const double* corner = solid.view().vertices + 3 * (i % solid.view().vertex_count);
+      lines[i] = {coordinate(random), coordinate(random)};
+      if (i % 3 == 1) lines[i] = {corner[1], corner[2]};
+    }
+    const auto found = line_crossings(solid.arrays(), lines);
+    std::vector<Crossing> expected;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      line_crossings(solid.view(), lines[i][0], lines[i][1], expected);
+      ASSERT_TRUE(std::ranges::equal(found[i], expected, [](const Crossing& a, const Crossing& b) {
+        return a.x == b.x && a.sign == b.sign;
+      }));
     }
   }
 }
