@@ -17,6 +17,7 @@
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
 #include "mesh/two_meshes.h"
+#include "mesh/usable_mesh.h"
 #include "mesh/weld.h"
 #include "mesh/winding.h"
 
@@ -136,8 +137,8 @@ struct Distances {
   double near = 0;           ///< share of the area within `limit`
 };
 
-/// The part of `mesh` in which the closest points of some places lie: there is a corner of its
-/// triangles no further from places[i] than reach[i].
+/// The part of `mesh` that has the closest points of some places. reach[i]: the distance from
+/// places[i] to a corner of one of its triangles, or infinity.
 std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
                                      const std::vector<Eigen::Vector3d>& places,
                                      const std::vector<double>& reach) {
@@ -149,32 +150,27 @@ std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
     about.extend(places[i] + off);
   }
   TriangleMesh part{mesh.vertices, {}, {}};
-  std::copy_if(mesh.triangles.begin(), mesh.triangles.end(), std::back_inserter(part.triangles),
-               [&](const Triangle& t) {
-                 Eigen::AlignedBox3d box;
-                 for (const std::uint32_t v : t) box.extend(mesh.vertices[v]);
-                 return box.intersects(about);
-               });
+  std::ranges::copy_if(mesh.triangles, std::back_inserter(part.triangles), [&](const Triangle& t) {
+    return bounds_of(mesh.vertices, t).intersects(about);
+  });
   drop_unused(part);
   return triangles_as_solid(std::move(part));
 }
 
-/// `shared`: [triangle] 1 where it is one of `to`, too; `corners`: [vertex] 1 where it is one of
-/// those of its triangles.
+/// `shared`: [triangle of `from`] 1 where `to` has it too. `corners`: [vertex of `from`] 1 where a
+/// triangle of `to` has it.
 Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
                     const std::vector<std::uint8_t>& corners, const TriangleMesh& to,
                     double limit) {
   std::vector<double> area_to(from.triangles.size());  // of all triangles up to this one
   double area = 0;
   for (std::size_t t = 0; t < area_to.size(); ++t) {
-    const auto& [a, b, c] = from.triangles[t];
-    const Eigen::Vector3d& corner = from.vertices[a];
-    area += (from.vertices[b] - corner).cross(from.vertices[c] - corner).norm() / 2;
+    area += area_of(from.vertices, from.triangles[t]);
     area_to[t] = area;
   }
-  std::vector<std::size_t> apart;       // samples
-  std::vector<Eigen::Vector3d> places;  // of these
-  std::vector<double> reach;            // from them to a corner that `to` has
+  std::vector<std::size_t> apart;       // samples on triangles that `to` does not have
+  std::vector<Eigen::Vector3d> places;  // where these lie
+  std::vector<double> reach;            // from there to a corner that `to` has
   for (std::size_t i = 0, t = 0; i < kSurface; ++i) {
     const double place = (static_cast<double>(i) + 0.5) / double{kSurface} * area;
     while (t + 1 < area_to.size() && area_to[t] < place) ++t;
@@ -214,9 +210,7 @@ Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& s
 
 RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, const TwoMeshes& both,
                     double kept) {
-  Eigen::AlignedBox3d bounds;
-  for (const Triangle& t : soup.triangles)
-    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
+  const Eigen::AlignedBox3d bounds = bounds_of(soup.vertices, soup.triangles);
   const MeshSolid solid(made);
   TriangleMesh outward = turned_outward(soup);
   std::optional<TriangleMesh> rest = difference(outward, made.mesh, both);

@@ -49,13 +49,9 @@ struct LatticeRange {
 
 /// Rows that may meet a triangle.
 IST_HD inline LatticeRange rows_of(const LineLattice& lattice, const Corners& t) {
-  double low = t.p[0][2], high = low;
-  for (int k = 1; k < 3; ++k) {
-    low = t.p[k][2] < low ? t.p[k][2] : low;
-    high = t.p[k][2] > high ? t.p[k][2] : high;
-  }
-  return {(low - lattice.z0) / lattice.step_z - lattice.offset,
-          (high - lattice.z0) / lattice.step_z - lattice.offset, lattice.nz};
+  const Extent z(t, 2);
+  return {(z.low - lattice.z0) / lattice.step_z - lattice.offset,
+          (z.high - lattice.z0) / lattice.step_z - lattice.offset, lattice.nz};
 }
 
 /// Lines of row j that may pierce a triangle.

@@ -16,6 +16,7 @@
 #include "mesh/exact_sign.h"
 #include "mesh/shells.h"
 #include "mesh/triangle_columns.h"
+#include "mesh/usable_mesh.h"
 #include "stage/raw_array.h"
 
 namespace ist {
@@ -98,7 +99,7 @@ void find_boxes(const std::vector<Eigen::Vector3d>& vertices,
       const std::uint32_t shell = shells.of_triangle[t];
       Eigen::AlignedBox3d box;
       for (; t < range.end() && shells.of_triangle[t] == shell; ++t)
-        for (const std::uint32_t v : triangles[t]) box.extend(vertices[v]);
+        box.extend(bounds_of(vertices, triangles[t]));
       const std::scoped_lock lock(mutex);
       result[shell].box.extend(box);
     }

@@ -19,6 +19,7 @@
 #include "mesh/line_lattice.h"
 #include "mesh/shells.h"
 #include "mesh/surface_reduction.h"
+#include "mesh/usable_mesh.h"
 
 namespace ist {
 namespace {
@@ -90,10 +91,7 @@ void look_along(const std::vector<std::array<double, 3>>& points,
 }
 
 UnitFrame frame_of(const TriangleMesh& soup) {
-  Eigen::AlignedBox3d bounds;
-  for (const Triangle& t : soup.triangles)
-    for (const std::uint32_t v : t) bounds.extend(soup.vertices[v]);
-  return unit_frame(bounds);
+  return unit_frame(bounds_of(soup.vertices, soup.triangles));
 }
 
 /// What is seen of each patch from far away, along the three axes both ways.
@@ -315,13 +313,9 @@ TriangleMesh turned_outward(TriangleMesh mesh) {
 
 TriangleWinding::TriangleWinding(TriangleMesh mesh) {
   if (mesh.triangles.empty()) return;
+  bounds_ = bounds_of(mesh.vertices, mesh.triangles);
   double area = 0;
-  for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d &a = mesh.vertices[t[0]], &b = mesh.vertices[t[1]],
-                          &c = mesh.vertices[t[2]];
-    area += (b - a).cross(c - a).norm() / 2;
-    for (const Eigen::Vector3d* p : {&a, &b, &c}) bounds_.extend(*p);
-  }
+  for (const Triangle& t : mesh.triangles) area += area_of(mesh.vertices, t);
   constexpr double kRounding = 1.01;
   least_distance2_ = kRounding * area / (2 * std::numbers::pi);
   surface_ = triangles_as_solid(std::move(mesh));

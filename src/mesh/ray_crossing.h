@@ -30,13 +30,13 @@ IST_HD inline int pierced(const Corners& t, const double yz[2]) {
          edge_crossing(t.p[2], t.p[0], yz);
 }
 
-/// Extent of a triangle in x.
+/// Extent of a triangle along an axis.
 struct Extent {
   double low, high;
 
-  IST_HD explicit Extent(const Corners& t) : low(t.p[0][0]), high(t.p[0][0]) {
+  IST_HD explicit Extent(const Corners& t, int axis = 0) : low(t.p[0][axis]), high(t.p[0][axis]) {
     for (int i = 1; i < 3; ++i) {
-      const double x = t.p[i][0];
+      const double x = t.p[i][axis];
       low = x < low ? x : low;
       high = x < high ? high : x;
     }

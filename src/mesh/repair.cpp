@@ -228,10 +228,6 @@ bool any_crowded(const EdgeTable& edges) {
   return false;
 }
 
-double area(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
-  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
-}
-
 /// Drops patches that hang on others and leave fewer odd edges when they go, those first that leave
 /// the fewest for their area: a body with holes has many itself. What is right for one changes what
 /// is right for its neighbours, so those wait. Returns how many went.
@@ -240,13 +236,15 @@ std::size_t drop_fins_once(Surface& surface) {
   const EdgeTable& edges = surface.edges;
   if (!any_crowded(edges)) return 0;
   HangingPatches hanging(mesh, edges);
-  auto& [patches, gain, shared_edges] = hanging;
+  DisjointSets& patches = hanging.sets;
+  const std::vector<int>& gain = hanging.gain;
+  const auto& shared_edges = hanging.shared_edges;
   std::vector<std::uint32_t> order;
   for (std::uint32_t patch = 0; patch < gain.size(); ++patch)
     if (gain[patch] > 0 && !shared_edges[patch].empty()) order.push_back(patch);
   std::vector<double> size(gain.size(), 0);
   for (std::uint32_t t = 0; t < size.size(); ++t)
-    size[patches.find(t)] += area(mesh.vertices, mesh.triangles[t]);
+    size[patches.find(t)] += area_of(mesh.vertices, mesh.triangles[t]);
   std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
     return gain[a] * size[b] > gain[b] * size[a];
   });
@@ -310,12 +308,12 @@ void cap_holes(Surface& surface, MeshReport& report) {
   std::vector<double> own_area(mesh.triangles.size(), 0), cap_area(mesh.triangles.size(), 0);
   std::vector<std::uint32_t> piece_of_loop;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    own_area[pieces.find(t)] += area(mesh.vertices, mesh.triangles[t]);
+    own_area[pieces.find(t)] += area_of(mesh.vertices, mesh.triangles[t]);
   for (const BorderLoop& loop : loops) {
     const std::uint32_t piece = pieces.find(edges.sides(loop.edge)[0] / 3);
     piece_of_loop.push_back(piece);
     caps.push_back(cap(mesh.vertices, loop));
-    for (const Triangle& t : caps.back()) cap_area[piece] += area(mesh.vertices, t);
+    for (const Triangle& t : caps.back()) cap_area[piece] += area_of(mesh.vertices, t);
   }
   const auto is_sheet = [&](const std::uint32_t piece) {
     return cap_area[piece] > kSheet * own_area[piece];

@@ -380,17 +380,12 @@ std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt
 std::vector<std::uint32_t> near_others(const std::vector<Eigen::Vector3d>& vertices,
                                        const std::vector<Triangle>& triangles,
                                        const std::vector<std::uint8_t>& known_apart) {
-  const auto box_of = [&](const std::size_t t) {
-    Eigen::AlignedBox3d box;
-    for (const std::uint32_t v : triangles[t]) box.extend(vertices[v]);
-    return box;
-  };
   Eigen::AlignedBox3d others;
   for (std::size_t t = 0; t < known_apart.size(); ++t)
-    if (known_apart[t] == 0) others.extend(box_of(t));
+    if (known_apart[t] == 0) others.extend(bounds_of(vertices, triangles[t]));
   std::vector<std::uint32_t> near;
   for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    if (box_of(t).intersects(others)) near.push_back(t);
+    if (bounds_of(vertices, triangles[t]).intersects(others)) near.push_back(t);
   return near;
 }
 

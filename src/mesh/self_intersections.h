@@ -25,8 +25,8 @@ bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle
 /// [vertex] The number of triangles about it where these are proven not to meet elsewhere than in
 /// the corners and sides they share: they follow one another in a closed fan that, seen from some
 /// direction, goes once around the vertex and has all its triangles facing the viewer. 0 says
-/// nothing, as of vertices whose triangles are all left out ([triangle] 1, or none at all). On the
-/// caller's TBB threads.
+/// nothing. `left_out` [triangle]: a vertex all of whose triangles have a 1 there is not looked at
+/// and gets 0; empty: every vertex is looked at. On the caller's TBB threads.
 std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
                                        const std::vector<Triangle>& triangles,
                                        const std::vector<std::uint8_t>& left_out = {});
@@ -41,7 +41,8 @@ struct SelfIntersections {
 /// Degenerate triangles are left out. Nothing where looking would take too long: more than two
 /// million triangles, or a soup in which the boxes of more than 50 million pairs, and of 600 a
 /// triangle, meet. Runs on the caller's TBB threads; the answer does not depend on their number.
-/// `known_apart`: [triangle] 1: two of these are known not to meet; none at all: nothing is known.
+/// `known_apart` [triangle]: no two triangles that have a 1 there meet, as the caller knows, and
+/// such pairs are not looked at; empty: nothing is known.
 std::optional<SelfIntersections> find_self_intersections(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
     const std::vector<std::uint8_t>& known_apart = {});

@@ -1,6 +1,5 @@
 #include "mesh/winding.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
@@ -35,45 +34,56 @@ void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossi
   std::sort(out.begin(), out.end(), comes_before);
 }
 
+namespace {
+
+/// Lines (y, z) by the square cells that they lie in, as many cells as lines.
+class LinesInCells {
+ public:
+  explicit LinesInCells(const std::vector<std::array<double, 2>>& lines)
+      : cells_(static_cast<std::size_t>(std::sqrt(static_cast<double>(lines.size()))) + 1),
+        lines_(cells_ * cells_, [&](const auto& visit) {
+          for (std::uint32_t i = 0; i < lines.size(); ++i)
+            visit(cell_of(lines[i][1]) * cells_ + cell_of(lines[i][0]), i);
+        }) {}
+
+  /// Calls visit(line) for all lines within the extents, and for some others.
+  template <class Visit>
+  void for_each(const Extent& y, const Extent& z, const Visit& visit) const {
+    const std::size_t left = cell_of(y.low), right = cell_of(y.high), last = cell_of(z.high);
+    for (std::size_t row = cell_of(z.low); row <= last; ++row) {
+      const std::uint32_t end = lines_.first[row * cells_ + right + 1];
+      for (std::uint32_t i = lines_.first[row * cells_ + left]; i < end; ++i)
+        visit(lines_.items[i]);
+    }
+  }
+
+ private:
+  /// Never falls as the coordinate grows.
+  std::size_t cell_of(const double x) const {
+    const auto n = static_cast<double>(cells_);
+    return static_cast<std::size_t>(std::clamp((x + 1) / 2 * n, 0.0, n - 1));
+  }
+
+  std::size_t cells_;  ///< along each side of the cube
+  ItemGroups<> lines_;
+};
+
+}  // namespace
+
 ItemGroups<std::uint32_t, Crossing> line_crossings(
     const MeshView& mesh, const std::vector<std::array<double, 2>>& lines) {
-  // The lines by square cells, as many as there are lines. A coordinate's cell never falls when it
-  // grows.
-  const auto cells = static_cast<std::size_t>(std::sqrt(static_cast<double>(lines.size()))) + 1;
-  const auto cell_of = [&](const double x) {
-    const double n = static_cast<double>(cells);
-    return static_cast<std::size_t>(std::clamp((x + 1) / 2 * n, 0.0, n - 1));
-  };
-  const ItemGroups<> lines_in(cells * cells, [&](const auto& visit) {
-    for (std::uint32_t i = 0; i < lines.size(); ++i)
-      visit(cell_of(lines[i][1]) * cells + cell_of(lines[i][0]), i);
-  });
+  const LinesInCells in_cells(lines);
   tbb::enumerable_thread_specific<std::vector<std::pair<std::uint32_t, Crossing>>> of_threads;
-  tbb::parallel_for(
-      tbb::blocked_range<std::uint32_t>(0, mesh.triangle_count), [&](const auto& triangles) {
-        auto& found = of_threads.local();
-        for (std::uint32_t triangle = triangles.begin(); triangle != triangles.end(); ++triangle) {
-          const Corners t = corners_of(mesh, triangle);
-          const auto low = [&](const int k) {
-            return std::min(std::min(t.p[0][k], t.p[1][k]), t.p[2][k]);
-          };
-          const auto high = [&](const int k) {
-            return std::max(std::max(t.p[0][k], t.p[1][k]), t.p[2][k]);
-          };
-          const double y_low = low(1), y_high = high(1), z_low = low(2), z_high = high(2);
-          const std::size_t left = cell_of(y_low), right = cell_of(y_high), last = cell_of(z_high);
-          for (std::size_t row = cell_of(z_low); row <= last; ++row) {
-            const std::uint32_t end = lines_in.first[row * cells + right + 1];
-            for (std::uint32_t i = lines_in.first[row * cells + left]; i < end; ++i) {
-              const std::uint32_t line = lines_in.items[i];
-              const double* const yz = lines[line].data();
-              if (yz[0] < y_low || yz[0] > y_high || yz[1] < z_low || yz[1] > z_high) continue;
-              const int facing = pierced(t, yz);
-              if (facing != 0) found.push_back({line, {crossing_x(t, yz), -facing}});
-            }
-          }
-        }
-      });
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](const std::uint32_t triangle) {
+    const Corners t = corners_of(mesh, triangle);
+    const Extent y(t, 1), z(t, 2);
+    in_cells.for_each(y, z, [&](const std::uint32_t line) {
+      const double* const yz = lines[line].data();
+      if (yz[0] < y.low || yz[0] > y.high || yz[1] < z.low || yz[1] > z.high) return;
+      const int facing = pierced(t, yz);
+      if (facing != 0) of_threads.local().push_back({line, {crossing_x(t, yz), -facing}});
+    });
+  });
   const auto each = [&](const auto& visit) {
     for (const auto& found : of_threads)
       for (const auto& [line, crossing] : found) visit(line, crossing);

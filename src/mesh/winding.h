@@ -21,8 +21,8 @@ int winding_number(const MeshView& mesh, const double p[3]);
 /// All crossings of the line (·, y, z), sorted by x, +1 first among equals.
 void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out);
 
-/// [line] The same of many lines (y, z), without the hierarchy, which costs more to build than some
-/// thousand lines do. On the caller's TBB threads.
+/// [line] The same of many lines (y, z). Needs the mesh's arrays alone: to build a hierarchy costs
+/// more than a few thousand lines do. On the caller's TBB threads.
 ItemGroups<std::uint32_t, Crossing> line_crossings(const MeshView& mesh,
                                                    const std::vector<std::array<double, 2>>& lines);
 

@@ -173,6 +173,39 @@ TEST(Judge, WhatWasDroppedCounts) {
   }
 }
 
+/// A box without its lid, flush with the axes or turned, and a block that floats above the opening:
+/// from the lid that is put on, what is nearest may be the block, which the lid does not touch.
+TEST(Judge, TellsHowFarWhatWasAddedLies) {
+  TriangleMesh open = box_mesh({-1, -1, -1}, {1, 1, 1});
+  std::erase_if(open.triangles, [&](const auto& t) {
+    return std::ranges::all_of(t, [&](const auto v) { return open.vertices[v].z() == 1; });
+  });
+  const Eigen::Vector3d low(-0.2, -0.2, 1.1), high(0.2, 0.2, 1.3);
+  const Eigen::AlignedBox3d block(low, high);
+  const TriangleMesh scene = joined(open, box_mesh(low, high));
+  double mean = 0, furthest = 0;
+  constexpr int kPlaces = 400;
+  for (int i = 0; i < kPlaces; ++i)
+    for (int k = 0; k < kPlaces; ++k) {
+      const double x = (2 * i + 1.0) / kPlaces - 1, y = (2 * k + 1.0) / kPlaces - 1;
+      const double to_walls = 1 - std::max(std::abs(x), std::abs(y));
+      const double distance = std::min(to_walls, block.exteriorDistance(Eigen::Vector3d(x, y, 1)));
+      mean += distance / (kPlaces * kPlaces);
+      furthest = std::max(furthest, distance);
+    }
+  const double lid_of_all = 4 / (24 + 2 * 0.16 + 4 * 0.08);
+  for (const double turn : {0.0, std::numbers::pi / 2, 0.3}) {
+    TriangleMesh turned = scene;
+    for (Eigen::Vector3d& v : turned.vertices)
+      v = Eigen::AngleAxisd(turn, Eigen::Vector3d(1, 2, 2) / 3) * v;
+    const RepairQuality judged =
+        close_mesh(turned, "box", OpenMeshPolicy::repair).report.judged.value();
+    EXPECT_NEAR(judged.made_mean, mean * lid_of_all, 0.02 * mean * lid_of_all) << turn;
+    EXPECT_NEAR(judged.made_max, furthest, 0.02) << turn;
+    EXPECT_EQ(judged.input_max, 0) << turn;
+  }
+}
+
 TEST(Judge, IsTheSameForAnyNumberOfThreads) {
   const TriangleMesh open = cut_above(icosphere_mesh(3), 0.5);
   const auto judged_by = [&](std::size_t threads) {
