@@ -90,18 +90,24 @@ void look_along(const std::vector<std::array<double, 3>>& points,
       }
 }
 
-UnitFrame frame_of(const TriangleMesh& soup) {
-  return unit_frame(bounds_of(soup.vertices, soup.triangles));
+/// The vertices in the unit frame of the triangles.
+std::vector<Eigen::Vector3d> unit_vertices(const TriangleMesh& soup) {
+  const UnitFrame frame = unit_frame(bounds_of(soup.vertices, soup.triangles));
+  const double scale = frame.scale();
+  std::vector<Eigen::Vector3d> unit(soup.vertices.size());
+  for (std::size_t v = 0; v < unit.size(); ++v) unit[v] = (soup.vertices[v] - frame.centre) / scale;
+  return unit;
 }
 
 /// What is seen of each patch from far away, along the three axes both ways.
-std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const UnitFrame& frame) {
+std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
+                        const std::vector<Eigen::Vector3d>& unit) {
   const std::uint32_t lines = lines_to_see(soup, patches);
   std::array<std::vector<Votes>, 3> along;
   tbb::parallel_for(0, 3, [&](const int axis) {
     std::vector<std::array<double, 3>> points(soup.vertices.size());
     for (std::size_t v = 0; v < points.size(); ++v) {
-      const Eigen::Vector3d x = frame.to_unit(soup.vertices[v]);
+      const Eigen::Vector3d& x = unit[v];
       points[v] = {x[axis], x[(axis + 1) % 3], x[(axis + 2) % 3]};
     }
     std::vector<Votes>& votes = along[static_cast<std::size_t>(axis)];
@@ -120,17 +126,17 @@ std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches, const U
 /// For each patch the volume between it and the middle of its area: > 0 where it bulges to its
 /// front. 0 where only rounding is left, as of a flat one.
 std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
-                           const UnitFrame& frame) {
+                           const std::vector<Eigen::Vector3d>& unit) {
   struct Sum {
     double area = 0, volume = 0, magnitude = 0;
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   };
   std::vector<Sum> sums(soup.triangles.size());
-  const auto corner = [&](std::uint32_t t, std::size_t k) {
-    return frame.to_unit(soup.vertices[soup.triangles[t][k]]);
+  const auto corner = [&](std::uint32_t t, std::size_t k) -> const Eigen::Vector3d& {
+    return unit[soup.triangles[t][k]];
   };
   for (std::uint32_t t = 0; t < soup.triangles.size(); ++t) {
-    const Eigen::Vector3d a = corner(t, 0), b = corner(t, 1), c = corner(t, 2);
+    const Eigen::Vector3d &a = corner(t, 0), &b = corner(t, 1), &c = corner(t, 2);
     const double area = (b - a).cross(c - a).norm();
     Sum& sum = sums[patches.find(t)];
     sum.area += area;
@@ -163,9 +169,9 @@ std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
 void orient_soup(TriangleMesh& soup, const EdgeTable& edges) {
   make_consistent(soup.triangles, manifold_partners(edges));
   DisjointSets patches = connected_pieces(edges, 2);
-  const UnitFrame frame = frame_of(soup);
-  const std::vector<Votes> votes = look(soup, patches, frame);
-  const std::vector<double> bulge = bulges(soup, patches, frame);
+  const std::vector<Eigen::Vector3d> unit = unit_vertices(soup);
+  const std::vector<Votes> votes = look(soup, patches, unit);
+  const std::vector<double> bulge = bulges(soup, patches, unit);
   // Lines by which a patch shows its front more than its back, or as it bulges.
   const auto in_favour = [&](std::uint32_t patch) {
     const auto [fronts, backs] = votes[patch];
@@ -278,7 +284,7 @@ std::unique_ptr<MeshSolid> triangles_as_solid(TriangleMesh mesh) {
 std::vector<bool> inner_walls(const TriangleMesh& soup, DisjointSets& patches,
                               const std::vector<bool>& asked) {
   constexpr double kSolid = 0.75;
-  const std::vector<Votes> votes = look(soup, patches, frame_of(soup));
+  const std::vector<Votes> votes = look(soup, patches, unit_vertices(soup));
   std::vector<bool> inner(soup.triangles.size(), false);
   TriangleMesh rest = {soup.vertices, {}, {}};
   for (std::uint32_t t = 0; t < inner.size(); ++t) {

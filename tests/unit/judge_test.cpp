@@ -134,6 +134,32 @@ TEST(OutwardWinding, TurnsWhatFacesInward) {
   EXPECT_GT(OutwardWinding(apart).at({0.1, 0.2, 0.1}), 0.9);
 }
 
+/// Several sheets above each other are seen with more than a half from beside them.
+TEST(TriangleWinding, IsLessThanHalfWhereItSaysSo) {
+  std::mt19937_64 random(8);
+  TriangleMesh sheets;
+  for (const double z : {0.0, 0.05, 0.1, 0.15, 0.2}) {
+    TriangleMesh sheet = box_mesh({-1, -1, z - 1}, {1, 1, z});
+    std::erase_if(sheet.triangles, [&](const auto& t) {
+      return std::ranges::any_of(t, [&](const auto v) { return sheet.vertices[v].z() != z; });
+    });
+    sheets = joined(sheets, sheet);
+  }
+  const TriangleWinding winding(sheets);
+  int said = 0, more = 0;
+  for (int i = 0; i < 4000; ++i) {
+    Eigen::Vector3d x;
+    for (double& at : x) at = 8 * uniform(random) - 4;
+    if (i % 2 == 0) x.x() = x.y() = 0;  // right above or below the middle
+    const bool is_less = std::abs(winding.at(x)) < 0.5;
+    said += winding.surely_less_than_half(x) ? 1 : 0;
+    more += is_less ? 0 : 1;
+    EXPECT_TRUE(is_less || !winding.surely_less_than_half(x)) << x.transpose();
+  }
+  EXPECT_GT(said, 1000);
+  EXPECT_GT(more, 500);
+}
+
 TEST(Judge, AClosedMeshAgreesWithItself) {
   const ClosedMesh gear = close_mesh(make_sample("gear"), "gear");
   const RepairQuality judged = judge(gear.mesh, gear, TwoMeshes(gear.mesh, gear.mesh), kKept);
@@ -203,6 +229,19 @@ TEST(Judge, TellsHowFarWhatWasAddedLies) {
     EXPECT_NEAR(judged.made_mean, mean * lid_of_all, 0.02 * mean * lid_of_all) << turn;
     EXPECT_NEAR(judged.made_max, furthest, 0.02) << turn;
     EXPECT_EQ(judged.input_max, 0) << turn;
+  }
+}
+
+/// What was made lacks one of two equal boxes, which lie flush, a corner on a corner, or apart.
+TEST(Judge, CountsVolumeThatWasNotMade) {
+  const TriangleMesh box = box_mesh({-1, -1, -1}, {1, 1, 1});
+  const ClosedMesh made = close_mesh(box, "box");
+  for (const Eigen::Vector3d& low : {Eigen::Vector3d(1, -1, -1), Eigen::Vector3d(-1, -1, 1),
+                                     Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1.7, 0.3, -0.4)}) {
+    const TriangleMesh two = joined(box, box_mesh(low, low + Eigen::Vector3d::Constant(2)));
+    const RepairQuality judged = judge(two, made, TwoMeshes(two, made.mesh), kKept);
+    EXPECT_NEAR(judged.volume_ratio, 2, 0.05) << low.transpose();
+    EXPECT_NEAR(judged.agreement, 0.5, 0.02) << low.transpose();
   }
 }
 
