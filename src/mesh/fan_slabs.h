@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -57,6 +58,31 @@ struct Slab {
   }
 };
 
+/// The corners of up to eight triangles, and two planes that have all of them behind: of their
+/// planes those that most nearly bound them. Needles side by side, as the walls of a star, lie
+/// between such planes like the slice of a cake, and boxes of slices meet near the tip.
+struct Slice {
+  static constexpr std::size_t kCorners = 24;
+  float corner[3][kCorners];  ///< in [0, 1]
+  float normal[2][3], reach[2];
+
+  /// One of either's planes has the other before it.
+  bool apart_from(const Slice& other) const { return other.is_before(*this) || is_before(other); }
+
+ private:
+  bool is_before(const Slice& other) const {
+    constexpr float kRounding = 1e-6f;  // of coordinates within [0, 1], and of their products
+    for (int i = 0; i < 2; ++i) {
+      const float* const n = other.normal[i];
+      float least = HUGE_VALF;
+      for (std::size_t k = 0; k < kCorners; ++k)
+        least = std::min(least, n[0] * corner[0][k] + n[1] * corner[1][k] + n[2] * corner[2][k]);
+      if (least > other.reach[i] + kRounding) return true;
+    }
+    return false;
+  }
+};
+
 /// [triangle] The corner with the most triangles, if these are many; nothing at all if none has.
 std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std::size_t vertices);
 
@@ -65,5 +91,9 @@ std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
              std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
              const std::vector<std::uint32_t>& spread, double margin);
+
+/// `group`: one to eight triangles. Planes lie further out by `margin`.
+Slice slice_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+               std::span<const std::uint32_t> group, double margin);
 
 }  // namespace ist

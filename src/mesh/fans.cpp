@@ -186,4 +186,43 @@ Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& tr
   return slab;
 }
 
+Slice slice_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+               const std::span<const std::uint32_t> group, const double margin) {
+  Slice slice;
+  Eigen::Matrix<double, 3, Slice::kCorners> corners;
+  for (std::size_t c = 0; c < Slice::kCorners; ++c)
+    for (std::size_t k = 0; k < 3; ++k) {
+      slice.corner[k][c] = points[triangles[group[c / 3 % group.size()]][c % 3]][k];
+      corners(Eigen::Index(k), Eigen::Index(c)) = double{slice.corner[k][c]};
+    }
+  struct Plane {
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    double reach = HUGE_VAL, beyond = HUGE_VAL;  ///< of the group; past the triangle
+  };
+  std::vector<Plane> planes;
+  for (Eigen::Index t = 0; t < Eigen::Index(group.size()); ++t) {
+    const Eigen::Vector3d a = corners.col(3 * t);
+    const Eigen::Vector3d n = (corners.col(3 * t + 1) - a).cross(corners.col(3 * t + 2) - a);
+    if (!(n.squaredNorm() > 0)) continue;
+    for (const double side : {1.0, -1.0}) {
+      const Eigen::Vector3d normal = side * n.normalized();
+      const double reach = (normal.transpose() * corners).maxCoeff();
+      planes.push_back({normal, reach, reach - normal.dot(a)});
+    }
+  }
+  const auto nearest = [&](const Eigen::Vector3d& against) {
+    Plane best;
+    for (const Plane& plane : planes)
+      if (plane.normal.dot(against) <= 0 && plane.beyond < best.beyond) best = plane;
+    return best;
+  };
+  const Plane first = nearest(Eigen::Vector3d::Zero()), second = nearest(first.normal);
+  for (const int i : {0, 1}) {
+    const Plane& plane = i == 0 ? first : second;
+    for (int k = 0; k < 3; ++k) slice.normal[i][k] = static_cast<float>(plane.normal[k]);
+    slice.reach[i] = static_cast<float>(plane.reach + margin);
+  }
+  return slice;
+}
+
 }  // namespace ist

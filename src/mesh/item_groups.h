@@ -40,6 +40,7 @@ struct ItemGroups {
     return made;
   }
 
+  std::size_t size() const { return first.size() - 1; }
   std::span<const Item> operator[](std::size_t group) const {
     return {items.data() + first[group], items.data() + first[group + 1]};
   }

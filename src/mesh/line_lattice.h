@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 
 #include "mesh/item_groups.h"
 #include "mesh/mesh_view.h"
@@ -105,11 +106,15 @@ IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t,
   return {crossing_x(t, yz), -facing};
 }
 
-/// The crossings of every line, in order: line (i, j) is group j ny + i.
-using LatticeCrossings = ItemGroups<std::uint32_t, Crossing>;
+/// The crossings of some rows' lines, in order, a group a line.
+using LatticeCrossings = ItemGroups<std::uint64_t, Crossing>;
 
-/// All crossings of a mesh (its arrays suffice) with a lattice. Runs on the caller's TBB threads.
-LatticeCrossings cross_lattice(const MeshView& mesh, const LineLattice& lattice);
+/// All crossings of a mesh (its arrays suffice) with a lattice: calls visit(j, crossings) for rows
+/// j and on, line (i, j + k) is group k ny + i, until all rows were visited. There are some 16
+/// million crossings at once, or those of a row; the lines of needles have billions. Runs on the
+/// caller's TBB threads.
+void cross_lattice(const MeshView& mesh, const LineLattice& lattice,
+                   const std::function<void(std::uint32_t, const LatticeCrossings&)>& visit);
 
 /// Calls visit(line, crossing) for every crossing of a triangle with row j.
 template <class Visit>

@@ -101,10 +101,12 @@ class ExcessIntegral {
     lattice_.ny = lattice_.nz = 2 * kIntervals + 1;
     const bool flat = !(lattice_.step_y > 0 && lattice_.step_z > 0);
     if (flat) return;
-    const LatticeCrossings lines = cross_lattice(arrays, lattice_);
     at_line_.resize(lattice_.lines());
-    tbb::parallel_for(std::size_t{0}, at_line_.size(),
-                      [&](std::size_t line) { at_line_[line] = line_excess(lines[line]); });
+    cross_lattice(arrays, lattice_, [&](const std::uint32_t row, const LatticeCrossings& lines) {
+      tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t line) {
+        at_line_[std::size_t{row} * lattice_.ny + line] = line_excess(lines[line]);
+      });
+    });
   }
 
   double plane() const { return size(1) * size(2); }

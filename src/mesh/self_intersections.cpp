@@ -120,6 +120,7 @@ class TriangleBoxes {
     if (!slabs_.empty()) {
       const Slab &slab_a = slabs_[level][a], &slab_b = slabs_[level][b];
       if (slab_a.apart_about_owner(slab_b) || slab_a.apart_from(slab_b)) return;
+      if (level == 0 && slices_[a].apart_from(slices_[b])) return;
     }
     const EightBoxes &of_a = levels_[level][a], &of_b = levels_[level][b];
     unsigned near_b = of_a.met_by(levels_[level + 1][b / 8], b % 8);
@@ -145,6 +146,7 @@ class TriangleBoxes {
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
   /// Of the nodes up to the starting level, where there are large fans or needles; or none at all.
   std::vector<std::vector<Slab>> slabs_;
+  std::vector<Slice> slices_;  ///< of level 0, with slabs
   /// [level][node] Bit k: box k holds a triangle that is not marked. Or none at all.
   std::vector<std::vector<std::uint8_t>> wanted_;
 };
@@ -264,6 +266,13 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                             owners, spread, double{wider});
     });
   }
+  slices_.resize(levels_[0].size());
+  tbb::parallel_for(std::size_t{0}, slices_.size(), [&](const std::size_t node) {
+    const std::span<const std::uint32_t> all(order_);
+    slices_[node] = slice_of(points, triangles,
+                             all.subspan(8 * node, std::min<std::size_t>(8, all.size() - 8 * node)),
+                             double{wider});
+  });
 }
 
 void TriangleBoxes::leave_out(const std::vector<std::uint8_t>& marked) {
@@ -314,7 +323,7 @@ constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 10'000'000;
 
 /// The boxes of needles meet those of many others.
 constexpr std::size_t most_candidates(const std::size_t triangles) {
-  return std::max(std::size_t{50'000'000}, 600 * triangles);
+  return std::max(std::size_t{100'000'000}, 1000 * triangles);
 }
 
 /// What the parts of a search add to. Integers only: their sums do not depend on the order.

@@ -329,28 +329,47 @@ TEST(SelfIntersections, OfFansInOnePlane) {
   }
 }
 
-TEST(SelfIntersections, OfASunburst) {
-  // Long walls in all directions, whose boxes along the axes meet each other.
-  for (const std::uint32_t n : {60u, 20'000u}) {
-    TriangleMesh walls;
-    for (const double z : {0.0, 0.1})
-      for (std::uint32_t i = 0; i < n; ++i) {
-        const double angle = 2 * 3.14159265358979 * i / n, radius = i % 2 == 0 ? 1 : 0.2;
-        walls.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
-      }
+/// Walls of n sides in all directions, whose boxes along the axes meet each other.
+TriangleMesh sunburst(const std::uint32_t n, const double height) {
+  TriangleMesh walls;
+  for (const double z : {0.0, height})
     for (std::uint32_t i = 0; i < n; ++i) {
-      const std::uint32_t j = (i + 1) % n;
-      walls.triangles.push_back({i, j, n + j});
-      walls.triangles.push_back({i, n + j, n + i});
+      const double angle = 2 * 3.14159265358979 * i / n, radius = i % 2 == 0 ? 1 : 0.1;
+      walls.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
     }
-    if (n < 1'000) {
-      expect_all_found(walls);
-      continue;
-    }
-    const auto none = find_self_intersections(walls.vertices, walls.triangles);
-    ASSERT_TRUE(none);
-    EXPECT_EQ(none->count, 0u);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t j = (i + 1) % n;
+    walls.triangles.push_back({i, j, n + j});
+    walls.triangles.push_back({i, n + j, n + i});
   }
+  return walls;
+}
+
+TEST(SelfIntersections, OfASunburst) {
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.3, -0.5, 0.2, 0.8).normalized();
+  for (const bool turned : {false, true}) {
+    SCOPED_TRACE(turned);
+    const auto placed = [&](TriangleMesh mesh) {
+      for (Eigen::Vector3d& v : mesh.vertices)
+        if (turned) v = turn * v;
+      return mesh;
+    };
+    expect_all_found(placed(sunburst(60, 1)));
+    // Needles that cross others, a little and a lot.
+    for (const double by : {1e-3, 0.37}) {
+      const Eigen::AngleAxisd off(by * 2 * 3.14159265358979 / 80, Eigen::Vector3d(0.1, 0, 1));
+      TriangleMesh other = sunburst(80, 0.005);
+      for (Eigen::Vector3d& v : other.vertices) v = off * v + Eigen::Vector3d(0, 0, 0.004);
+      const TriangleMesh two = placed(testing::joined(sunburst(80, 0.005), other));
+      expect_all_found(two);
+      EXPECT_GT(find_self_intersections(two.vertices, two.triangles)->count, 50u);
+    }
+  }
+  TriangleMesh large = sunburst(24'000, 1);
+  for (Eigen::Vector3d& v : large.vertices) v = turn * v;
+  const auto none = find_self_intersections(large.vertices, large.triangles);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->count, 0u);
 }
 
 TEST(SelfIntersections, FansInOnePlaneAreOneSolid) {

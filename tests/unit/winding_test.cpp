@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mesh/exact_sign.h"
+#include "mesh/line_lattice.h"
 #include "mesh/winding.h"
 #include "support/test_meshes.h"
 
@@ -199,6 +200,38 @@ TEST(LineCrossings, IntegrateToTheVolume) {
     }
   }
   EXPECT_NEAR(sum * 4 / (kLines * kLines), solid.unit_volume(), 1e-3 * solid.unit_volume());
+}
+
+// More crossings than are found at once: their parts join without a gap.
+TEST(LatticeCrossings, AllRowsOfManyLines) {
+  ist::TriangleMesh tubes;
+  for (int k = 0; k < 20; ++k) tubes = joined(tubes, torus_mesh(2, 0.7 - 0.01 * k, 60, 30));
+  const MeshSolid solid(closed(tubes, "tubes"));
+  ist::LineLattice lattice;
+  lattice.y0 = -0.68;
+  lattice.z0 = -0.18;
+  lattice.ny = lattice.nz = 700;
+  lattice.step_y = 1.36 / lattice.ny;
+  lattice.step_z = 0.36 / lattice.nz;
+  lattice.offset = 0.5;
+  std::uint32_t next = 0, parts = 0;
+  std::vector<Crossing> expected;
+  ist::cross_lattice(solid.arrays(), lattice,
+                     [&](const std::uint32_t row, const ist::LatticeCrossings& lines) {
+                       EXPECT_EQ(row, next);
+                       next += static_cast<std::uint32_t>(lines.size() / lattice.ny);
+                       ++parts;
+                       for (const std::size_t line : {std::size_t{500}, lines.size() - 500}) {
+                         const std::uint32_t j = row + std::uint32_t(line / lattice.ny);
+                         const std::uint32_t i = std::uint32_t(line % lattice.ny);
+                         line_crossings(solid.view(), lattice.y(i, j), lattice.z(j), expected);
+                         ASSERT_EQ(lines[line].size(), expected.size());
+                         for (std::size_t k = 0; k < expected.size(); ++k)
+                           EXPECT_EQ(lines[line][k].x, expected[k].x);
+                       }
+                     });
+  EXPECT_EQ(next, lattice.nz);
+  EXPECT_GT(parts, 1u);
 }
 
 /// Points on and beside the line through (12, 12) and (24, 24), a hair apart: against integers.

@@ -211,20 +211,19 @@ std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
   lattice.step_z = sizes.z() / lattice.nz;
   lattice.offset = kGoldenRatio / 2;
   lattice.shift = kGoldenRatio;
-  const LatticeCrossings all = cross_lattice(solid.arrays(), lattice);
-
   // Along the lines, so that each stands for as much as a cell of the wanted step.
   const double along = step * step * step / (lattice.step_y * lattice.step_z);
   std::vector<Vector3d> points;
   double turned = 0;  // of the first point of a line, over the step
-  for (std::uint32_t j = 0; j < lattice.nz; ++j)
-    for (std::uint32_t i = 0; i < lattice.ny; ++i) {
+  cross_lattice(solid.arrays(), lattice, [&](std::uint32_t row, const LatticeCrossings& cut) {
+    for (std::size_t line = 0; line < cut.size(); ++line) {
+      const auto i = static_cast<std::uint32_t>(line % lattice.ny);
+      const auto j = row + static_cast<std::uint32_t>(line / lattice.ny);
       turned += kGoldenRatio;
       turned -= std::floor(turned);
       int winding = 0;
       double since = 0;
-      const std::size_t line = std::size_t{j} * lattice.ny + i;
-      for (const Crossing& crossing : all[line]) {
+      for (const Crossing& crossing : cut[line]) {
         if (winding >= 1)
           for (double k = std::ceil((since - low.x()) / along - turned);
                low.x() + (k + turned) * along < crossing.x; ++k)
@@ -234,6 +233,7 @@ std::vector<Vector3d> inner_points(const MeshSolid& solid, std::size_t count) {
         since = crossing.x;
       }
     }
+  });
   return points;
 }
 

@@ -66,27 +66,30 @@ ColumnPlan plan_columns(const MeshSolid& solid, double step, double min_columns,
 
 ColumnLattice cut_columns(const MeshSolid& solid, const ColumnPlan& plan) {
   ColumnLattice lattice{plan, {}, {}, 0};
-  const LatticeCrossings cut = cross_lattice(solid.arrays(), plan.lines);
-  const std::size_t lines = plan.lines.lines();
-  lattice.first.resize(lines + 1);
-  const auto for_spans_of = [&](std::size_t line, const auto& add) {
-    for_spans(cut[line].data(), static_cast<std::uint32_t>(cut[line].size()), add);
-  };
+  lattice.first = {0};
   std::uint64_t length = 0;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines), [&](const auto& range) {
-    std::uint64_t part = 0;
-    for (std::size_t line = range.begin(); line != range.end(); ++line)
-      for_spans_of(line, [&](const ColumnSpan& span) {
-        ++lattice.first[line + 1];
-        part += length_units(span);
-      });
-    std::atomic_ref<std::uint64_t>(length).fetch_add(part, std::memory_order_relaxed);
-  });
-  for (std::size_t line = 0; line < lines; ++line) lattice.first[line + 1] += lattice.first[line];
-  lattice.spans.resize(lattice.first.back());
-  tbb::parallel_for(std::size_t{0}, lines, [&](std::size_t line) {
-    std::uint32_t next = lattice.first[line];
-    for_spans_of(line, [&](const ColumnSpan& span) { lattice.spans[next++] = span; });
+  cross_lattice(solid.arrays(), plan.lines, [&](std::uint32_t, const LatticeCrossings& cut) {
+    const auto for_spans_of = [&](std::size_t line, const auto& add) {
+      for_spans(cut[line].data(), static_cast<std::uint32_t>(cut[line].size()), add);
+    };
+    const std::size_t before = lattice.first.size() - 1, lines = cut.size();
+    lattice.first.resize(before + lines + 1);
+    std::uint32_t* const first = &lattice.first[before];
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, lines), [&](const auto& range) {
+      std::uint64_t part = 0;
+      for (std::size_t line = range.begin(); line != range.end(); ++line)
+        for_spans_of(line, [&](const ColumnSpan& span) {
+          ++first[line + 1];
+          part += length_units(span);
+        });
+      std::atomic_ref<std::uint64_t>(length).fetch_add(part, std::memory_order_relaxed);
+    });
+    for (std::size_t line = 0; line < lines; ++line) first[line + 1] += first[line];
+    lattice.spans.resize(first[lines]);
+    tbb::parallel_for(std::size_t{0}, lines, [&](std::size_t line) {
+      std::uint32_t next = first[line];
+      for_spans_of(line, [&](const ColumnSpan& span) { lattice.spans[next++] = span; });
+    });
   });
   lattice.length = static_cast<double>(length) * kLengthUnit;
   return lattice;
