@@ -135,6 +135,14 @@ ist_status_t ist_scene_get_patches(const ist_scene_t* scene, const ist_scene_pai
  * are passed. `hit_size`: sizeof(ist_ray_hit_t). */
 ist_status_t ist_scene_raycast(const ist_scene_t* scene, const ist_ray_t* rays, size_t count,
                                uint32_t* numbers, ist_ray_hit_t* hits, size_t hit_size);
+/* The body nearest to each point, where bodies stand now: that of the least signed distance;
+ * equally near ones: the lowest number. `points`: [3 · count]. `numbers`, `answers`: [count]; the
+ * distance is infinite where no body is within `max_distance` [u], which may be infinite. Bodies
+ * that ist_closest_point() does not support are passed. `answer_size`: sizeof(ist_surface_point_t).
+ */
+ist_status_t ist_scene_nearest(const ist_scene_t* scene, const double* points, size_t count,
+                               double max_distance, uint32_t* numbers, ist_surface_point_t* answers,
+                               size_t answer_size);
 /* Bodies whose boxes meet a box [u], in no order. `count`: how many there are; the first `capacity`
  * of them are written. `numbers` may be null if that is 0. */
 ist_status_t ist_scene_in_box(const ist_scene_t* scene, const double lower[3],

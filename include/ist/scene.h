@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -90,6 +91,12 @@ struct SceneHit {
   RayHit hit;
 };
 
+struct SceneNearest {
+  std::uint32_t number = 0;  ///< of the body, if there is one
+  /// An infinite distance: no body is near enough.
+  SurfacePoint surface = {.distance = std::numeric_limits<double>::infinity()};
+};
+
 /// Many solids, and which of them meet: a broad phase over the queries of pairs, and no more.
 /// Bodies, islands, sleeping and solving stay with the host.
 ///
@@ -158,6 +165,13 @@ class Scene {
   /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.
   /// Bodies that rays do not support (<ist/raycast.h>) and those that are refused are passed.
   SceneHit raycast(const Ray& ray) const noexcept;
+  /// The body nearest to a point, where bodies stand now: that of the least signed distance, so of
+  /// those that hold the point the one in which it lies deepest; equally near ones: the lowest
+  /// number. Bodies beyond `max_distance` [u], those that closest_point() does not support and
+  /// those that are refused are passed.
+  SceneNearest nearest(
+      const Eigen::Vector3d& point,
+      double max_distance = std::numeric_limits<double>::infinity()) const noexcept;
   /// Bodies whose boxes meet a box [u], in no order: how many there are; as many as fit are
   /// written.
   std::size_t in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,

@@ -290,6 +290,23 @@ ist_status_t ist_scene_raycast(const ist_scene_t* scene, const ist_ray_t* rays, 
   });
 }
 
+ist_status_t ist_scene_nearest(const ist_scene_t* scene, const double* points, size_t count,
+                               double max_distance, uint32_t* numbers, ist_surface_point_t* answers,
+                               size_t answer_size) {
+  if (answer_size != sizeof(ist_surface_point_t)) return IST_WRONG_SIZE;
+  return with_scene(scene, [&](const OwnedScene& all) -> ist_status_t {
+    if (count > 0 && (points == nullptr || numbers == nullptr || answers == nullptr))
+      return IST_NULL_POINTER;
+    for (std::size_t i = 0; i < count; ++i) {
+      const ist::SceneNearest found =
+          all.scene.nearest(Eigen::Vector3d(points + 3 * i), max_distance);
+      numbers[i] = found.number;
+      write(found.surface, answers[i]);
+    }
+    return IST_OK;
+  });
+}
+
 ist_status_t ist_scene_in_box(const ist_scene_t* scene, const double lower[3],
                               const double upper[3], uint32_t* numbers, size_t capacity,
                               size_t* count) {

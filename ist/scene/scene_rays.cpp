@@ -43,6 +43,34 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
   return best;
 }
 
+SceneNearest Scene::nearest(const Eigen::Vector3d& point,
+                            const double max_distance) const noexcept {
+  SceneNearest best;
+  if (!point.allFinite()) return best;
+  double farthest = max_distance;
+  const auto enter = [&](const SceneBox& box) {
+    Eigen::Vector3d off;
+    for (int k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      off[k] = std::max({0.0, box.low[i] - point[k], point[k] - box.high[i]});
+    }
+    // A body that holds the point is in a box that holds it.
+    return off.stableNorm() <= std::max(farthest, 0.0) * (1 + 1e-9);
+  };
+  const auto visit = [&](std::uint32_t i) {
+    const auto& body = impl_->bodies[i];
+    const SurfacePoint here = closest_point(body.given.solid, point);
+    if (here.status != QueryStatus::ok || !(here.distance <= farthest)) return;
+    if (here.distance == best.surface.distance && body.given.number > best.number) return;
+    best = {body.given.number, here};
+    farthest = here.distance;
+  };
+  for (const std::uint32_t i : impl_->endless) visit(i);
+  impl_->still.each(enter, visit);
+  impl_->moving.each(enter, visit);
+  return best;
+}
+
 std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                           std::span<std::uint32_t> numbers) const noexcept {
   const SceneBox box = box_around(lower, upper);

@@ -277,8 +277,19 @@ class SceneStep:
     overlapping: Final[NDArray[np.uint32]]  # (n,) YesNo, where the rule is 'overlap'
     penetration: Final[Penetration]  # n rows
     separation: Final[Separation]  # n rows
+    impact: Final[TimeOfImpact]  # n rows, where the rule is 'impact'
     ended: Final[NDArray[np.uint32]]  # (m, 2)
     refused: Final[NDArray[np.uint32]]  # (k,)
+
+@final
+class SceneHits:
+    number: Final[_Count]  # (n,) of the body; 0 without a hit
+    hit: Final[RayHits]  # n rows
+
+@final
+class ScenePoints:
+    number: Final[_Count]  # (n,) of the body; 0 where none is near enough
+    surface: Final[SurfacePoints]  # n rows; distance inf where none is near enough
 
 class Scene:
     def __init__(
@@ -293,11 +304,21 @@ class Scene:
     def remove(self, number: int) -> None: ...
     def set_rule(
         self, group_a: int = 0, group_b: int = 0, *,
-        answer: Literal["nothing", "boxes", "overlap", "penetration"] = "penetration",
+        answer: Literal["nothing", "boxes", "overlap", "penetration", "impact"] = "penetration",
         measure: _Measure = "matched",
         spheres_only: bool = False, margin: float = 0.0,
         pair_budget: int = 0, max_visits: int = 0, relative_error: float = 0.0,
+        duration: float = 1.0, tolerance: float = 0.0,
     ) -> None: ...
+    def set_motions(
+        self, velocities: ArrayLike, *, numbers: ArrayLike | None = None,
+        about: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None: ...
+    def raycast(
+        self, origins: ArrayLike, directions: ArrayLike, *, max_distance: float = ...,
+    ) -> SceneHits: ...
+    def nearest(self, points: ArrayLike, *, max_distance: float = ...) -> ScenePoints: ...
+    def in_box(self, lower: ArrayLike, upper: ArrayLike) -> NDArray[np.uint32]: ...
     def exclude(self, a: int, b: int) -> None: ...
     def include(self, a: int, b: int) -> None: ...
     def record(self) -> bytes: ...

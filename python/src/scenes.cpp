@@ -2,6 +2,8 @@
 #include <ist/scene.h>
 #include <ist/types.h>
 
+#include <algorithm>
+#include <limits>
 #include <map>
 #include <memory>
 #include <thread>
@@ -9,8 +11,10 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/unique_ptr.h>
 
+#include "impacts.h"
 #include "penetration.h"
 #include "separation.h"
+#include "surfaces.h"
 
 namespace ist::python {
 namespace {
@@ -19,7 +23,8 @@ constexpr std::pair<const char*, SceneAnswer> kAnswers[] = {
     {"nothing", SceneAnswer::nothing},
     {"boxes", SceneAnswer::boxes},
     {"overlap", SceneAnswer::overlap},
-    {"penetration", SceneAnswer::penetration}};
+    {"penetration", SceneAnswer::penetration},
+    {"impact", SceneAnswer::impact}};
 
 struct PyScene {
   explicit PyScene(Scene made) : scene(std::move(made)) {}
@@ -37,6 +42,19 @@ struct SceneAnswers {
   Column<std::uint32_t> overlapping{rows}, refused{};
   std::shared_ptr<Penetrations> penetration{};
   std::shared_ptr<Separations> separation{};
+  std::shared_ptr<Impacts> impact{};
+};
+
+/// What rays and points find, and of which bodies.
+struct SceneHits {
+  Shape rows;
+  Column<std::uint32_t> number{rows};
+  std::shared_ptr<RayHits> hit{};
+};
+struct ScenePoints {
+  Shape rows;
+  Column<std::uint32_t> number{rows};
+  std::shared_ptr<SurfacePoints> surface{};
 };
 
 Pose pose_at(const double* row) {
@@ -46,24 +64,22 @@ Pose pose_at(const double* row) {
   return pose;
 }
 
-void set_poses(PyScene& self, const py::object& poses, const py::object& numbers) {
-  const Doubles rows = take_poses(poses, "poses", "(n, 7) or (n, 4, 4)");
-  const std::size_t count = rows.size() / 7;
-  std::vector<Pose> to(count);
-  for (std::size_t i = 0; i < count; ++i) to[i] = pose_at(rows.data() + 7 * i);
+/// The bodies that `count` rows of `name` are for: `numbers`, or all that move, by number.
+std::vector<std::uint32_t> bodies_of(const PyScene& self, const std::size_t count,
+                                     const std::string& name, const py::object& numbers) {
   std::vector<std::uint32_t> of;
   if (numbers.is_none()) {
     for (const auto& [number, owner] : self.owners)
       if (self.scene.body(number)->moves) of.push_back(number);
     if (of.size() != count)
-      throw value_error("poses: " + std::to_string(count) + " rows; wanted " +
+      throw value_error(name + ": " + std::to_string(count) + " rows; wanted " +
                         std::to_string(of.size()) +
                         ", one for each body that moves, by number, or give numbers=");
   } else {
     const Integers given = take_integers(numbers, "numbers", "(n,)");
     if (given.size() != count)
       throw value_error("numbers: " + std::to_string(given.size()) + " for " +
-                        std::to_string(count) + " poses");
+                        std::to_string(count) + " rows of " + name);
     for (std::size_t i = 0; i < count; ++i) {
       const std::int64_t number = given.data()[i];
       if (number < 0 || self.owners.count(static_cast<std::uint32_t>(number)) == 0)
@@ -71,7 +87,68 @@ void set_poses(PyScene& self, const py::object& poses, const py::object& numbers
       of.push_back(static_cast<std::uint32_t>(number));
     }
   }
-  self.scene.set_poses(of, to);
+  return of;
+}
+
+void set_poses(PyScene& self, const py::object& poses, const py::object& numbers) {
+  const Doubles rows = take_poses(poses, "poses", "(n, 7) or (n, 4, 4)");
+  std::vector<Pose> to(rows.size() / 7);
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] = pose_at(rows.data() + 7 * i);
+  self.scene.set_poses(bodies_of(self, to.size(), "poses", numbers), to);
+}
+
+void set_motions(PyScene& self, const py::object& velocities, const py::object& numbers,
+                 const py::object& about) {
+  const Doubles rows = take_doubles(velocities, "velocities", "(n, 6)");
+  if (rows.ndim() != 2 || rows.shape(1) != 6) refuse_shape(rows, "velocities", "(n, 6)");
+  const Places points(about, "about");
+  std::vector<Motion> to(rows.shape(0));
+  if (!points.rows.empty() && points.count != to.size())
+    throw value_error("about: " + std::to_string(points.count) + " rows; velocities have " +
+                      std::to_string(to.size()));
+  for (std::size_t i = 0; i < to.size(); ++i)
+    to[i] = {Eigen::Vector3d(rows.data() + 6 * i), Eigen::Vector3d(rows.data() + 6 * i + 3),
+             points.at(i)};
+  self.scene.set_motions(bodies_of(self, to.size(), "velocities", numbers), to);
+}
+
+std::unique_ptr<SceneHits> cast_rays(const PyScene& self, const py::object& origins,
+                                     const py::object& directions, const double max_distance) {
+  const Places from(origins, "origins"), along(directions, "directions");
+  auto out = std::make_unique<SceneHits>(SceneHits{rows_of(from, along)});
+  out->hit = std::make_shared<RayHits>(RayHits{out->rows});
+  const py::gil_scoped_release free;
+  for (std::size_t i = 0; i < std::max(from.count, along.count); ++i) {
+    const SceneHit found = self.scene.raycast(Ray{from.at(i), along.at(i), max_distance});
+    out->number.write(i, found.number);
+    write_row(*out->hit, i, found.hit);
+  }
+  return out;
+}
+
+std::unique_ptr<ScenePoints> nearest(const PyScene& self, const py::object& points,
+                                     const double max_distance) {
+  const Places places(points, "points");
+  auto out = std::make_unique<ScenePoints>(ScenePoints{places.rows});
+  out->surface = std::make_shared<SurfacePoints>(SurfacePoints{out->rows});
+  const py::gil_scoped_release free;
+  for (std::size_t i = 0; i < places.count; ++i) {
+    const SceneNearest found = self.scene.nearest(places.at(i), max_distance);
+    out->number.write(i, found.number);
+    write_row(*out->surface, i, found.surface);
+  }
+  return out;
+}
+
+Column<std::uint32_t> in_box(const PyScene& self, const py::object& lower,
+                             const py::object& upper) {
+  std::vector<std::uint32_t> numbers(self.scene.size());
+  numbers.resize(
+      self.scene.in_box(take_vector(lower, "lower"), take_vector(upper, "upper"), numbers));
+  std::sort(numbers.begin(), numbers.end());
+  Column<std::uint32_t> out({numbers.size()});
+  for (std::size_t i = 0; i < numbers.size(); ++i) out.write(i, numbers[i]);
+  return out;
 }
 
 std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
@@ -91,6 +168,7 @@ std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
   auto out = std::make_shared<SceneAnswers>(SceneAnswers{{found.pairs.size()}});
   out->penetration = std::make_shared<Penetrations>(Penetrations{out->rows});
   out->separation = std::make_shared<Separations>(Separations{out->rows});
+  out->impact = std::make_shared<Impacts>(Impacts{out->rows});
   for (std::size_t i = 0; i < found.pairs.size(); ++i) {
     const ScenePair& pair = found.pairs[i];
     out->pairs.row(i)[0] = pair.a;
@@ -106,6 +184,7 @@ std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
     row.b.pose = pose_of(pair.b);
     out->penetration->write(i, row, self.scene.penetration(pair));
     write_row(*out->separation, i, self.scene.separation(pair));
+    write_row(*out->impact, i, self.scene.impact(pair));
   }
   out->ended = Column<std::uint32_t, 2>({found.ended.size()});
   for (std::size_t i = 0; i < found.ended.size(); ++i) {
@@ -187,11 +266,21 @@ void add_scenes(py::module_& module) {
             "Penetration of n rows; zero where the rule asks none.");
   add_inner(type, "separation", &SceneAnswers::separation,
             "Separation of n rows; zero where bodies overlap, or the rule has no margin.");
+  add_inner(type, "impact", &SceneAnswers::impact,
+            "TimeOfImpact of n rows, where the rule is 'impact'; else zero.");
   add_column(type, "ended", &SceneAnswers::ended,
              "(m, 2) uint32: pairs that met in the step before.");
   add_column(type, "refused", &SceneAnswers::refused,
              "(k,) uint32: bodies that are left out, whose pose is not usable.");
   type.def("__len__", [](const SceneAnswers& self) { return self.rows[0]; });
+
+  py::class_<SceneHits> hits(module, "SceneHits", "What rays meet first in a Scene.");
+  add_column(hits, "number", &SceneHits::number, "(n,) uint32: of the body; 0 without a hit.");
+  add_inner(hits, "hit", &SceneHits::hit, "RayHits of n rows.");
+  py::class_<ScenePoints> points(module, "ScenePoints", "The bodies nearest to points.");
+  add_column(points, "number", &ScenePoints::number, "(n,) uint32: of the body; 0 where none is.");
+  add_inner(points, "surface", &ScenePoints::surface,
+            "SurfacePoints of n rows; an infinite distance where no body is near enough.");
 
   py::class_<PyScene>(module, "Scene", kSceneDoc)
       .def(py::new_([](std::size_t max_bodies, std::size_t max_pairs, unsigned threads) {
@@ -230,8 +319,10 @@ void add_scenes(py::module_& module) {
           "set_rule",
           [](PyScene& self, std::uint32_t group_a, std::uint32_t group_b, const std::string& answer,
              const std::string& measure, bool spheres_only, double margin,
-             std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error) {
+             std::uint32_t pair_budget, std::uint32_t max_visits, double relative_error,
+             double duration, double tolerance) {
             SceneRule rule;
+            rule.impact = {duration, take_limit(tolerance, "tolerance"), max_visits};
             rule.answer = named(answer, "answer", kAnswers);
             rule.margin = take_limit(margin, "margin");
             rule.penetration =
@@ -241,11 +332,34 @@ void add_scenes(py::module_& module) {
           py::arg("group_a") = 0, py::arg("group_b") = 0, py::kw_only(),
           py::arg("answer") = "penetration", py::arg("measure") = "matched",
           py::arg("spheres_only") = false, py::arg("margin") = 0.0, py::arg("pair_budget") = 0,
-          py::arg("max_visits") = 0, py::arg("relative_error") = 0.0,
+          py::arg("max_visits") = 0, py::arg("relative_error") = 0.0, py::arg("duration") = 1.0,
+          py::arg("tolerance") = 0.0,
           "How bodies of two groups are asked: 'penetration' (as ist.penetration has it), "
           "'overlap' "
-          "(yes or no), 'boxes' (whether their boxes meet) or 'nothing'. margin: [u] bodies that "
-          "come as near are told too, with their separation.")
+          "(yes or no), 'boxes' (whether their boxes meet), 'impact' (when they meet first within "
+          "`duration` [T] from now, by their motions, as ist.time_of_impact has it) or 'nothing'. "
+          "margin: [u] bodies that come as near are told too, with their separation.")
+      .def("set_motions", set_motions, py::arg("velocities"), py::kw_only(),
+           py::arg("numbers") = py::none(), py::arg("about") = py::make_tuple(0.0, 0.0, 0.0),
+           "For the rule 'impact'. velocities: (n, 6), [u/T] of the point `about` and [rad/T], "
+           "world, "
+           "of the bodies `numbers` (n,), or of all that move, by number. about: (3,) or (n, 3) "
+           "[u] in the body's own frame, before its scale: its centre of mass if it is free.")
+      .def("raycast", cast_rays, py::arg("origins"), py::arg("directions"), py::kw_only(),
+           py::arg("max_distance") = std::numeric_limits<double>::infinity(),
+           "The first body that each ray meets, where bodies stand now, as ist.raycast has it. "
+           "Returns SceneHits. Bodies that rays do not support are passed.")
+      .def("nearest", nearest, py::arg("points"), py::kw_only(),
+           py::arg("max_distance") = std::numeric_limits<double>::infinity(),
+           "The body nearest to each point (3,) or (n, 3) [u], where bodies stand now: that of the "
+           "least signed distance. Returns ScenePoints. Bodies without a mesh are passed.")
+      .def(
+          "in_box",
+          [](const PyScene& self, const py::object& lower, const py::object& upper) {
+            return in_box(self, lower, upper).handed_out();
+          },
+          py::arg("lower"), py::arg("upper"),
+          "(k,) uint32: bodies whose boxes meet the box from lower to upper (3,) [u].")
       .def(
           "exclude",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.exclude(a, b); },

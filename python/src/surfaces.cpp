@@ -7,47 +7,15 @@
 #include <ist/types.h>
 
 #include "penetration.h"
+#include "surfaces.h"
 
 namespace ist::python {
 namespace {
-
-struct RayHits {
-  Shape rows;
-  Column<double> distance{rows};
-  Column<double, 3> point{rows}, normal{rows};
-  Column<std::uint32_t> triangle{rows}, status{rows};
-};
-
-struct SurfacePoints {
-  Shape rows;
-  Column<double> distance{rows}, error{rows};
-  Column<double, 3> point{rows}, gradient{rows};
-  Column<std::uint32_t> triangle{rows}, status{rows};
-};
 
 PlacedSolid placed_alone(const py::object& solid, const py::object& pose, double scale) {
   const Solid view = solid_of(solid, "solid");
   return Side{&view, take_pose(pose, scale), scale}.placed();
 }
-
-/// (3,) or (n, 3).
-struct Places {
-  Places(const py::object& value, const char* name)
-      : held(take_doubles(value, name, "(3,) or (n, 3)")) {
-    if (held.ndim() < 1 || held.ndim() > 2 || held.shape(held.ndim() - 1) != 3)
-      refuse_shape(held, name, "(3,) or (n, 3)");
-    if (held.ndim() == 2) rows = {held.shape(0)};
-    count = held.ndim() == 2 ? held.shape(0) : 1;
-  }
-  Eigen::Vector3d at(std::size_t i) const {
-    const double* const x = held.data() + (held.ndim() == 2 ? 3 * i : 0);
-    return {x[0], x[1], x[2]};
-  }
-
-  Doubles held;
-  Shape rows;
-  std::size_t count = 0;
-};
 
 /// ask(placed, i) for each place of `shape`, the GIL released. Where the solid does not hold what
 /// is asked, nothing is answered. One invalid place is a ValueError.
@@ -119,10 +87,7 @@ void add_surfaces(py::module_& module) {
          const py::object& directions, double max_distance, double scale) {
         const PlacedSolid placed = placed_alone(solid, pose, scale);
         const Places from(origins, "origins"), along(directions, "directions");
-        if (!from.rows.empty() && !along.rows.empty() && from.count != along.count)
-          throw value_error("directions: " + std::to_string(along.count) + " rows; origins have " +
-                            std::to_string(from.count));
-        const Shape& shape = from.rows.empty() ? along.rows : from.rows;
+        const Shape& shape = rows_of(from, along);
         auto answers = std::make_unique<RayHits>(RayHits{shape});
         ask_places(placed, shape, "origins, directions, max_distance",
                    [&](const PlacedSolid& at, std::size_t i) {

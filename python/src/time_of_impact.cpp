@@ -3,17 +3,11 @@
 #include <cmath>
 #include <memory>
 
+#include "impacts.h"
 #include "penetration.h"
 
 namespace ist::python {
 namespace {
-
-struct Impacts {
-  Shape rows;
-  Column<double> time{rows}, distance_min{rows}, distance_max{rows};
-  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
-  Column<std::uint32_t> kind{rows}, status{rows}, node_visits{rows}, surface_pairs{rows};
-};
 
 constexpr const char* kDoc =
     R"(Time up to which B, moving between two poses, provably stays clear of A.

@@ -159,6 +159,7 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   const double low[3] = {-100, -100, -100}, high[3] = {100, 100, 100};
   uint32_t number = 77, numbers[4];
   ist_ray_hit_t hit, alone;
+  ist_surface_point_t near, foot;
   size_t count = 5;
   CHECK(ist_raycast(&s->a, &ray, 1, &alone, sizeof alone) >= IST_MISSING_DATA);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, sizeof hit) == IST_OK);
@@ -166,6 +167,14 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, 3) == IST_WRONG_SIZE);
   CHECK(ist_scene_raycast(scene, NULL, 1, &number, &hit, sizeof hit) == IST_NULL_POINTER);
   CHECK(ist_scene_raycast(NULL, &ray, 1, &number, &hit, sizeof hit) == IST_NULL_POINTER);
+  CHECK(ist_closest_point(&s->a, low, 1, &foot, sizeof foot) >= IST_MISSING_DATA);
+  CHECK(ist_scene_nearest(scene, low, 1, HUGE_VAL, &number, &near, sizeof near) == IST_OK);
+  if (foot.status == IST_OK) CHECK(number == 4 && near.distance == foot.distance);
+  CHECK(ist_scene_nearest(scene, low, 1, 1, &number, &near, sizeof near) == IST_OK);
+  CHECK(number == 0 && near.distance == HUGE_VAL);
+  CHECK(ist_scene_nearest(scene, low, 1, 1, &number, &near, 3) == IST_WRONG_SIZE);
+  CHECK(ist_scene_nearest(scene, NULL, 1, 1, &number, &near, sizeof near) == IST_NULL_POINTER);
+  CHECK(ist_scene_nearest(NULL, low, 1, 1, &number, &near, sizeof near) == IST_NULL_POINTER);
   CHECK(ist_scene_in_box(scene, low, high, numbers, 4, &count) == IST_OK && count == 1);
   CHECK(numbers[0] == 4);
   CHECK(ist_scene_in_box(scene, low, high, NULL, 0, &count) == IST_OK && count == 1);

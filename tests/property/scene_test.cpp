@@ -427,6 +427,26 @@ TEST(Scene, RaysAndBoxesMeetTheSameBodiesAsOneByOne) {
     hits += best.hit.hit() ? 1 : 0;
   }
   EXPECT_GT(hits, 50);
+  int inside = 0;
+  for (int k = 0; k < 300; ++k) {
+    Eigen::Vector3d point;
+    for (int c = 0; c < 3; ++c)
+      point[c] = pile.below(2) == 0 ? 2.0 * pile.below(4) - 4 : pile.uniform(-6, 6);
+    const double reach = k % 3 == 0 ? pile.uniform(-0.1, 1) : HUGE_VAL;
+    SceneNearest best;
+    for (const auto& [number, body] : bodies) {
+      const SurfacePoint here = closest_point(body.solid, point);
+      if (here.status == QueryStatus::ok && here.distance <= reach &&
+          here.distance < best.surface.distance)
+        best = {number, here};
+    }
+    const SceneNearest found = scene.nearest(point, reach);
+    EXPECT_EQ(found.surface.distance, best.surface.distance);
+    EXPECT_EQ(found.number, best.number);
+    inside += found.surface.distance < 0 ? 1 : 0;
+  }
+  EXPECT_GT(inside, 5);
+  EXPECT_EQ(scene.nearest({NAN, 0, 0}).surface.distance, HUGE_VAL);
   std::vector<std::uint32_t> numbers(300);
   const std::size_t all = scene.in_box({-9, -9, -9}, {9, 9, 9}, numbers);
   EXPECT_GT(all, 200u);

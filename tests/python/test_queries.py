@@ -714,3 +714,62 @@ def test_mistakes_of_scenes_are_told(gear):
         scene.add(gear, IDENTITY, number=1)
     with pytest.raises(ist.Error, match="group 8 is not below 8"):
         scene.add(gear, IDENTITY, group=8)
+
+
+def test_a_scene_tells_impacts_as_time_of_impact_does(gear, knot):
+    side = (gear.bounds().upper - gear.bounds().lower).max()
+    scene = ist.Scene(threads=1)
+    scene.set_rule(answer="impact", duration=2.0)
+    poses = np.array([[1, 0, 0, 0, 0, 0, 0], [1, 0.2, 0, 0, 4 * side, 0, 0], [1, 0, 0, 0, 0, 9 * side, 0]])
+    for solid, pose in zip((gear, knot, gear), poses):
+        scene.add(solid, pose)
+    velocities = np.zeros((3, 6))
+    velocities[1] = [-2 * side, 0, 0, 0.1, 0.2, 0.3]
+    scene.set_motions(velocities)
+    step = scene.step()
+    assert step.pairs.tolist() == [[0, 1]]
+    end = ist.time_of_impact(gear, knot, poses[1], poses[1], poses_a=poses[0], duration=2.0)
+    assert end.kind == ist.ImpactKind.no_impact
+    assert step.impact.kind[0] == ist.ImpactKind.impact and 0.5 < step.impact.time[0] < 2
+    # Where the bodies are then, they are as near as it says.
+    moved = poses[1].copy()
+    angle = velocities[1, 3:] * step.impact.time[0]
+    half = np.linalg.norm(angle) / 2
+    turn = np.r_[np.cos(half), np.sin(half) * angle / np.linalg.norm(angle)]
+    q = poses[1][:4] / np.linalg.norm(poses[1][:4])
+    moved[0] = turn[0] * q[0] - turn[1:] @ q[1:]
+    moved[1:4] = turn[0] * q[1:] + q[0] * turn[1:] + np.cross(turn[1:], q[1:])
+    moved[4:] += velocities[1, :3] * step.impact.time[0]
+    gap = ist.separation(gear, knot, moved)
+    assert 0 < gap.distance <= step.impact.distance_max[0] * (1 + 1e-6)
+    scene.set_motions(-velocities[1:2], numbers=[1], about=[0, 0, 0])
+    assert len(scene.step()) == 0
+    with pytest.raises(ValueError, match=r"velocities: shape \(3,\); wanted \(n, 6\)"):
+        scene.set_motions([1, 2, 3])
+    with pytest.raises(ValueError, match="about: 2 rows; velocities have 3"):
+        scene.set_motions(velocities, about=np.zeros((2, 3)))
+    with pytest.raises(ist.Error, match="duration"):
+        scene.set_rule(answer="impact", duration=0)
+
+
+def test_a_scene_finds_bodies_by_rays_points_and_boxes(gear):
+    side = (gear.bounds().upper - gear.bounds().lower).max()
+    poses = [[1, 0, 0, 0, 3 * side * i, 0, 0] for i in range(4)]
+    scene = ist.Scene()
+    for i, pose in enumerate(poses):
+        scene.add(gear, pose, number=10 + i)
+    points = np.array([[0.1 * side, 0.3 * side, 0], [5.5 * side, 0, 0], [20 * side, 0, 0]])
+    found = scene.nearest(points, max_distance=4 * side)
+    assert found.number.tolist() == [10, 12, 0]
+    for k, body in enumerate([0, 2]):
+        alone = ist.closest_point(gear, poses[body], points[k])
+        assert found.surface.distance[k] == alone.distance
+        assert np.array_equal(found.surface.point[k], alone.point)
+    assert found.surface.distance[2] == np.inf
+    one = scene.nearest(points[1])
+    assert one.number == 12 and one.surface.point.shape == (3,)
+    rays = scene.raycast([-9 * side, 0.31 * side, 0.013], [[1, 0, 0], [0, 0, 1]])
+    assert rays.number[0] == 10 and rays.hit.distance[1] == np.inf
+    assert scene.in_box([2 * side, -side, -side], [7 * side, side, side]).tolist() == [11, 12]
+    with pytest.raises(ValueError, match="points: shape"):
+        scene.nearest([1, 2])
