@@ -89,13 +89,18 @@ Separation separation(const PlacedSolid& a, const PlacedSolid& b,
 PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept {
   PenetrationAndSeparation both{penetration(a, b, settings.penetration, workspace), {}};
-  // A certified overlap leaves no gap to look for.
+  // A certified overlap leaves no gap to look for. Matched spheres certify none, but show where
+  // inner spheres may share a point.
   const Measure measure = settings.penetration.measure;
-  const bool certified = measure == Measure::inner ||
-                         (measure == Measure::exact && !settings.separation.inner_spheres);
-  if (!certified || both.penetration.status != QueryStatus::ok ||
-      !(both.penetration.volume_min > 0))
-    both.separation = separation(a, b, settings.separation, workspace);
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
+  const bool certified = both.penetration.status == QueryStatus::ok &&
+                         both.penetration.volume_min > 0 &&
+                         (measure == Measure::inner ||
+                          (measure == Measure::exact && !settings.separation.inner_spheres) ||
+                          (tree_a != nullptr && tree_b != nullptr &&
+                           spheres_share(*tree_a, *tree_b, both.penetration)));
+  if (!certified) both.separation = separation(a, b, settings.separation, workspace);
   return both;
 }
 

@@ -190,6 +190,86 @@ class GapDescent {
   bool stopped_ = false;
 };
 
+/// Whether a point lies at least `margin` deep in a sphere of a tree; both in its unit frame. Looks
+/// at some nodes alone, the one around the point most deeply first, so that it may miss some.
+bool is_seen_within(const SphereTree& tree, const Eigen::Vector3d& point, double margin) {
+  constexpr int kMostVisits = 16;
+  struct Waiting {
+    int level;
+    std::uint32_t block;
+    float depth;
+  };
+  Waiting stack[kWidth * (kMaxLevels + 1)] = {{tree.top, 0, 0}};
+  std::size_t size = 1;
+  for (int visit = 0; visit < kMostVisits && size > 0; ++visit) {
+    const auto [level, block, depth] = stack[--size];
+    const BallBlock& balls = tree.level[level].blocks[block];
+    const Origin& origin = tree.level[level].origins[block];
+    const auto x = static_cast<float>(point.x() - origin.x),
+               y = static_cast<float>(point.y() - origin.y),
+               z = static_cast<float>(point.z() - origin.z);
+    float inside[kWidth];
+    for (std::size_t k = 0; k < kWidth; ++k) {
+      const float dx = x - balls.x[k], dy = y - balls.y[k], dz = z - balls.z[k];
+      const float r = std::max(balls.r[k], 0.0f);
+      inside[k] = r * r - (dx * dx + dy * dy + dz * dz);
+    }
+    const std::size_t first = size, below = tree.count(level - 1) - std::size_t{kWidth} * block;
+    for (std::uint32_t k = 0; k < std::min<std::size_t>(kWidth, below); ++k) {
+      if (!(inside[k] > 0)) continue;
+      if (level == 0) {
+        const NodeBall sphere = tree.sphere(block, k);
+        if ((vector(sphere.centre) - point).norm() < sphere.r - margin) return true;
+        continue;
+      }
+      const Waiting child = {level - 1, kWidth * block + k, inside[k] / (balls.r[k] * balls.r[k])};
+      std::size_t place = size++;
+      for (; place > first && stack[place - 1].depth > child.depth; --place)
+        stack[place] = stack[place - 1];
+      stack[place] = child;
+    }
+  }
+  return false;
+}
+
+/// Of two solids, and points that both may hold.
+class InnerSpheres {
+ public:
+  InnerSpheres(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose)
+      : a(sphere_tree(a.asset, Measure::inner)),
+        b(sphere_tree(b.asset, Measure::inner)),
+        off(distance_error(Precision::float64,
+                           span(this->a.root(), this->b.root(), pose.a_from_b)) +
+            pose.rounding_of_world()),
+        pose_(pose) {}
+
+  /// Whether spheres of both are seen to hold a point of A's unit frame: then the solids overlap.
+  bool share(const Eigen::Vector3d& point) const {
+    if (!is_seen_within(a, point, off)) return false;
+    double in_b[3];
+    pose_.b_from_a.apply({point.x(), point.y(), point.z()}, in_b);
+    return is_seen_within(b, vector(in_b), off / pose_.a_from_b.scale);
+  }
+
+  /// The middle of what the balls around them share.
+  Eigen::Vector3d likely_point() const {
+    const RootBall root_a = a.root(), root_b = b.root();
+    double moved[3];
+    pose_.a_from_b.apply(root_b.centre, moved);
+    const Eigen::Vector3d centre = vector(root_a.centre), between = vector(moved) - centre;
+    const double length = between.norm(), r = pose_.a_from_b.scale * root_b.r;
+    if (!(length > 0)) return centre;
+    const double low = std::max(length - r, -root_a.r), high = std::min(root_a.r, length + r);
+    return centre + (low + high) / (2 * length) * between;
+  }
+
+  const SphereTree a, b;
+  const double off;  ///< what rounding may move a point by; A's unit frame
+
+ private:
+  const RelativePose& pose_;
+};
+
 /// Between the surfaces that both assets keep.
 class SurfaceGap {
  public:
@@ -234,18 +314,17 @@ class SurfaceGap {
  private:
   /// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
   void ask_spheres() {
-    const SphereTree a = sphere_tree(a_.asset, Measure::inner),
-                     b = sphere_tree(b_.asset, Measure::inner);
-    const double off =
-        distance_error(Precision::float64, span(a.root(), b.root(), pose_.a_from_b)) +
-        pose_.rounding_of_world();
-    GapDescent descent(a, b, pose_, std::min(kGlance, visit_limit(settings_.max_visits)),
-                       question_.most, false, scratch_);
+    const InnerSpheres spheres(a_, b_, pose_);
+    overlap_ = spheres.share(spheres.likely_point());
+    if (overlap_) return;
+    GapDescent descent(spheres.a, spheres.b, pose_,
+                       std::min(kGlance, visit_limit(settings_.max_visits)), question_.most, false,
+                       scratch_);
     descent.run();
     visits_ = descent.visits();
     pairs_ = descent.pairs();
-    overlap_ = descent.gap() < -off;
-    question_.likely = std::max(0.0, descent.gap()) + error_ + off;
+    overlap_ = descent.gap() < -spheres.off;
+    question_.likely = std::max(0.0, descent.gap()) + error_ + spheres.off;
     const Eigen::Vector3d way = descent.centre_b() - descent.centre_a();
     if (const double length = way.norm(); length > 0)
       question_.toward = {way.x() / length, way.y() / length, way.z() / length};
@@ -292,6 +371,26 @@ class SurfaceGap {
 };
 
 }  // namespace
+
+bool spheres_share(const PlacedAsset& a, const PlacedAsset& b, const Penetration& found) noexcept {
+  if (lack_spheres(a, b)) return false;
+  const std::optional<RelativePose> pose = relative_pose(a, b);
+  if (!pose) return false;
+  const InnerSpheres spheres(a, b, *pose);
+  const Eigen::Vector3d middle =
+      pose->rotation().transpose() * (found.centroid - vector(pose->origin_a)) / pose->unit_a;
+  if (spheres.share(middle)) return true;
+  // Of an overlap in parts the middle may lie beside them: on its sides are 70 of 100 of the rows
+  // of an elephant and a dino that overlap by 0.01 to 10 %, in the middle 39.
+  constexpr double kAside = 0.4;
+  const Eigen::Vector3d push = pose->rotation().transpose() * found.force;
+  if (!(push.squaredNorm() > 0)) return false;
+  const Eigen::Vector3d across =
+      kAside * std::cbrt(found.volume) / pose->unit_a * push.unitOrthogonal();
+  const Eigen::Vector3d other = push.normalized().cross(across);
+  return spheres.share(middle + across) || spheres.share(middle - across) ||
+         spheres.share(middle + other) || spheres.share(middle - other);
+}
 
 Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace,

@@ -101,6 +101,37 @@ TEST(Query, SeparationMatchesAllPairs) {
   }
 }
 
+// A penetration shows where inner spheres may share a point: only where they do there is no gap.
+TEST(Query, TellsTheSeparation) {
+  Workspace workspace;
+  std::mt19937_64 random(3);
+  int met = 0, apart = 0;
+  for (const std::size_t n : {2u, 17u, 300u}) {
+    const Asset a = make_random_asset({n, 0.2, {}, 0}, 22);
+    const Asset b = make_random_asset({n, 0.05, {0.3, 0, 0}, 3}, 23);
+    for (int i = 0; i < 300; ++i) {
+      const double far = i % 3 == 0 ? 1e3 : 0;
+      PlacedAsset pa{a.view(), random_pose(random, far), 1.0};
+      PlacedAsset pb{b.view(), random_pose(random, 0.3), 0.11};
+      for (int k = 0; k < 3; ++k) pb.pose.t[k] += pa.pose.t[k];
+      pb.pose.t[0] += 1.0 + 0.004 * i;
+      const PenetrationAndSeparation both = query(pa, pb, {}, workspace);
+      const Separation alone = separation(pa, pb, {}, workspace);
+      EXPECT_EQ(both.separation.distance, alone.distance);
+      EXPECT_EQ(both.separation.distance_min, alone.distance_min);
+      EXPECT_EQ(both.separation.distance_max, alone.distance_max);
+      EXPECT_EQ(both.separation.point_a, alone.point_a);
+      EXPECT_EQ(both.separation.normal, alone.normal);
+      if (!(both.penetration.volume > 0)) continue;
+      const double gap = testing::reference_gap(pa, pb).distance;
+      EXPECT_EQ(both.separation.distance_max == 0, gap < 0) << gap;
+      ++(gap < 0 ? met : apart);
+    }
+  }
+  EXPECT_GT(met, 100);
+  EXPECT_GT(apart, 10);
+}
+
 TEST(Query, HoldsOverScalesAndSizeRatios) {
   Workspace workspace;
   std::mt19937_64 random(5);
