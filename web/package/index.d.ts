@@ -155,7 +155,7 @@ export class Asset {
   /** The stored mesh; null if there is none. */
   mesh(): ClosedSurface | null;
 
-  /** Releases the memory. May be called twice. */
+  /** Releases the memory. May be called twice. Throws while bodies of a Scene are made of it. */
   free(): void;
 }
 
@@ -193,7 +193,7 @@ export class Shape {
     options?: { origin?: Vector; error?: number },
   ): Shape;
 
-  /** Releases the memory. May be called twice. */
+  /** Releases the memory. May be called twice. Throws while bodies of a Scene are made of it. */
   free(): void;
 }
 
@@ -501,6 +501,90 @@ export function contains(
   points: ArrayLike<number>,
   options?: { into?: Uint8Array },
 ): Uint8Array;
+
+/** Two bodies that meet: their volume is positive, or they touch, or come within the margin. */
+export interface ScenePair {
+  /** Numbers, a < b; A of the answers is `a`. */
+  a: number;
+  b: number;
+  /** They did not meet in the step before. */
+  begins: boolean;
+  /** Where the rule is 'overlap'; else 'unknown'. */
+  overlapping: 'no' | 'yes' | 'unknown';
+  /** Zero where the rule asks none. */
+  penetration: Penetration;
+  /** Zero where the bodies overlap, or the rule has no margin. */
+  separation: Separation;
+}
+
+export interface SceneStep {
+  /** How many of `pairs` are of this step; by (a, b). */
+  count: number;
+  pairs: ScenePair[];
+  /** Pairs that met in the step before: `endedCount` times two numbers. */
+  endedCount: number;
+  ended: Uint32Array;
+  /** Bodies that are left out: their pose is not usable. */
+  refusedCount: number;
+  refused: Uint32Array;
+}
+
+/**
+ * Many solids, and which of them meet. A step asks the pairs whose boxes meet and of which a body was
+ * added or moved; of the others the answers are those of the step before. Poses and rules alone decide
+ * the answers. Each Scene has a workspace of its own: 42 MB.
+ */
+export class Scene {
+  /** Memory for as many bodies, and pairs whose boxes meet, is taken at once: 1024 and 8192. */
+  constructor(options?: { maxBodies?: number; maxPairs?: number });
+  /** Bodies. */
+  readonly size: number;
+  /**
+   * Adds a body at a pose; undefined: at the origin. Returns its number: the one given, or the first
+   * above all others. Two bodies that do not move are not asked, nor are two shapes. `group` (< 8)
+   * selects the rule of a pair; each of a pair must be on a layer (bits) that the other meets.
+   */
+  add(
+    solid: Asset | Shape,
+    pose?: Pose,
+    options?: { number?: number; moves?: boolean; group?: number; layers?: number; meets?: number },
+  ): number;
+  /** Its pairs end in the next step. */
+  remove(number: number): void;
+  /** Of bodies numbers[i]; scales are those they were added with. */
+  setPoses(numbers: ArrayLike<number>, poses: ArrayLike<Pose>): void;
+  /**
+   * How bodies of two groups are asked, whichever is which. `margin` [u]: bodies that come as near
+   * are told too, with their separation.
+   */
+  setRule(
+    groupA: number,
+    groupB: number,
+    options?: Omit<PenetrationOptions, 'poseA' | 'into' | 'pairId'> & {
+      answer?: 'penetration' | 'nothing' | 'boxes' | 'overlap';
+      margin?: number;
+    },
+  ): void;
+  /** Bodies that are joined do not meet, until include(). */
+  exclude(a: number, b: number): void;
+  include(a: number, b: number): void;
+  /** Asks all pairs that may have changed. */
+  step(options?: { into?: SceneStep }): SceneStep;
+  /** As raycast(), of the first body that each ray meets: `number`, 0 without a hit. */
+  raycast(
+    origins: ArrayLike<number>,
+    directions: ArrayLike<number>,
+    options?: { maxDistance?: number; into?: RayHits & { number: Uint32Array } },
+  ): RayHits & { number: Uint32Array };
+  /** As closestPoint(), of the nearest body: `number`; its distance is infinite where none is near. */
+  nearest(
+    points: ArrayLike<number>,
+    options?: { maxDistance?: number; into?: SurfacePoints & { number: Uint32Array } },
+  ): SurfacePoints & { number: Uint32Array };
+  /** Releases the memory. May be called twice. */
+  free(): void;
+}
+
 
 // --- Corrections and wrenches of contacts -----------------------------------------------------------
 

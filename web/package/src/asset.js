@@ -15,11 +15,14 @@ class Owner {
     if (key !== kInside)
       throw new IstError(`ist: ${this.constructor.name}has no public constructor; use its static functions`);
     this._places = places;
+    this._bodies = 0;  // of scenes
     forgotten.register(this, places, this);
   }
 
   free() {
     if (this._places === null) return;
+    if (this._bodies > 0)
+      throw new IstError(`ist: free(): ${this._bodies} bodies of a Scene are made of it; remove them first`);
     forgotten.unregister(this);
     this._places.forEach(give);
     this._places = null;

@@ -23,6 +23,12 @@ const kNames = {
   'wrenches()': ['a', 'b'],
   'sizeMatch()': ['scaleA', 'scaleB'],
   'timeOfImpact()': [...kLimits, 'motionA', 'motionB', 'duration', 'tolerance'],
+  'Scene()': ['maxBodies', 'maxPairs'],
+  'Scene.add()': ['number', 'moves', 'group', 'layers', 'meets'],
+  'Scene.setRule()': ['answer', 'margin', ...kContact.slice(3).filter((name) => name !== 'pairId'), 'maxVisits'],
+  'Scene.step()': ['into'],
+  'Scene.raycast()': ['maxDistance', 'into'],
+  'Scene.nearest()': ['maxDistance', 'into'],
   'penetrationBatch()': kOfBatch(kPenetration),
   'contactPatchesBatch()': kOfBatch(kPatches),
 };

@@ -8,6 +8,7 @@ export {sizeMatch, patchesWithoutProtrusion, withoutProtrusion, wrenches} from '
 export {IstError} from './error.js';
 export {motionBetween, moved, timeOfImpact} from './motion.js';
 export {contactPatches, lenses, overlap, overlapOutline, penetration, separation} from './query.js';
+export {Scene} from './scene.js';
 export {closestPoint, contains, raycast} from './surfaces.js';
 
 export function version() {

@@ -44,11 +44,15 @@ export function penetration(a, b, poseB, options) {
   return readPenetration(desk().penetration, status, options?.into ?? newPenetration());
 }
 
-const newSeparation = () => ({status: 'ok', distance: 0, ...newGap(), spherePairs: 0});
+export const newSeparation = () => ({status: 'ok', distance: 0, ...newGap(), spherePairs: 0});
 
 export function separation(a, b, poseB, options) {
   const status = ask('separation', 'separation()', a, b, poseB, options, options?.innerSpheres ? 1 : 0);
-  const out = options?.into ?? newSeparation();
+  return readSeparation(status, options?.into ?? newSeparation());
+}
+
+/** The one that lies on the desk. */
+export function readSeparation(status, out) {
   const integers = u32(), at = desk().separation / 8 + 1;
   out.status = statusOf(status);
   out.distance = f64()[at];

@@ -8,8 +8,8 @@ import {checkOptions} from './options.js';
 import {solid} from './query.js';
 
 // Numbers of an answer after its status and triangle, in the order of the header.
-const kHit = {distance: 1, point: 3, normal: 3};
-const kSurfacePoint = {distance: 1, error: 1, point: 3, gradient: 3};
+export const kHit = {distance: 1, point: 3, normal: 3};
+export const kSurfacePoint = {distance: 1, error: 1, point: 3, gradient: 3};
 const kRayBytes = 56, kPointBytes = 24;
 const room = new Room();
 
@@ -36,7 +36,7 @@ function ask(question, who, given, pose, count, place, answers) {
   if (status !== kInvalidInput || count === 1) check(status, who);
 }
 
-function read(place, count, columns, out) {
+export function read(place, count, columns, out) {
   const numbers = f64(), integers = u32();
   let stride = 1, from = 1;
   for (const name in columns) stride += columns[name];
@@ -54,32 +54,44 @@ function read(place, count, columns, out) {
   return out;
 }
 
-export function raycast(given, pose, origins, directions, options) {
-  functions('raycast()');
-  checkOptions('raycast()', options);
+/** Writes rays, leaves room for a hit and `more` bytes of each; where rays and hits lie. */
+export function askRays(who, origins, directions, options, more) {
+  functions(who);
+  checkOptions(who, options);
   const from = rows(origins, 'origins'), along = rows(directions, 'directions');
   if (from !== along && from !== 1 && along !== 1)
     throw new IstError(`ist: directions has ${along} rows; origins has ${from}`);
   const count = from === 1 ? along : from, maxDistance = options?.maxDistance ?? Infinity;
   if (!(maxDistance > 0)) throw new IstError(`ist: maxDistance is ${maxDistance}; it must be > 0`);
-  const place = room.of(count * (kRayBytes + 64)), hits = place + count * kRayBytes;
+  const place = room.of(count * (kRayBytes + 64 + more)), hits = place + count * kRayBytes;
   for (let i = 0; i < count; ++i) {
     const ray = place + i * kRayBytes;
     writeRow(ray, origins, from === 1 ? 0 : i, 'origins');
     writeRow(ray + 24, directions, along === 1 ? 0 : i, 'directions');
     f64()[ray / 8 + 6] = maxDistance;
   }
+  return {place, count, hits, more: hits + 64 * count};
+}
+
+export function raycast(given, pose, origins, directions, options) {
+  const {place, count, hits} = askRays('raycast()', origins, directions, options, 0);
   ask('raycast', 'raycast()', given, pose, count, place, hits);
   return read(hits, count, kHit, options?.into ?? {});
 }
 
-/** Writes points, leaves room for an answer of so many bytes each, and asks; where answers lie. */
-function askPoints(question, who, given, pose, points, options, bytes) {
+/** Writes points, leaves room for an answer of so many bytes each; where both lie. */
+export function placePoints(who, points, options, bytes) {
   functions(who);
   checkOptions(who, options);
   const count = rows(points, 'points');
   const place = room.of(count * (kPointBytes + bytes)), answers = place + count * kPointBytes;
   for (let i = 0; i < count; ++i) writeRow(place + i * kPointBytes, points, i, 'points');
+  return {place, count, answers};
+}
+
+/** The same, and asks; where answers lie. */
+function askPoints(question, who, given, pose, points, options, bytes) {
+  const {place, count, answers} = placePoints(who, points, options, bytes);
   ask(question, who, given, pose, count, place, answers);
   return answers;
 }

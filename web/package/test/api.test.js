@@ -570,3 +570,71 @@ test('rays and points against one solid', () => {
       sentence(() => ist.contains(bare, {}, [...below, ...inside])), /lacks data that the query needs/);
   for (const each of [bolt, ball, bare]) each.free();
 });
+
+test('a scene: pairs, events and answers are those of single calls', () => {
+  const bolt = ist.Asset.from(bytesA, 'bolt'), nut = ist.Asset.from(bytesB, 'nut');
+  const floor = ist.Shape.halfSpace([0, 0, 1]);
+  const scene = new ist.Scene({maxBodies: 8, maxPairs: 16});
+  scene.setRule(0, 0, {measure: 'exact', margin: 1});
+  const poses = [{}, {translation: [0, 0, 9]}, {translation: [0.2, 0, 40]}, {translation: [300, 0, 0]}];
+  const solids = [bolt, nut, nut, bolt];
+  solids.forEach((solid, i) => assert.equal(scene.add(solid, poses[i]), i));
+  scene.setRule(0, 1, {answer: 'overlap'});
+  assert.equal(scene.add(floor, undefined, {number: 20, moves: false, group: 1}), 20);
+  assert.equal(scene.size, 5);
+  const first = scene.step();
+  const named = (step) => step.pairs.slice(0, step.count).map(({a, b}) => [a, b]);
+  for (let a = 0; a < 4; ++a)
+    for (let b = a + 1; b < 4; ++b) {
+      const options = {measure: 'exact', poseA: poses[a]};
+      const alone = ist.penetration(solids[a], solids[b], poses[b], options);
+      const gap = ist.separation(solids[a], solids[b], poses[b], {poseA: poses[a]});
+      const pair = first.pairs.slice(0, first.count).find((pair) => pair.a === a && pair.b === b);
+      assert.equal(pair !== undefined, alone.volume > 0 || gap.distance < 1, `${a} ${b}`);
+      if (pair === undefined) continue;
+      assert.deepEqual(pair.penetration, alone);
+      assert.ok(pair.begins);
+      if (alone.volume === 0) assert.equal(pair.separation.distance, gap.distance);
+    }
+  assert.ok(named(first).some(([a, b]) => a === 0 && b === 1));
+  const onFloor = first.pairs.slice(0, first.count).filter((pair) => pair.b === 20);
+  assert.ok(onFloor.length > 0 && onFloor.every((pair) => pair.overlapping !== 'no'));
+  // Moved away: the pair ends; the answer is written into the one given.
+  scene.setPoses([1], [{translation: [0, 500, 0]}]);
+  const second = scene.step({into: first});
+  assert.equal(second, first);
+  assert.deepEqual(Array.from(second.ended.subarray(0, 2)), [0, 1]);
+  assert.ok(second.pairs.slice(0, second.count).every((pair) => !pair.begins || pair.a === 1));
+  scene.setPoses([1], [{translation: [NaN, 0, 0]}]);
+  assert.deepEqual(Array.from(scene.step().refused), [1]);
+  scene.setPoses([1], [{translation: [0, 0, 9]}]);
+  scene.exclude(0, 1);
+  assert.ok(!named(scene.step()).some(([a, b]) => a === 0 && b === 1));
+  scene.include(0, 1);
+  assert.ok(named(scene.step()).some(([a, b]) => a === 0 && b === 1));
+
+  const hits = scene.raycast([300, 0.01, 900, 150, 0, 900], [0, 0, -1]);
+  assert.deepEqual(Array.from(hits.number), [3, 20]);
+  const near = scene.nearest([300, 0, 60, 150, 0, 900], {maxDistance: 100});
+  const alone = ist.closestPoint(bolt, poses[3], [300, 0, 60]);
+  assert.equal(near.number[0], alone.distance[0] < 60 ? 3 : 20);
+  assert.ok(near.distance[1] === Infinity);
+
+  assert.match(sentence(() => bolt.free()), /2 bodies of a Scene are made of it/);
+  assert.match(sentence(() => scene.add(nut, {}, {number: 3})), /body 3: /);
+  assert.match(sentence(() => scene.remove(9)), /body 9: /);
+  assert.match(sentence(() => scene.setPoses([1, 2], [{}])), /2 numbers and 1 poses/);
+  assert.match(sentence(() => scene.setRule(0, 0, {answer: 'all'})), /use one of penetration, nothing/);
+  const small = new ist.Scene({maxBodies: 3, maxPairs: 1});
+  small.setRule(0, 0, {answer: 'boxes'});
+  for (let i = 0; i < 3; ++i) small.add(nut);
+  assert.match(sentence(() => small.step()), /larger maxPairs/);
+  assert.match(sentence(() => small.add(nut)), /body 3: /);
+  small.free();
+  scene.remove(3);
+  scene.free();
+  scene.free();
+  assert.match(sentence(() => scene.step()), /used after free/);
+  bolt.free();
+  nut.free();
+});
