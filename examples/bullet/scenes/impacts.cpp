@@ -130,13 +130,16 @@ SceneResult run_overlap(const SceneOptions& options) {
   return result;
 }
 
-SceneResult run_heap(const SceneOptions& options) {
+namespace {
+
+SceneResult fill_crate(const SceneOptions& options, bool by_scene) {
   // A hundred solids fall into a crate of 0.5 m.
   constexpr double kHalf = 0.25, kWall = 0.05, kHigh = 1.5;
   const std::vector<Part> parts = solids(options);
   WorldSettings settings = world_settings(options);
   settings.margin = 5e-4;
   settings.hulls = 0;
+  settings.by_scene = by_scene;
   set_law(settings, 0.1, 1e-3, 1e-4, 4);
   SceneWorld world(settings);
   add_ground(world, kFriction);
@@ -178,6 +181,11 @@ SceneResult run_heap(const SceneOptions& options) {
                      {"bodies out of the crate", lost, 0, 0},
                      {"bodies faster than 2 cm/s at the end", moving, 0, 0}});
 }
+
+}  // namespace
+
+SceneResult run_heap(const SceneOptions& options) { return fill_crate(options, false); }
+SceneResult run_crate(const SceneOptions& options) { return fill_crate(options, true); }
 
 SceneResult run_edge(const SceneOptions& options) {
   // Boxes lie over a table's edge by a share of their side: 0.5 is true.

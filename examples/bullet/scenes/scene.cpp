@@ -18,6 +18,7 @@ const std::vector<Scene>& scenes() {
       {"drop", "eight screws fall on a thin plate", run_drop},
       {"impacts", "five solids fall on a plane at every turn", run_impacts},
       {"heap", "a hundred solids fall into a crate", run_heap},
+      {"crate", "the same with ist::Scene as the broad phase of Bullet's world", run_crate},
       {"edge", "boxes lie over a table's edge", run_edge},
       {"sensor", "a box falls through a sensor", run_sensor},
       {"overlap", "five boxes that begin in each other", run_overlap},

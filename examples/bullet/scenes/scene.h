@@ -76,6 +76,7 @@ SceneResult run_screw(const SceneOptions&);
 SceneResult run_drop(const SceneOptions&);
 SceneResult run_impacts(const SceneOptions&);
 SceneResult run_heap(const SceneOptions& options);
+SceneResult run_crate(const SceneOptions& options);
 SceneResult run_edge(const SceneOptions& options);
 SceneResult run_sensor(const SceneOptions& options);
 SceneResult run_overlap(const SceneOptions&);

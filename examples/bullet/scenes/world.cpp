@@ -6,6 +6,8 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "scene_broadphase.h"
+
 using ist::bullet::to_bullet;
 using ist::bullet::to_eigen;
 
@@ -23,7 +25,17 @@ const char* name_of(Way way) {
   return "";
 }
 
-SceneWorld::SceneWorld(const WorldSettings& settings) : settings_(settings) {
+namespace {
+
+std::unique_ptr<btBroadphaseInterface> make_broadphase(const WorldSettings& settings) {
+  if (!settings.by_scene) return std::make_unique<btDbvtBroadphase>();
+  return std::make_unique<SceneBroadphase>(1024);
+}
+
+}  // namespace
+
+SceneWorld::SceneWorld(const WorldSettings& settings)
+    : settings_(settings), broadphase_(make_broadphase(settings)) {
   contacts_.settings = settings.ist;
   contacts_.settings.response = settings.way == Way::wrench
                                     ? ist::bullet::Settings::Response::wrench

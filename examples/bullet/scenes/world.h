@@ -29,6 +29,7 @@ struct WorldSettings {
   ist::bullet::Settings ist;  ///< `response` follows `way`
   double margin = 0;          ///< [u] of GImpact's triangles and of hulls
   std::size_t hulls = 16;     ///< a part's, at least; 0: one about all of it
+  bool by_scene = false;      ///< SceneBroadphase, not Bullet's; parts must be ist's
 };
 
 /// A btDiscreteDynamicsWorld whose parts collide in one way, and what can be measured of it.
@@ -79,9 +80,10 @@ class SceneWorld {
   ist::bullet::Contacts contacts_;
   btDefaultCollisionConfiguration configuration_;
   btCollisionDispatcher dispatcher_{&configuration_};
-  btDbvtBroadphase broadphase_;
+  std::unique_ptr<btBroadphaseInterface> broadphase_;
   btSequentialImpulseConstraintSolver solver_;
-  mutable btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+  mutable btDiscreteDynamicsWorld world_{&dispatcher_, broadphase_.get(), &solver_,
+                                         &configuration_};
   std::map<const Part*, std::unique_ptr<ist::bullet::Shape>> ist_shapes_;
   std::map<const Part*, std::unique_ptr<PeerShape>> peer_shapes_;
   std::vector<Body> bodies_;
