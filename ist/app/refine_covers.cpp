@@ -18,12 +18,12 @@ namespace {
 constexpr double kEnough = 0.1;              ///< of the free poses
 constexpr std::size_t kMostOfALink = 40;     ///< on average
 constexpr double kGivenUp[] = {0.05, 0.03};  ///< share of the free poses, by round
-constexpr double kMoreGivenUp = 1.5;         ///< times that, where it takes too many spheres
-constexpr double kElsewhere = 0.6;           ///< of the first protrusion, where no link is near
-constexpr double kWhole = 0.95;              ///< of a gap, where the other link's spheres stay
-constexpr int kBisections = 4;               ///< of the room in a direction
-constexpr std::size_t kPosesOfAPair = 200;   ///< that are looked at, about
-constexpr std::size_t kTold = 3;             ///< pairs that are in the way
+constexpr double kHopeless = 0.3;   ///< share that is given up where it takes too many spheres
+constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
+constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
+constexpr int kBisections = 4;      ///< of the room in a direction
+constexpr std::size_t kPosesOfAPair = 80;  ///< that are looked at, about
+constexpr std::size_t kTold = 3;           ///< pairs that are in the way
 
 /// Positions in which spheres of two links met falsely, and how far apart the links are there.
 class Meetings {
@@ -205,7 +205,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     if (best.second.false_share() <= kEnough) break;
     meetings.add(robot.self.meetings);
     std::size_t total = SIZE_MAX;
-    for (double share = least; share < 1 && total > budget; share *= kMoreGivenUp) {
+    for (double share = least; share < kHopeless && total > budget; share *= 2) {
       rooms = rooms_of(links, first, meetings.without(given_up(share)));
       const std::vector<std::size_t> counts = needed(budget);
       total = 0;
