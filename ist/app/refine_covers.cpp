@@ -21,9 +21,9 @@ constexpr double kGivenUp[] = {0.05, 0.03};  ///< share of the free poses, by ro
 constexpr double kHopeless = 0.3;   ///< share that is given up where it takes too many spheres
 constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
 constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
-constexpr int kBisections = 4;      ///< of the room in a direction
-constexpr std::size_t kPosesOfAPair = 80;  ///< that are looked at, about
-constexpr std::size_t kTold = 3;           ///< pairs that are in the way
+constexpr int kBisections = 3;      ///< of the room in a direction
+constexpr std::size_t kPosesOfAPair = 160;  ///< that are looked at, about
+constexpr std::size_t kTold = 3;            ///< pairs that are in the way
 
 /// Positions in which spheres of two links met falsely, and how far apart the links are there.
 class Meetings {
@@ -165,7 +165,7 @@ void complete_cover(SphereLink& link, bool read) {
 
 void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
                    const SphereCoverSettings& cover,
-                   const std::map<std::string, std::size_t>& fixed,
+                   const std::map<std::string, std::size_t>& fixed, bool is_open,
                    const ProgressCallback& progress) {
   std::vector<Refined> links;
   std::size_t next = 0, before = 0;
@@ -204,6 +204,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
   for (const double least : kGivenUp) {
     if (best.second.false_share() <= kEnough) break;
     meetings.add(robot.self.meetings);
+    if (!is_open) break;
     std::size_t total = SIZE_MAX;
     for (double share = least; share < kHopeless && total > budget; share *= 2) {
       rooms = rooms_of(links, first, meetings.without(given_up(share)));

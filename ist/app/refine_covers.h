@@ -22,9 +22,10 @@ void complete_cover(SphereLink& link, bool read);
 /// needed. The best of all rounds is kept.
 ///
 /// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
+/// `is_open`: whether counts may change; if not, it is told alone what is in the way.
 void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
                    const SphereCoverSettings& cover,
-                   const std::map<std::string, std::size_t>& fixed,
+                   const std::map<std::string, std::size_t>& fixed, bool is_open,
                    const ProgressCallback& progress);
 
 }  // namespace ist::app

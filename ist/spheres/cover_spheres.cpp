@@ -219,12 +219,14 @@ SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings, bool room) {
   int tries = 0;
   const double level = settings.max_protrusion / solid.frame().scale();
+  LeveledBalls nearest = {{}, std::numeric_limits<double>::infinity()};  // to the level, with room
   const auto with = [&](std::size_t count) {
     ++tries;
     const LeveledBalls found = search.with_count(count);
-    SphereCover cover = finished(solid, found.balls);
-    cover.reached =
-        room ? found.level <= kAbout * level : cover.protrusion.largest <= settings.max_protrusion;
+    if (room && found.level < nearest.level) nearest = found;
+    SphereCover cover = finished(solid, room ? nearest.balls : found.balls);
+    cover.reached = room ? nearest.level <= kAbout * level
+                         : cover.protrusion.largest <= settings.max_protrusion;
     return cover;
   };
   const std::size_t guess = search.greedy_count(level);
