@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -23,13 +24,11 @@ struct CoverSphere {
 /// The largest number of spheres of a cover.
 inline constexpr std::size_t kMostCoverSpheres = 4096;
 
-/// A ball around a place where spheres are to protrude less than elsewhere, such as where another
-/// link of a robot passes close by.
-struct TightPlace {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [u]
-  double radius = 0;  ///< [u] above 0; at twice as far the level is the common one again
-  double share = 1;   ///< (0, 1] of the common level of protrusion
-};
+/// How far spheres may protrude from a place of a mesh's surface outward, such as where another
+/// link of a robot passes close by: [u] above 0. `outward`: unit, or zero for the least of any way.
+/// Called from many threads at once.
+using ProtrusionRoom =
+    std::function<double(const Eigen::Vector3d& place, const Eigen::Vector3d& outward)>;
 
 /// Number of spheres, or their largest protrusion.
 struct SphereCoverSettings {
@@ -40,12 +39,12 @@ struct SphereCoverSettings {
   /// Not 0: largest number of spheres of all meshes together. Meshes without a count of their own
   /// share the rest, such that the largest protrusion of all is small. Excludes max_protrusion.
   std::size_t total = 0;
-  /// Places of each mesh where spheres are to protrude less: a wish, never proven. Empty, or one
-  /// list per mesh. Excludes total and max_protrusion.
-  std::vector<std::vector<TightPlace>> tight = {};
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: the fewest spheres
   /// found that protrude by no more.
   double max_protrusion = 0;
+  /// With max_protrusion: where spheres are to protrude less than that, a wish that is never
+  /// proven; about as few spheres as do are looked for. Empty, or one per mesh, which may be null.
+  std::vector<ProtrusionRoom> room = {};
   std::uint64_t seed = 0;  ///< of the search; any value works equally well
   unsigned threads = 0;    ///< 0 = all cores; never changes the result
 };
@@ -90,6 +89,12 @@ SphereCover cover_with_spheres(const ClosedMesh& mesh, const SphereCoverSettings
 std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
                                             const SphereCoverSettings& settings = {},
                                             const ProgressCallback& progress = {});
+
+/// About how many spheres protrude from the solid by no more than max_protrusion, and than `room`:
+/// those of a plain choice, which is quick. Above `enough` it is a lower bound.
+std::size_t estimated_count(const ClosedMesh& mesh, double max_protrusion,
+                            const ProtrusionRoom& room = {},
+                            std::size_t enough = kMostCoverSpheres);
 
 /// Proves, in double, that every point of the solid, and every triangle of its mesh, lies in the
 /// union of the spheres. Spheres whose radius is not finite or not above 0 cover nothing.

@@ -1,10 +1,13 @@
 #include "app/refine_covers.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -12,99 +15,140 @@
 namespace ist::app {
 namespace {
 
-constexpr double kEnough = 0.1;           ///< of the free poses
-constexpr std::size_t kMostOfALink = 32;  ///< on average
-constexpr int kPatience = 3;  ///< rounds without gain: some gaps are too narrow for any spheres
-constexpr double kWorthwhile = 0.95;  ///< of the share before: less gain is none
-constexpr double kMore = 1.25;        ///< spheres of a link that is tightened
-constexpr double kMuchMore = 1.5;     ///< of one that protrudes kFurther
-constexpr double kFurther = 1.1;      ///< times as far as at first
-constexpr double kOften = 0.1;        ///< of the most meetings: what has fewer can wait
-constexpr double kAlike = 0.7;        ///< of the other's level: then both are to blame
-constexpr double kTighter = 0.5;      ///< share of the level, at a time
-constexpr double kTightest = 0.1;     ///< share of the level
-constexpr double kCells = 3;          ///< to the first protrusion
+constexpr double kEnough = 0.1;              ///< of the free poses
+constexpr std::size_t kMostOfALink = 40;     ///< on average
+constexpr double kGivenUp[] = {0.05, 0.03};  ///< share of the free poses, by round
+constexpr double kHopeless = 0.3;   ///< share that is given up where it takes too many spheres
+constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
+constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
+constexpr int kBisections = 3;      ///< of the room in a direction
+constexpr std::size_t kPosesOfAPair = 160;  ///< that are looked at, about
+constexpr std::size_t kTold = 3;            ///< pairs that are in the way
 
-/// Places where a link's spheres protrude too much, by cells.
-class TightCells {
+/// Positions in which spheres of two links met falsely, and how far apart the links are there.
+class Meetings {
  public:
-  explicit TightCells(double size) : size_(size) {}
+  Meetings(const LinkSolids& solids) : solids_(solids) {}
 
-  double share_at(const Eigen::Vector3d& place) const {
-    const auto cell = cells_.find(key(place));
-    return cell == cells_.end() ? 1 : cell->second.share;
+  void add(const std::vector<FalseMeeting>& meetings) {
+    const std::size_t known = all_.size();
+    for (const FalseMeeting& one : meetings)
+      if (seen_.insert({one.a, one.b, one.sample}).second) all_.push_back({one, 0});
+    tbb::parallel_for(known, all_.size(), [&](std::size_t i) {
+      all_[i].gap = solids_.gap(all_[i].at.a, all_[i].at.b, all_[i].at.b_in_a);
+    });
   }
 
-  void count(const Eigen::Vector3d& place) {
-    Cell& cell = cells_[key(place)];
-    cell.sum += place;
-    ++cell.all;
-    ++cell.now;
-    ++counted_;
-  }
+  struct Meeting {
+    FalseMeeting at;
+    double gap;  ///< [u]
+  };
 
-  std::size_t counted() const { return counted_; }  ///< since forget()
-
-  void forget() {
-    for (auto& [key, cell] : cells_) cell.now = 0;
-    counted_ = 0;
-  }
-
-  /// Where most was counted.
-  void tighten() {
-    std::size_t most = 0;
-    for (const auto& [key, cell] : cells_) most = std::max(most, cell.now);
-    for (auto& [key, cell] : cells_)
-      if (static_cast<double>(cell.now) >= kOften * static_cast<double>(most))
-        cell.share = std::max(kTightest, kTighter * cell.share);
-  }
-
-  std::vector<TightPlace> places() const {
-    std::vector<TightPlace> out;
-    for (const auto& [key, cell] : cells_)
-      if (cell.share < 1)
-        out.push_back({cell.sum / static_cast<double>(cell.all), size_, cell.share});
-    return out;
+  /// Those in other positions than the `given_up` that cost most. Where a pair is to be free from a
+  /// gap t on, spheres go with 1 / t and positions that are lost with t and how often the pair
+  /// meets; so the best t goes with the root of that.
+  std::vector<Meeting> without(std::size_t given_up) const {
+    std::map<std::pair<std::size_t, std::size_t>, double> often;
+    for (const Meeting& one : all_) ++often[{one.at.a, one.at.b}];
+    std::map<std::size_t, double> nearest;
+    for (const Meeting& one : all_) {
+      const double cost = one.gap * std::sqrt(often[{one.at.a, one.at.b}]);
+      const auto [at, is_new] = nearest.try_emplace(one.at.sample, cost);
+      at->second = std::min(at->second, cost);
+    }
+    std::vector<std::pair<double, std::size_t>> order;
+    for (const auto& [sample, gap] : nearest) order.emplace_back(gap, sample);
+    std::sort(order.begin(), order.end());
+    order.resize(std::min(given_up, order.size()));
+    std::set<std::size_t> left;
+    for (const auto& [gap, sample] : order) left.insert(sample);
+    std::vector<Meeting> kept;
+    for (const Meeting& one : all_)
+      if (!left.contains(one.at.sample)) kept.push_back(one);
+    return kept;
   }
 
  private:
-  using Key = std::array<std::int64_t, 3>;
-  struct Cell {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    std::size_t all = 0, now = 0;
-    double share = 1;
+  const LinkSolids& solids_;
+  std::set<std::tuple<std::size_t, std::size_t, std::size_t>> seen_;
+  std::vector<Meeting> all_;
+};
+
+/// How far a link's spheres may protrude, so that they meet no others falsely.
+struct LinkRoom {
+  struct Near {
+    std::size_t other;
+    Eigen::Isometry3d in_other;               ///< of the link's frame
+    double share;                             ///< of the distance
+    const std::vector<CoverSphere>* spheres;  ///< that contain the other
   };
 
-  Key key(const Eigen::Vector3d& place) const {
-    const auto at = [&](int k) { return static_cast<std::int64_t>(std::floor(place[k] / size_)); };
-    return {at(0), at(1), at(2)};
+  /// Points between two links belong to that of which they are nearer, by shares.
+  double operator()(const LinkSolids& solids, const Eigen::Vector3d& place,
+                    const Eigen::Vector3d& outward) const {
+    double room = most;
+    for (const Near& one : near) {
+      const double other = (1 - one.share) / one.share;
+      const Eigen::Vector3d from = one.in_other * place, out = one.in_other.linear() * outward;
+      const auto is_ours = [&](double t) {
+        const Eigen::Vector3d at = from + t * out;
+        // Its spheres contain it.
+        const bool is_near =
+            std::any_of(one.spheres->begin(), one.spheres->end(), [&](const CoverSphere& s) {
+              const double reach = s.radius + other * t;
+              return (at - s.centre).squaredNorm() < reach * reach;
+            });
+        return !is_near || solids.distance(one.other, at, other * t) >= other * t;
+      };
+      if (outward.isZero()) {
+        room = one.share * solids.distance(one.other, from, room / one.share);
+        continue;
+      }
+      if (is_ours(room)) continue;
+      double low = one.share * solids.distance(one.other, from, room / one.share);
+      for (int step = 0; step < kBisections; ++step)
+        (is_ours(0.5 * (low + room)) ? low : room) = 0.5 * (low + room);
+      room = low;
+    }
+    return room;
   }
 
-  double size_;
-  std::size_t counted_ = 0;
-  std::map<Key, Cell> cells_;
+  double most;  ///< [u]
+  std::vector<Near> near = {};
 };
 
+/// What is known of a link.
 struct Refined {
   const ClosedMesh* mesh;  ///< null: its spheres stay as they are
-  std::size_t count;
-  double first;  ///< [u] protrusion before
-  TightCells tight;
+  std::size_t own;         ///< spheres that cover the mesh
+  double first;            ///< [u] protrusion before
 };
 
-/// Of two links the one whose spheres may protrude more where they meet is to blame, or both.
-void blame(const SphereRobot& robot, std::vector<Refined>& links) {
-  for (Refined& link : links) link.tight.forget();
-  for (const FalseMeeting& one : robot.self.meetings) {
-    const auto level = [&](std::size_t i, const Eigen::Vector3d& place) {
-      return links[i].mesh == nullptr
-                 ? 0
-                 : links[i].tight.share_at(place) * robot.links[i].cover.protrusion.largest;
-    };
-    const double a = level(one.a, one.in_a), b = level(one.b, one.in_b);
-    if (a > kAlike * b) links[one.a].tight.count(one.in_a);
-    if (b > kAlike * a) links[one.b].tight.count(one.in_b);
+/// By link; of those that stay as they are none is near.
+std::vector<LinkRoom> rooms_of(const std::vector<Refined>& links,
+                               const std::vector<LinkSpheres>& covers,
+                               const std::vector<Meetings::Meeting>& meetings) {
+  std::vector<LinkRoom> rooms;
+  for (const Refined& link : links) rooms.push_back({kElsewhere * link.first});
+  std::map<std::pair<std::size_t, std::size_t>, std::vector<const Meetings::Meeting*>> pairs;
+  for (const Meetings::Meeting& one : meetings) pairs[{one.at.a, one.at.b}].push_back(&one);
+  for (auto& [pair, all] : pairs) {
+    // The tightest first: then the others are soon told to be far.
+    std::stable_sort(all.begin(), all.end(),
+                     [](const auto* x, const auto* y) { return x->gap < y->gap; });
+    const std::size_t step = (all.size() + kPosesOfAPair - 1) / kPosesOfAPair;
+    for (std::size_t i = 0; i < all.size(); i += step) {
+      const FalseMeeting& at = all[i]->at;
+      const auto add = [&](std::size_t link, std::size_t other, const Eigen::Isometry3d& in_other) {
+        if (links[link].mesh != nullptr)
+          rooms[link].near.push_back({other, in_other, links[other].mesh == nullptr ? kWhole : 0.5,
+                                      &covers[other].spheres});
+      };
+      add(at.a, at.b, at.b_in_a.inverse());
+      add(at.b, at.a, at.b_in_a);
+    }
   }
+  return rooms;
 }
 
 }  // namespace
@@ -119,50 +163,70 @@ void complete_cover(SphereLink& link, bool read) {
   p.largest = p.mean = p.p95 = p.volume_ratio = std::numeric_limits<double>::quiet_NaN();
 }
 
-void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const SphereCoverSettings& cover,
-                   const std::map<std::string, std::size_t>& fixed,
+void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
+                   const SphereCoverSettings& cover,
+                   const std::map<std::string, std::size_t>& fixed, bool is_open,
                    const ProgressCallback& progress) {
-  std::vector<Refined> refined;
-  std::size_t count = 0, next = 0;
+  std::vector<Refined> links;
+  std::size_t next = 0, before = 0;
+  SphereCoverSettings settings = cover;
   for (const SphereLink& link : robot.links) {
-    const std::size_t own = link.cover.spheres.size() - link.given.size();
-    count += own;
     const double protrusion = link.cover.protrusion.largest;
     const ClosedMesh* mesh = link.has_mesh ? &robot.meshes[next++] : nullptr;
     if (fixed.contains(link.name) || !(protrusion > 0)) mesh = nullptr;
-    refined.push_back({mesh, own, protrusion, TightCells(protrusion / kCells)});
+    links.push_back({mesh, link.cover.spheres.size() - link.given.size(), protrusion});
+    before += links.back().own;
+    if (mesh != nullptr) settings.max_protrusion = std::max(settings.max_protrusion, protrusion);
   }
-  const std::size_t most = std::max(count, kMostOfALink * robot.links.size());
-  double least = robot.self.false_share();
+  settings.count = kMostCoverSpheres;
+  const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
+  const std::vector<LinkSpheres> first = robot.covers();
+  std::vector<LinkRoom> rooms;
+  const auto room_of = [&](std::size_t i) {
+    return [&, i](const Eigen::Vector3d& place, const Eigen::Vector3d& outward) {
+      return rooms[i](solids, place, outward);
+    };
+  };
+  /// Spheres of each link for these rooms; 0 for those that stay as they are.
+  const auto needed = [&](std::size_t enough) {
+    std::vector<std::size_t> counts(links.size());
+    tbb::parallel_for(std::size_t{0}, links.size(), [&](std::size_t i) {
+      if (!rooms[i].near.empty())
+        counts[i] = estimated_count(*links[i].mesh, settings.max_protrusion, room_of(i), enough);
+    });
+    return counts;
+  };
+  Meetings meetings(solids);
+  const auto given_up = [&](double share) {
+    return static_cast<std::size_t>(share * static_cast<double>(robot.self.free));
+  };
   std::pair best(robot.links, robot.self);
-  int idle = 0;
-  for (int round = 0; idle < kPatience && robot.self.false_share() > kEnough; ++round) {
-    blame(robot, refined);
-    std::size_t often = 0;
-    for (const Refined& one : refined) often = std::max(often, one.tight.counted());
-    if (often == 0) break;
-    std::vector<ClosedMesh> meshes;
-    std::vector<std::size_t> links;
-    SphereCoverSettings settings = cover;
-    for (std::size_t i = 0; i < refined.size(); ++i) {
-      Refined& one = refined[i];
-      if (static_cast<double>(one.tight.counted()) < kOften * static_cast<double>(often)) continue;
-      // Elsewhere it is to protrude no more than at first: then it is not tightened each time.
-      const bool further = robot.links[i].cover.protrusion.largest > kFurther * one.first;
-      if (!further || round % 2 == 0) one.tight.tighten();
-      const double more = (further ? kMuchMore : kMore) * static_cast<double>(one.count);
-      count -= one.count;
-      one.count = std::min(static_cast<std::size_t>(std::ceil(more)), kMostCoverSpheres);
-      count += one.count;
-      settings.counts.push_back(one.count);
-      settings.tight.push_back(one.tight.places());
-      meshes.push_back(*one.mesh);
-      links.push_back(i);
+  for (const double least : kGivenUp) {
+    if (best.second.false_share() <= kEnough) break;
+    meetings.add(robot.self.meetings);
+    if (!is_open) break;
+    std::size_t total = SIZE_MAX;
+    for (double share = least; share < kHopeless && total > budget; share *= 2) {
+      rooms = rooms_of(links, first, meetings.without(given_up(share)));
+      const std::vector<std::size_t> counts = needed(budget);
+      total = 0;
+      for (std::size_t i = 0; i < links.size(); ++i)
+        total += counts[i] > 0 ? counts[i] : links[i].own;
     }
-    if (count > most) break;
+    std::vector<ClosedMesh> meshes;
+    std::vector<std::size_t> changed;
+    settings.room.clear();
+    for (std::size_t i = 0; i < links.size() && total <= budget; ++i) {
+      if (rooms[i].near.empty()) continue;
+      changed.push_back(i);
+      meshes.push_back(*links[i].mesh);
+      settings.room.push_back(room_of(i));
+    }
+    if (changed.empty()) break;
     std::vector<SphereCover> covers = cover_with_spheres(meshes, settings, progress);
-    for (std::size_t i = 0; i < links.size(); ++i) {
-      SphereLink& link = robot.links[links[i]];
+    for (std::size_t i = 0; i < changed.size(); ++i) {
+      SphereLink& link = robot.links[changed[i]];
+      covers[i].reached = true;  // a wish
       covers[i].seconds += link.cover.seconds;
       covers[i].protrusion.largest += link.slack;
       link.proof = prove_cover(meshes[i], covers[i].spheres);
@@ -170,13 +234,33 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const SphereCo
       complete_cover(link, true);
     }
     robot.self = study.of(robot.covers(), true);
-    ++idle;
-    if (robot.self.false_share() > kWorthwhile * least) continue;
-    idle = 0;
-    least = robot.self.false_share();
-    best = {robot.links, robot.self};
+    if (robot.self.false_share() < best.second.false_share()) best = {robot.links, robot.self};
   }
-  if (idle > 0) std::tie(robot.links, robot.self) = std::move(best);
+  std::tie(robot.links, robot.self) = std::move(best);
+  if (robot.self.false_share() <= kEnough) return;
+
+  // What is in the way, where no more than a tenth is given up.
+  std::vector<Meetings::Meeting> left = meetings.without(given_up(kEnough));
+  std::vector<const LinkPair*> worst;
+  for (const LinkPair& pair : robot.self.pairs)
+    if (pair.falsely > 0) worst.push_back(&pair);
+  std::stable_sort(worst.begin(), worst.end(),
+                   [](const LinkPair* x, const LinkPair* y) { return x->falsely > y->falsely; });
+  worst.resize(std::min(worst.size(), kTold));
+  for (const LinkPair* pair : worst) {
+    std::vector<Meetings::Meeting> own;
+    double gap = std::numeric_limits<double>::infinity();
+    for (const Meetings::Meeting& one : left)
+      if (robot.links[one.at.a].name == pair->a && robot.links[one.at.b].name == pair->b) {
+        own.push_back(one);
+        gap = std::min(gap, one.gap);
+      }
+    if (own.empty()) continue;
+    rooms = rooms_of(links, first, own);
+    std::size_t spheres = 0;
+    for (const std::size_t count : needed(kMostCoverSpheres)) spheres += count;
+    robot.too_close.push_back({pair->a, pair->b, gap, spheres});
+  }
 }
 
 }  // namespace ist::app

@@ -8,6 +8,7 @@
 #include <ist/types.h>
 
 #include "app/sphere_output.h"
+#include "library/link_solids.h"
 
 namespace ist::app {
 
@@ -15,13 +16,16 @@ namespace ist::app {
 /// holds the mesh as it was read (`read`).
 void complete_cover(SphereLink& link, bool read);
 
-/// Covers links again whose spheres overlap others' though the solids do not: with more spheres,
-/// that protrude less there. It ends where at most a tenth of the free poses are called colliding,
-/// or with 32 spheres a link on average. The best of all rounds is kept.
+/// Covers links again whose spheres overlap others' though the solids do not: with as many spheres
+/// as it takes to protrude only into the gaps that the solids leave there. It ends where at most a
+/// tenth of the free poses are called colliding, or more than 40 spheres a link on average were
+/// needed. The best of all rounds is kept.
 ///
 /// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
-void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const SphereCoverSettings& cover,
-                   const std::map<std::string, std::size_t>& fixed,
+/// `is_open`: whether counts may change; if not, it is told alone what is in the way.
+void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
+                   const SphereCoverSettings& cover,
+                   const std::map<std::string, std::size_t>& fixed, bool is_open,
                    const ProgressCallback& progress);
 
 }  // namespace ist::app

@@ -63,7 +63,12 @@ Json robot_json(const SphereRobot& robot) {
   Json links = Json::object();
   for (const SphereLink& link : robot.links) links[link.name] = link_json(link);
   const SelfCollision& self = robot.self;
-  Json ignored = Json::array(), wrong = Json::array();
+  Json ignored = Json::array(), wrong = Json::array(), too_close = Json::array();
+  for (const ClosePair& pair : robot.too_close)
+    too_close.push_back({{"links", {pair.a, pair.b}},
+                         {"gap", pair.gap},
+                         {"protrusion", pair.gap / 2},
+                         {"spheres", pair.spheres}});
   for (const LinkPair& pair : self.pairs) {
     if (!pair.ignored.empty())
       ignored.push_back(
@@ -99,7 +104,8 @@ Json robot_json(const SphereRobot& robot) {
             {"colliding", self.colliding},
             {"missed", self.missed},
             {"false", self.falsely},
-            {"wrong", wrong}}}};
+            {"wrong", wrong},
+            {"too_close", too_close}}}};
 }
 
 /// Links and spheres, each a node, in the default pose. glTF's Y is up, a robot's Z.
@@ -166,6 +172,12 @@ std::string self_collision_text(const SphereRobot& robot) {
   for (std::size_t i = 0; i < std::min(kShown, wrong.size()); ++i)
     out += fmt::format("    {} and {}: collide in {}, missed in {}, falsely in {}\n", wrong[i]->a,
                        wrong[i]->b, wrong[i]->colliding, wrong[i]->missed, wrong[i]->falsely);
+  for (const ClosePair& pair : robot.too_close)
+    out += fmt::format(
+        "    {} and {} pass at {:.3g}: spheres that protrude by at most {:.3g} there would tell, "
+        "about "
+        "{} of both links\n",
+        pair.a, pair.b, pair.gap, pair.gap / 2, pair.spheres);
   std::string locked;
   for (const auto& [joint, position] : self.locked)
     locked += fmt::format("{}{} at {:g}", locked.empty() ? "; gripper locked: " : ", ",

@@ -24,6 +24,14 @@ struct SphereLink {
   SphereCoverProof proof;
 };
 
+/// Two links that are in the way of few false collisions: their solids come so close that it takes
+/// many spheres to tell.
+struct ClosePair {
+  std::string a, b;
+  double gap;           ///< [u] in which both protrude, where a tenth of the free poses is given up
+  std::size_t spheres;  ///< of both that this takes, about
+};
+
 /// What `ist spheres` reads and makes.
 struct SphereRobot {
   std::string name, input, output;  ///< of the robot or the mesh; paths
@@ -31,6 +39,7 @@ struct SphereRobot {
   std::vector<ClosedMesh> meshes;   ///< of the links that have one, in their order
   RobotModel robot;                 ///< of a mesh: one link; its file is empty
   SelfCollision self;
+  std::vector<ClosePair> too_close;         ///< if too many free poses are called colliding
   std::vector<std::string> left_out;        ///< links with visual shapes alone
   std::vector<std::string> taken_as_fixed;  ///< joints that move in the file
 

@@ -282,11 +282,12 @@ void compare_links(SphereRobot& input, const SpheresOptions& options,
       wanted_pose(input.robot, options));
   input.self =
       study.of(input.covers(), options.kind == Kind::cover || options.kind == Kind::capsules);
-  if (options.refined()) refine_covers(input, study, options.cover, options.counts, progress);
+  if (options.kind == Kind::cover)
+    refine_covers(input, study, solids, options.cover, options.counts, options.refined(), progress);
   if (constexpr double kMany = 0.1; input.self.false_share() > kMany)
     spdlog::warn(
         "{}: the spheres call {:.0f} % of the free poses colliding: they are too coarse for "
-        "the gaps between some links (the report names the pairs); use more spheres "
+        "the gaps between some links (the report names the pairs and their gaps); use more spheres "
         "(--total, --count LINK=N)",
         options.input, 100 * input.self.false_share());
   const DefaultPose& pose = input.self.pose;

@@ -2,9 +2,11 @@
 
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
+#include <ist/raycast.h>
 #include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "robot/link_mesh.h"
@@ -20,14 +22,16 @@ LinkSolids::~LinkSolids() = default;
 
 std::string LinkSolids::add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres) {
   assets_.emplace_back();
+  TriangleMesh all = mesh == nullptr ? TriangleMesh{} : mesh->mesh;
+  for (const CoverSphere& s : spheres)
+    append_mesh(all, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
+  boxes_.emplace_back();
+  for (const Eigen::Vector3d& v : all.vertices) boxes_.back().extend(v);
   try {
     if (spheres.empty()) {
       assets_.back() = std::make_unique<const Asset>(bake_mesh_only(*mesh));
       return "";
     }
-    TriangleMesh all = mesh == nullptr ? TriangleMesh{} : mesh->mesh;
-    for (const CoverSphere& s : spheres)
-      append_mesh(all, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
     assets_.back() =
         std::make_unique<const Asset>(bake_mesh_only(close_mesh(std::move(all), "link")));
     return "";
@@ -44,6 +48,20 @@ bool LinkSolids::overlap(std::size_t a, std::size_t b, const Eigen::Isometry3d& 
                                         PlacedSolid(assets_[b]->view(), to_pose(b_in_a)), exact,
                                         workspaces_->each.local());
   return found.status != QueryStatus::ok || found.volume_min > 0;
+}
+
+double LinkSolids::gap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const {
+  if (!assets_[a] || !assets_[b]) return 0;
+  return separation(PlacedSolid(assets_[a]->view(), Pose{}),
+                    PlacedSolid(assets_[b]->view(), to_pose(b_in_a)), {}, workspaces_->each.local())
+      .distance_min;
+}
+
+double LinkSolids::distance(std::size_t link, const Eigen::Vector3d& point, double most) const {
+  if (!assets_[link]) return 0;
+  if (boxes_[link].squaredExteriorDistance(point) >= most * most) return most;
+  const double found = closest_point(PlacedSolid(assets_[link]->view(), Pose{}), point).distance;
+  return std::clamp(found, 0.0, most);
 }
 
 }  // namespace ist

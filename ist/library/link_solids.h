@@ -27,9 +27,17 @@ class LinkSolids {
   /// has no exact solid. Thread-safe.
   bool overlap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const;
 
+  /// [u] Between their surfaces; 0 where a link has no exact solid. Thread-safe.
+  double gap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const;
+
+  /// [u] From a point in the link's frame to the link, or `most` if that is less; 0 inside, and
+  /// where it has no exact solid. Thread-safe.
+  double distance(std::size_t link, const Eigen::Vector3d& point, double most) const;
+
  private:
   struct Workspaces;
   std::vector<std::unique_ptr<const Asset>> assets_;  ///< null: there is no exact solid
+  std::vector<Eigen::AlignedBox3d> boxes_;            ///< around them
   std::unique_ptr<Workspaces> workspaces_;
 };
 

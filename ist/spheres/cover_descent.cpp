@@ -229,6 +229,8 @@ class CoverDescent::Round {
 /// Returns how far the worst place that was found is outside.
 double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double level) {
   std::vector<OpenCorner> open = open_corners(solid_.arrays(), balls, holders_);
+  if (sampled_.share)
+    for (OpenCorner& corner : open) corner.gap /= sampled_.share(corner.place, Vector3d::Zero());
   std::stable_sort(open.begin(), open.end(),
                    [](const OpenCorner& a, const OpenCorner& b) { return a.gap > b.gap; });
   std::unordered_set<std::uint64_t> seen;
@@ -266,8 +268,9 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
     for (const Vector3d& p : points) {
       if (!seen.insert(cell_key(p, 0.2 * level)).second) continue;
       const ClosestPoint foot = solid_.closest_point(p);
-      sampled_.rays.push_back({foot.point, (p - foot.point) / foot.distance, foot.distance,
-                               sampled_.share_at(foot.point)});
+      const Vector3d out = (p - foot.point) / foot.distance;
+      sampled_.rays.push_back(
+          {foot.point, out, foot.distance, sampled_.share ? sampled_.share(foot.point, out) : 1});
     }
   }
   return std::max(0.0, *std::max_element(further.begin(), further.end()));
@@ -303,17 +306,21 @@ LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::funct
       look();
       const std::vector<CoverSphere> spheres = balls.spheres();
       double level = aim + add_targets(spheres, aim);
+      const auto grown_to = [&](double to) {
+        return sampled_.share ? Balls({solid_, sampled_, to}, balls.centres).spheres()
+                              : grown(spheres, to - aim);
+      };
       const auto is_better = [&] {
         return first || level < (1 - kWorthwhile) * cover.level ||
                (level < cover.level && level <= aim * (1 + kHeld));
       };
       if (is_better()) {
-        level += add_void(grown(spheres, level - aim + kHeld * aim), aim);
+        level += add_void(grown_to(level + kHeld * aim), aim);
         const std::size_t rays = sampled_.rays.size();
         if (is_better()) level = std::max(level, aim + add_rays(surface, spheres));
         if (is_better()) {
           cover = {balls.centres, level};
-          looked.balls = grown(spheres, level - aim);
+          looked.balls = grown_to(level);
           gained = true;
         }
         if (sampled_.rays.size() != rays) {

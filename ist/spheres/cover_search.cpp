@@ -180,12 +180,12 @@ class Choice {
 std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
                                         std::span<const Eigen::Vector3d> targets, std::size_t count,
                                         std::size_t exchanges, std::uint64_t seed,
-                                        std::int64_t& steps) {
+                                        std::int64_t& steps, std::size_t one_in) {
   const Incidence incidence(candidates, targets);
   steps -= kStepsAPair * incidence.pairs;
   const auto unheld = std::count_if(incidence.holders.begin(), incidence.holders.end(),
                                     [](const auto& holders) { return holders.empty(); });
-  if (50 * static_cast<std::size_t>(unheld) > targets.size()) return {};
+  if (one_in * static_cast<std::size_t>(unheld) > targets.size()) return {};
   Choice choice(incidence);
   while (choice.chosen().size() < count) {
     const std::uint32_t best = choice.most_helpful();
@@ -232,10 +232,13 @@ constexpr int kPasses = 3;                 ///< of exchanges and descent, of whi
 constexpr int kRounds = 120;               ///< of a descent, over all balls
 constexpr std::size_t kTargetsABall = 60;  ///< on faces
 constexpr std::size_t kCandidates = 1200;  ///< that exchanges choose from, about
-constexpr double kThinning = 0.3;          ///< levels between targets that exchanges look at
-constexpr std::size_t kExchanges = 1500;   ///< at a level
-constexpr std::int64_t kSteps = 100'000'000;  ///< of all exchanges of a pass
-constexpr int kLevels = 24;                   ///< that exchanges try
+constexpr std::size_t kCandidatesABall = 20;  ///< where shares of the level are asked for
+constexpr double kThinning = 0.3;             ///< levels between targets that exchanges look at
+constexpr double kTightCell = 0.3;  ///< of the usual cells, where shares of the level are small
+constexpr std::size_t kExchanges = 1500;           ///< at a level
+constexpr std::int64_t kSteps = 100'000'000;       ///< of all exchanges of a pass
+constexpr std::int64_t kTightSteps = 500'000'000;  ///< the same with shares of the level
+constexpr int kLevels = 24;                        ///< that exchanges try
 constexpr double kFinest = 1e-3;  ///< of the level: how close the last radii are to just enough
 
 /// Centres of candidates, and how deep they lie.
@@ -266,25 +269,38 @@ std::vector<Vector3d> centres_of(const std::vector<CoverSphere>& balls,
   return centres;
 }
 
-/// The first point of every cell of a grid.
-std::vector<Vector3d> thinned(const std::vector<Vector3d>& points, double cell) {
-  std::unordered_set<std::uint64_t> seen;
+/// The first target of every cell of a grid: of so many levels, or fewer where their share is
+/// small.
+std::vector<Vector3d> thinned(const SampledSolid& sampled, double cell) {
+  std::unordered_set<std::uint64_t> seen, tight;
   std::vector<Vector3d> some;
-  for (const Vector3d& p : points)
-    if (seen.insert(cell_key(p, cell)).second) some.push_back(p);
+  for (std::size_t i = 0; i < sampled.targets.size(); ++i) {
+    const Vector3d& p = sampled.targets[i];
+    if (i < sampled.tight ? tight.insert(cell_key(p, kTightCell * cell)).second
+                          : seen.insert(cell_key(p, cell)).second)
+      some.push_back(p);
+  }
   return some;
 }
 
-SampledSolid sampled_for(const MeshSolid& solid, std::size_t count,
-                         std::vector<TightPlace> tight = {}) {
-  return sample_solid(solid, std::clamp<std::size_t>(kTargetsABall * count, 1000, 60000),
-                      std::move(tight));
+SampledSolid sampled_for(const MeshSolid& solid, std::size_t count, const LevelShare& share,
+                         double most) {
+  SampledSolid sampled =
+      sample_solid(solid, std::clamp<std::size_t>(kTargetsABall * count, 1000, 60000), share);
+  sampled.most = most;
+  return sampled;
+}
+
+/// Balls hold little of the surface where their share of the level is small: then more are tried.
+std::size_t candidate_count(const SampledSolid& sampled, std::size_t usual, std::size_t count) {
+  return sampled.share ? std::max(usual, kCandidatesABall * count) : usual;
 }
 
 /// The lowest level at which a greedy choice of balls around the medial axis is enough.
 LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std::size_t count) {
-  const Candidates candidates(solid, OffsetSurface(solid, sampled, 0).medial_centres(800));
-  const std::vector<Vector3d> targets = thinned(sampled.targets, 2 * sampled.spacing);
+  const Candidates candidates(
+      solid, OffsetSurface(solid, sampled, 0).medial_centres(candidate_count(sampled, 800, count)));
+  const std::vector<Vector3d> targets = thinned(sampled, 2 * sampled.spacing);
   double low = 1e-3, high = 1;
   LevelCover best;
   for (int k = 0; k < 7; ++k) {
@@ -309,19 +325,25 @@ LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std
 LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelCover cover,
                      std::size_t count, double step, std::uint64_t seed,
                      const std::function<void()>& look) {
-  std::vector<Vector3d> centres =
-      OffsetSurface(solid, sampled, cover.level).medial_centres(kCandidates);
-  centres.insert(centres.end(), cover.centres.begin(), cover.centres.end());
-  const Candidates candidates(solid, std::move(centres));
-  const std::vector<Vector3d> targets = thinned(sampled.targets, kThinning * cover.level);
+  const auto candidates_at = [&](double level) {
+    std::vector<Vector3d> centres =
+        OffsetSurface(solid, sampled, level)
+            .medial_centres(candidate_count(sampled, kCandidates, count));
+    centres.insert(centres.end(), cover.centres.begin(), cover.centres.end());
+    return Candidates(solid, std::move(centres));
+  };
+  Candidates candidates = candidates_at(cover.level);
+  const std::vector<Vector3d> targets = thinned(sampled, kThinning * cover.level);
   double factor = 1 - step;
-  std::int64_t steps = kSteps;
+  std::int64_t steps = sampled.share ? kTightSteps : kSteps;
   for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
     const double level = cover.level * factor;
+    // Tight edges are held by balls for their level alone.
+    if (sampled.share) candidates = candidates_at(level);
     const std::vector<CoverSphere> balls =
         candidates.balls_at(OffsetSurface(solid, sampled, level));
     const std::vector<std::uint32_t> chosen =
-        choose_cover(balls, targets, count, kExchanges, ++seed, steps);
+        choose_cover(balls, targets, count, kExchanges, ++seed, steps, sampled.share ? 300 : 50);
     look();
     if (chosen.empty())
       factor = std::sqrt(factor);
@@ -343,20 +365,28 @@ double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>
 
 }  // namespace
 
-std::size_t CoverSearch::greedy_count(double level) const {
-  const SampledSolid sampled = sampled_for(solid_, 64);
-  const OffsetSurface surface(solid_, sampled, level);
-  return choose_greedily(Candidates(solid_, surface.medial_centres(3000)).balls_at(surface),
-                         thinned(sampled.targets, 0.5 * level))
-      .size();
+std::size_t CoverSearch::greedy_count(double level, std::size_t enough) const {
+  for (std::size_t count = 64;;) {
+    const SampledSolid sampled = sampled_for(solid_, count, share_, most_);
+    const OffsetSurface surface(solid_, sampled, level);
+    const std::size_t found =
+        choose_greedily(
+            Candidates(solid_, surface.medial_centres(candidate_count(sampled, 3000, count)))
+                .balls_at(surface),
+            thinned(sampled, 0.5 * level))
+            .size();
+    // More balls need more samples to be told apart.
+    if (!share_ || 2 * found < 3 * count || found > enough || count >= kMostCoverSpheres)
+      return found;
+    count = std::min(2 * found, kMostCoverSpheres);
+  }
 }
 
-std::vector<CoverSphere> CoverSearch::with_count(std::size_t count) const {
-  SampledSolid sampled = sampled_for(solid_, count, tight_);
+LeveledBalls CoverSearch::with_count(std::size_t count) const {
+  SampledSolid sampled = sampled_for(solid_, count, share_, most_);
   look_(0.1);
   LevelCover start = greedy_cover(solid_, sampled, count);
-  std::vector<CoverSphere> best;
-  double least = std::numeric_limits<double>::infinity();
+  LeveledBalls best = {{}, std::numeric_limits<double>::infinity()};
   for (int pass = 0; pass < kPasses; ++pass) {
     const double share = 0.2 + 0.7 * pass / kPasses;
     const std::function<void()> look = [&] { look_(share); };
@@ -370,14 +400,11 @@ std::vector<CoverSphere> CoverSearch::with_count(std::size_t count) const {
     if (start.level == before && pass > 0) break;
     LookedCover looked = CoverDescent(solid_, sampled).improve(std::move(start), kRounds, look);
     grow_to_cover(solid_, looked.balls, kFinest * looked.cover.level);
-    const double largest = tight_.empty()
-                               ? largest_protrusion(solid_, looked.balls, 1.01 * looked.cover.level)
-                               : looked.cover.level;
+    const double largest =
+        share_ ? looked.cover.level
+               : largest_protrusion(solid_, looked.balls, 1.01 * looked.cover.level);
     start = std::move(looked.cover);
-    if (largest < least) {
-      least = largest;
-      best = std::move(looked.balls);
-    }
+    if (largest < best.level) best = {std::move(looked.balls), largest};
   }
   look_(0.95);
   return best;

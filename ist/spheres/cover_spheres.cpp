@@ -29,9 +29,9 @@ namespace {
 /// Equal meshes of which as many spheres are asked for, and their covers by count.
 struct CoverPart {
   const ClosedMesh* mesh;
-  std::size_t count;                     ///< 0: a share of the total
-  std::size_t copies;                    ///< meshes
-  const std::vector<TightPlace>* tight;  ///< null: none
+  std::size_t count;           ///< 0: a share of the total
+  std::size_t copies;          ///< meshes
+  const ProtrusionRoom* room;  ///< null: none
   std::map<std::size_t, SphereCover> tried = {};
 };
 
@@ -49,14 +49,14 @@ std::vector<std::size_t> parts_of(std::span<const ClosedMesh> meshes,
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     std::size_t count = settings.counts.empty() ? 0 : settings.counts[i];
     if (count == 0 && settings.total == 0) count = settings.count;
-    const auto* const tight =
-        settings.tight.empty() || settings.tight[i].empty() ? nullptr : &settings.tight[i];
+    const auto* const room =
+        settings.room.empty() || !settings.room[i] ? nullptr : &settings.room[i];
     const auto found = std::find_if(parts.begin(), parts.end(), [&](const CoverPart& part) {
-      return part.count == count && part.tight == tight && equal(*part.mesh, meshes[i]);
+      return part.count == count && part.room == room && equal(*part.mesh, meshes[i]);
     });
     part_of.push_back(static_cast<std::size_t>(found - parts.begin()));
     if (found == parts.end())
-      parts.push_back({&meshes[i], count, 1, tight});
+      parts.push_back({&meshes[i], count, 1, room});
     else
       ++found->copies;
   }
@@ -114,7 +114,10 @@ std::vector<std::size_t> shared_counts(
 
 using Eigen::Vector3d;
 
-constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
+constexpr int kMostTries = 8;    ///< counts that are tried for a protrusion; doubling goes on
+constexpr double kOfGuess = 1;   ///< with room: of a plain choice's balls, to begin with
+constexpr int kRoomTries = 2;    ///< with room: counts that are tried
+constexpr double kAbout = 1.25;  ///< with room: times the level that are good enough
 
 /// What several searches have done together, told by the thread that started them.
 class Watch {
@@ -180,18 +183,13 @@ void check(const SphereCoverSettings& settings, std::size_t meshes) {
                   std::to_string(kMostCoverSpheres));
   if (!(settings.max_protrusion >= 0) || !std::isfinite(settings.max_protrusion))
     throw Error("cover: the largest protrusion must be finite and 0 or more");
-  if ((settings.total > 0) + (settings.max_protrusion > 0) + !settings.tight.empty() > 1)
-    throw Error("cover: total, max_protrusion and tight exclude each other");
-  if (!settings.tight.empty() && settings.tight.size() != meshes)
-    throw Error("cover: " + std::to_string(settings.tight.size()) + " lists of tight places for " +
-                std::to_string(meshes) + " meshes");
-  for (const auto& places : settings.tight)
-    for (const TightPlace& one : places)
-      if (!one.centre.allFinite() || !(one.radius > 0) || !std::isfinite(one.radius) ||
-          !(one.share > 0) || !(one.share <= 1))
-        throw Error(
-            "cover: a tight place needs a finite centre, a finite radius above 0 and a "
-            "share above 0 and at most 1");
+  if (settings.total > 0 && settings.max_protrusion > 0)
+    throw Error("cover: total and max_protrusion exclude each other");
+  if (settings.room.empty()) return;
+  if (settings.max_protrusion == 0) throw Error("cover: room needs max_protrusion");
+  if (settings.room.size() != meshes)
+    throw Error("cover: room of " + std::to_string(settings.room.size()) + " meshes for " +
+                std::to_string(meshes));
 }
 
 SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& balls) {
@@ -201,32 +199,51 @@ SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& bal
   return cover;
 }
 
+constexpr double kLeastShare = 0.05;      ///< of the level: less room than that is given up
+constexpr double kLeastEstimated = 1e-3;  ///< the same where spheres are only counted
+
+/// `room`: as shares of `most`, of at least `least`; null: none.
+CoverSearch search_of(const MeshSolid& solid, std::uint64_t seed, std::function<void(double)> look,
+                      double most, const ProtrusionRoom& room, double least) {
+  if (!room) return {solid, seed, std::move(look)};
+  return {solid, seed, std::move(look),
+          [&room, most, least, &solid](const Vector3d& place, const Vector3d& outward) {
+            return std::clamp(room(solid.frame().from_unit(place), outward) / most, least, 1.0);
+          },
+          most / solid.frame().scale()};
+}
+
 /// As few spheres as reach no further than asked: twice as many until it is enough, then halfway
 /// between too few and enough.
 SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
-                   const SphereCoverSettings& settings) {
+                   const SphereCoverSettings& settings, bool room) {
   int tries = 0;
+  const double level = settings.max_protrusion / solid.frame().scale();
+  LeveledBalls nearest = {{}, std::numeric_limits<double>::infinity()};  // to the level, with room
   const auto with = [&](std::size_t count) {
     ++tries;
-    return finished(solid, search.with_count(count));
+    const LeveledBalls found = search.with_count(count);
+    if (room && found.level < nearest.level) nearest = found;
+    SphereCover cover = finished(solid, room ? nearest.balls : found.balls);
+    cover.reached = room ? nearest.level <= kAbout * level
+                         : cover.protrusion.largest <= settings.max_protrusion;
+    return cover;
   };
-  const double level = settings.max_protrusion / solid.frame().scale();
+  const std::size_t guess = search.greedy_count(level);
   std::size_t low = 0;  // too few
-  std::size_t high = std::clamp<std::size_t>(search.greedy_count(level) / 2, 1, settings.count);
+  const auto first = static_cast<std::size_t>((room ? kOfGuess : 0.5) * static_cast<double>(guess));
+  std::size_t high = std::clamp<std::size_t>(first, 1, settings.count);
   SphereCover best = with(high);
-  while (best.protrusion.largest > settings.max_protrusion) {
+  while (!best.reached && high < settings.count && !(room && tries == kRoomTries)) {
     low = high;
-    if (high == settings.count) {
-      best.reached = false;
-      return best;
-    }
-    high = std::min(settings.count, 2 * high);
+    high = std::min(settings.count, room ? high + high / 4 + 1 : 2 * high);
     best = with(high);
   }
+  if (room || !best.reached) return best;
   while (high - low > std::max<std::size_t>(1, high / 16) && tries < kMostTries) {
     const std::size_t middle = (low + high) / 2;
     SphereCover fewer = with(middle);
-    if (fewer.protrusion.largest <= settings.max_protrusion) {
+    if (fewer.reached) {
       best = std::move(fewer);
       high = middle;
     } else {
@@ -239,24 +256,19 @@ SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
 SphereCover cover_one(const CoverPart& part, const SphereCoverSettings& settings, Watch& watch) {
   const auto start = std::chrono::steady_clock::now();
   const MeshSolid solid(*part.mesh);
-  std::vector<TightPlace> tight;
-  if (part.tight != nullptr) tight = *part.tight;
-  for (TightPlace& one : tight) {
-    one.centre = solid.closest_point(solid.frame().to_unit(one.centre)).point;
-    one.radius /= solid.frame().scale();
-  }
   std::atomic<double> done = 0;
-  const CoverSearch search(
+  const ProtrusionRoom none;
+  const CoverSearch search = search_of(
       solid, settings.seed,
       [&](double share) {
         const double before = done.load();
         if (share > before) done = share;  // one thread at a time gets further
         watch.look(before, std::max(before, share));
       },
-      std::move(tight));
+      settings.max_protrusion, part.room == nullptr ? none : *part.room, kLeastShare);
   SphereCover cover = settings.max_protrusion > 0
-                          ? fewest(solid, search, settings)
-                          : finished(solid, search.with_count(settings.count));
+                          ? fewest(solid, search, settings, part.room != nullptr)
+                          : finished(solid, search.with_count(settings.count).balls);
   watch.look(done, 1);
   cover.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return cover;
@@ -320,6 +332,14 @@ std::vector<SphereCover> cover_with_spheres(std::span<const ClosedMesh> meshes,
 SphereCover cover_with_spheres(const ClosedMesh& mesh, const SphereCoverSettings& settings,
                                const ProgressCallback& progress) {
   return cover_with_spheres(std::span(&mesh, 1), settings, progress).front();
+}
+
+std::size_t estimated_count(const ClosedMesh& mesh, double max_protrusion,
+                            const ProtrusionRoom& room, std::size_t enough) {
+  const MeshSolid solid(mesh);
+  return search_of(
+             solid, 0, [](double) {}, max_protrusion, room, kLeastEstimated)
+      .greedy_count(max_protrusion / solid.frame().scale(), enough);
 }
 
 SphereCoverProof prove_cover(const ClosedMesh& mesh, std::span<const CoverSphere> spheres) {

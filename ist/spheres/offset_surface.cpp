@@ -24,11 +24,14 @@ double depth_in(const MeshSolid& solid, const Vector3d& point) {
 }
 
 OffsetSurface::OffsetSurface(const MeshSolid& solid, const SampledSolid& sampled, double level)
-    : solid_(&solid), level_(level), spacing_(sampled.spacing), least_(level) {
+    : solid_(&solid),
+      level_(std::min(level, sampled.most)),
+      spacing_(sampled.spacing),
+      least_(level_) {
   std::vector<Vector3d> points, normals, tight;
   Eigen::AlignedBox3d box;
   for (const OutwardRay& ray : sampled.rays) {
-    const double here = level * ray.share;
+    const double here = std::min(level * ray.share, level_);
     if (ray.reach < here) continue;
     points.push_back(ray.foot + here * ray.direction);
     if (ray.share < 1) tight.push_back(points.back());

@@ -20,6 +20,7 @@ using Eigen::Vector3d;
 constexpr double kLongestRay = 4;  ///< unit frame: beyond any protrusion
 constexpr double kSharp = 0.85;    ///< cosine between faces whose edge is an edge of the solid
 constexpr double kOff = 1e-6;      ///< unit frame: a step off the surface
+constexpr double kTight = 0.5;     ///< share of the level: less is sampled more densely
 constexpr std::size_t kMostInside = 1500;
 
 struct Face {
@@ -66,6 +67,7 @@ class Thinning {
 
 struct Sample {
   Vector3d point, normal;
+  double share = 1;
 };
 
 /// Middles of the parts of a face, halved across its longest side until no side is above `longest`.
@@ -145,7 +147,7 @@ std::vector<OutwardRay> rays_of(const MeshSolid& solid, const std::vector<Sample
   std::vector<OutwardRay> rays(samples.size());
   tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
     const Sample& s = samples[i];
-    rays[i] = {s.point, s.normal, 0};
+    rays[i] = {s.point, s.normal, 0, s.share};
     if (solid.may_overlap() && solid.inside(s.point + kOff * s.normal)) return;
     rays[i].reach = reach_of(solid, s);
   });
@@ -176,35 +178,35 @@ std::vector<Vector3d> points_inside(const MeshSolid& solid, double spacing) {
 
 }  // namespace
 
-double SampledSolid::share_at(const Vector3d& foot) const {
-  double share = 1;
-  for (const TightPlace& one : tight) {
-    const double away = std::sqrt((foot - one.centre).squaredNorm()) / one.radius;
-    share = std::min(share, one.share + (1 - one.share) * std::max(0.0, away - 1));
-  }
-  return share;
-}
-
-SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets,
-                          std::vector<TightPlace> tight) {
+SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets, LevelShare share) {
   const MeshView& mesh = solid.view();
   const std::vector<Face> faces = faces_of(mesh);
   double area = 0;
   for (const Face& face : faces) area += face.area;
   SampledSolid out;
   out.spacing = std::sqrt(area / static_cast<double>(targets));
-  const EdgeSamples edges = sample_edges(mesh, faces, out.spacing / 2);
+  out.share = std::move(share);
+  EdgeSamples edges = sample_edges(mesh, faces, out.spacing / 2);
   std::vector<Sample> coarse, fine;
   Thinning thin_coarse(out.spacing), thin_fine(out.spacing / 2);
   for (const Face& face : faces) {
     sample_face(face, out.spacing, thin_coarse, coarse);
     sample_face(face, out.spacing / 2, thin_fine, fine);
   }
+  if (out.share)
+    for (auto* samples : {&coarse, &fine, &edges.fans})
+      tbb::parallel_for(std::size_t{0}, samples->size(), [&](std::size_t i) {
+        Sample& s = (*samples)[i];
+        s.share = out.share(s.point, s.normal);
+      });
+  for (const Sample& s : fine)
+    if (s.share < kTight) out.targets.push_back(s.point);
+  out.tight = out.targets.size();
   // Balls near edges are small, so that rays stand close there; elsewhere as far apart as targets.
   const PointGrid on_edges(edges.points);
   const double close = 3 * out.spacing;
   std::erase_if(fine, [&](const Sample& s) {
-    bool is_close = false;
+    bool is_close = s.share < kTight;
     on_edges.within(s.point, close * (1 + 1e-5) + 1e-6, [&](std::uint32_t place, float) {
       const Vector3d& p = edges.points[on_edges.index(place)];
       is_close |= (p - s.point).squaredNorm() < close * close;
@@ -214,8 +216,6 @@ SampledSolid sample_solid(const MeshSolid& solid, std::size_t targets,
   fine.insert(fine.end(), coarse.begin(), coarse.end());
   fine.insert(fine.end(), edges.fans.begin(), edges.fans.end());
   out.rays = rays_of(solid, fine);
-  out.tight = std::move(tight);
-  for (OutwardRay& ray : out.rays) ray.share = out.share_at(ray.foot);
   for (const Sample& s : coarse) out.targets.push_back(s.point);
   out.targets.insert(out.targets.end(), edges.points.begin(), edges.points.end());
   const std::vector<Vector3d> inside = points_inside(solid, 2 * out.spacing);

@@ -124,7 +124,8 @@ ShapeMesh mesh_of(const PlacedLinkShape& placed, const PackagePaths& paths,
       throw Error("a sphere has no mesh");
     }
   } catch (const Error& error) {
-    throw Error(file + ": line " + std::to_string(placed.line) + ": " + error.what());
+    const std::string line = placed.line == 0 ? "" : "line " + std::to_string(placed.line) + ": ";
+    throw Error(file + ": " + line + error.what());
   }
   const Eigen::Matrix3d turn = placed.rotation.toRotationMatrix();
   const bool turned = !placed.rotation.isApprox(Eigen::Quaterniond::Identity(), 0);

@@ -33,6 +33,7 @@ constexpr const char* kAttributes[] = {
 /// An element, with those of included files in their places.
 struct Node {
   std::string name, where;  ///< "file: line n: <name>"
+  std::size_t line;         ///< n, of the robot's own file; 0: of an included one
   Attributes attributes;
   std::vector<Node> children;
 };
@@ -88,12 +89,11 @@ class MjcfReader {
     Node node;
     node.name = xml[element].name;
     const auto& bytes = depth == 0 ? robot_.file.bytes : included_.back().bytes;
-    node.where = path + ": line " +
-                 std::to_string(1 + std::count(bytes.begin(),
-                                               bytes.begin() +
-                                                   static_cast<std::ptrdiff_t>(xml[element].offset),
-                                               '\n')) +
-                 ": <" + node.name + ">";
+    const auto line = static_cast<std::size_t>(
+        1 + std::count(bytes.begin(),
+                       bytes.begin() + static_cast<std::ptrdiff_t>(xml[element].offset), '\n'));
+    node.line = depth == 0 ? line : 0;
+    node.where = path + ": line " + std::to_string(line) + ": <" + node.name + ">";
     for (const char* const key : kAttributes)
       if (const std::string_view text = xml.attribute(element, key); !text.empty())
         node.attributes[key] = text;
@@ -172,6 +172,7 @@ class MjcfReader {
     const Attributes a = with_defaults(node, "");
     const std::string file = value(a, "file");
     const std::string name = value(a, "name", fs::path(file).stem().string());
+    if (meshes_by_name_.contains(name)) fail(node, "duplicates the mesh " + in_quotes(name));
     PlacedLinkShape& shape = meshes_by_name_[name];
     if (file.empty()) {
       shape.shape = LinkFault{node.where + ": has no file; write its vertices into one"};
@@ -392,6 +393,7 @@ class MjcfReader {
     }
     placed.rotation = Eigen::Quaterniond(at.linear());
     placed.translation = at.translation();
+    placed.line = node.line;
     return placed;
   }
 

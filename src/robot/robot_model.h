@@ -44,7 +44,7 @@ struct PlacedLinkShape {
   LinkShape shape;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< [u]
-  std::size_t line = 0;                                   ///< of the file, for messages
+  std::size_t line = 0;                                   ///< of the file; 0: of an included one
 };
 
 /// Which of a link's two sets of shapes is meant.

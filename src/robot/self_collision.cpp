@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <optional>
 #include <random>
 
 namespace ist {
@@ -41,25 +40,6 @@ bool overlap(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
       if (meet(p, q, centre)) return true;
   }
   return false;
-}
-
-/// Where they overlap most, if they do.
-std::optional<FalseMeeting> meeting(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
-  std::optional<FalseMeeting> where;
-  double most = 0;
-  for (const CoverSphere& q : b.spheres) {
-    const Vector3d centre = b_in_a * q.centre;
-    for (const CoverSphere& p : a.spheres) {
-      const Vector3d way = centre - p.centre;
-      const double apart = std::sqrt(way.squaredNorm());
-      const double depth = p.radius + q.radius - apart;
-      if (!(depth > most) || apart == 0) continue;
-      most = depth;
-      const Vector3d middle = p.centre + (p.radius - depth / 2) / apart * way;
-      where = FalseMeeting{0, 0, middle, b_in_a.inverse() * middle};
-    }
-  }
-  return where;
 }
 
 std::vector<Body> bodies_of(std::span<const LinkSpheres> links) {
@@ -262,6 +242,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
   out.locked = locked_;
   out.pairs.resize(pairs_.size());
   std::vector<std::vector<FalseMeeting>> meetings(pairs_.size());
+  std::vector<std::uint8_t> deciding(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
     Pair& pair = pairs_[i];
     LinkPair& told = out.pairs[i];
@@ -281,9 +262,8 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       look(pair, k, by_spheres, by_solids);
       solids += by_solids ? 1 : 0;
       spheres += by_spheres ? 1 : 0;
-      if (!by_spheres || by_solids || opens) continue;
-      if (auto one = meeting(bodies[pair.a], bodies[pair.b], pair.b_in_a(robot_, samples_[k])))
-        meetings[i].push_back({pair.a, pair.b, one->in_a, one->in_b});
+      if (by_spheres && !by_solids && !opens)
+        meetings[i].push_back({pair.a, pair.b, k, pair.b_in_a(robot_, samples_[k])});
     }
     const bool always = solids == told.tried;
     // A pair whose spheres rarely overlap costs little: it is compared rather than trusted.
@@ -295,9 +275,15 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
     if ((never || always) && (pair.free.empty() || holds(pair, always, apart, told.tried)))
       told.ignored = always ? "Always" : "Never";
     if (!told.ignored.empty()) meetings[i].clear();
+    if (told.ignored == "Always" || pair.free.empty()) return;
+    for (std::size_t k = 0; k < half_; ++k)
+      if (pair.truth[k] == Pair::Truth::overlapping)
+        std::atomic_ref(deciding[k]).store(1, std::memory_order_relaxed);
   });
+  out.free = static_cast<std::size_t>(std::count(deciding.begin(), deciding.end(), 0));
   for (const auto& some : meetings)
-    out.meetings.insert(out.meetings.end(), some.begin(), some.end());
+    for (const FalseMeeting& one : some)
+      if (deciding[one.sample] == 0) out.meetings.push_back(one);
   choose_pose(bodies, cover, out);
   std::vector<std::uint8_t> calls(half_), truths(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {

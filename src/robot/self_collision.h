@@ -45,15 +45,17 @@ struct DefaultPose {
   std::vector<std::pair<std::string, std::string>> overlapping;
 };
 
-/// Spheres of two links that overlap most in a position in which their solids do not.
+/// Compared spheres of two links that overlap in a position in which no solids do.
 struct FalseMeeting {
-  std::size_t a, b;            ///< of the links compared
-  Eigen::Vector3d in_a, in_b;  ///< where, in either link's frame
+  std::size_t a, b;    ///< of the links compared
+  std::size_t sample;  ///< of the positions that decide
+  Eigen::Isometry3d b_in_a;
 };
 
 struct SelfCollision {
   std::vector<LinkPair> pairs;
   std::vector<FalseMeeting> meetings;  ///< in the positions that decide, not in `samples`
+  std::size_t free = 0;                ///< of the positions that decide: no solids overlap
   DefaultPose pose;
   std::map<std::size_t, double> locked;  ///< joints of grippers: open, in the pose and the samples
   /// Positions of all joints, drawn within their limits after all was decided, and how many of them

@@ -282,30 +282,34 @@ double protrusion_above(double from, const SphereCover& cover, const Eigen::Alig
   return most;
 }
 
-TEST(CoverSpheres, ProtrudeLessWherePlacesAreTight) {
+TEST(CoverSpheres, ProtrudeLessWhereThereIsLessRoom) {
   const Eigen::AlignedBox3d box(Vector3d(0, 0, 0), Vector3d(4, 0.5, 0.4));
   const ClosedMesh mesh = close_mesh(box_mesh(box.min(), box.max()), "bar");
   SphereCoverSettings settings;
-  settings.count = 40;
-  const double even = cover_with_spheres(mesh, settings).protrusion.largest;
-  settings.tight = {{{Vector3d(4, 0.25, 0.2), 0.4, 0.3}}};
+  settings.max_protrusion = 0.1;
+  settings.count = 400;
+  const SphereCover even = cover_with_spheres(mesh, settings);
+  EXPECT_GT(protrusion_above(3.8, even, box), 0.07);
+  const double least = 0.03;
+  const auto room = [&](const Vector3d& place, const Vector3d&) { return place.x() > 3.5 ? least : 0.1; };
+  settings.room = {room};
   const SphereCover cover = cover_with_spheres(mesh, settings);
   EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
-  EXPECT_LE(cover.spheres.size(), 40u);
-  EXPECT_LT(protrusion_above(3.7, cover, box), 0.7 * even);
-  EXPECT_LT(cover.protrusion.largest, 1.7 * even);
-  // Equal meshes of which one has tight places are not covered alike.
-  settings.tight.push_back({});
+  EXPECT_LT(protrusion_above(3.8, cover, box), 1.2 * least);
+  EXPECT_LT(cover.protrusion.largest, 0.12);
+  // It takes more, where there is less room alone.
+  EXPECT_GT(cover.spheres.size(), even.spheres.size());
+  const std::size_t estimate = estimated_count(mesh, 0.1, room);
+  EXPECT_LE(cover.spheres.size(), estimate);
+  EXPECT_GT(2 * cover.spheres.size(), estimate);
+  EXPECT_LT(cover.spheres.size(), estimated_count(mesh, least));
+  // Equal meshes of which one has less room are not covered alike.
+  settings.room.push_back(nullptr);
   const std::vector<ClosedMesh> both = {mesh, mesh};
-  const std::vector<SphereCover> covers = cover_with_spheres(both, settings);
-  EXPECT_LT(covers[1].protrusion.largest, 1.01 * even);
-  EXPECT_GT(protrusion_above(3.7, covers[1], box), 0.7 * even);
-  settings.tight.pop_back();
+  EXPECT_EQ(cover_with_spheres(both, settings)[1].spheres.size(), even.spheres.size());
+  settings.room.pop_back();
   EXPECT_THROW(cover_with_spheres(both, settings), Error);
-  settings.tight[0][0].share = 0;
-  EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
-  settings.tight[0][0].share = 0.5;
-  settings.max_protrusion = 1;
+  settings.max_protrusion = 0;
   EXPECT_THROW(cover_with_spheres(mesh, settings), Error);
 }
 

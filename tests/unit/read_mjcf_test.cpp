@@ -97,6 +97,16 @@ TEST(Mjcf, IncludesAndEqualities) {
   EXPECT_EQ(link_frames(robot, {0, 0.25, 0})[3].translation(), Vector3d(0, 0.25, 0));
 }
 
+TEST(Mjcf, ShapesKnowTheirLines) {
+  const RobotModel robot = read_robot(SourceFile{
+      "m.xml",
+      "<mujoco>\n<asset><mesh name='m' file='a.stl'/></asset>\n<worldbody><body name='b'>\n"
+      "<geom type='mesh' mesh='m'/>\n<geom size='1'/></body></worldbody></mujoco>"});
+  ASSERT_EQ(robot.links[1].collision.size(), 2u);
+  EXPECT_EQ(robot.links[1].collision[0].line, 4u);
+  EXPECT_EQ(robot.links[1].collision[1].line, 5u);
+}
+
 TEST(Mjcf, SaysWhatIsWrongAndWhere) {
   const auto expect = [](const std::string& inside, const std::string& message) {
     EXPECT_NE(mjcf_error(inside).find(message), std::string::npos) << mjcf_error(inside);
@@ -106,6 +116,8 @@ TEST(Mjcf, SaysWhatIsWrongAndWhere) {
   expect("<worldbody><body><joint range='2 1'/></body></worldbody>", "the smaller first");
   expect("<worldbody><body name='a'/><body name='a'/></worldbody>", "duplicates the body");
   expect("<worldbody><body quat='0 0 0 0'/></worldbody>", "not all 0");
+  expect("<asset><mesh name='m' file='a.stl'/><mesh name='m' file='b.stl'/></asset>",
+         "duplicates the mesh \"m\"");
   expect("<worldbody><geom class='none'/></worldbody>", "its class \"none\" is not defined");
   expect("<worldbody><frame/></worldbody>", "mj_saveLastXML");
   expect("<contact><exclude body1='a' body2='b'/></contact>", "\"a\" is not a body");
