@@ -8,21 +8,60 @@
 
 namespace ist::gpu {
 
-constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles, of a stage
-constexpr float kExactFar = 3e38f;  ///< where what is not there lies: beyond any ratio of sizes
-
-/// Children of a node, or a node alone: boxes and slabs.
-struct ExactBoxes {
-  float low[3][kWidth], high[3][kWidth];                         ///< in the solid's own frame
-  float other_low[3][kWidth], other_high[3][kWidth];             ///< in the other's
-  float normal[3][kWidth], slab_low[kWidth], slab_high[kWidth];  ///< A's frame
-  float turned[3][kWidth];  ///< of A's: what a side of B's box, of length 1, reaches along a normal
+/// Four numbers that are read and written at once.
+struct alignas(16) Quad {
+  float x[4];
 };
 
-/// Boxes of a block's triangles, A's frame.
-struct ExactTriangles {
-  float at[3][kWidth];  ///< vertices
-  float low[3][kWidth], high[3][kWidth];
+constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles to be sifted
+
+/// What a team keeps at hand of a pair.
+struct ExactPair : ExactFrame {
+  MeshTree mesh[2];
+  Quad row[2][3];   ///< of the map to the other's frame, the shift last
+  Quad turn[2][3];  ///< of the other's axes from one's own
+
+  /// A vertex in A's frame.
+  IST_HD exact::Point vertex(int side, std::uint32_t number) const {
+    const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
+    const exact::Point at = {x[0], x[1], x[2]};
+    return side == 0 ? at : map_point(place.a_from_b, at);
+  }
+  IST_HD void load(int side, std::uint32_t triangle, exact::Point (&corners)[3]) const {
+    const MeshBlock& block = in_global_memory(mesh[side].blocks)[triangle / kWidth];
+    IST_ROLLED
+    for (int k = 0; k < 3; ++k)
+      corners[k] = vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
+  }
+};
+
+/// A child of a node, or a node alone. Own boxes are wider by the reach.
+struct ExactBox {
+  Quad low, high;              ///< in the solid's own frame; last its slab, A's frame
+  Quad other_low, other_high;  ///< in the other's
+  Quad normal;                 ///< of the slab, A's frame
+  Quad turned;  ///< of A's: what a side of B's box, of length 1, reaches along the normal
+};
+
+/// A triangle in A's frame, in floats.
+struct ExactTriangle {
+  Quad low, high;      ///< its box; A's is wider by the slack
+  Quad plane;          ///< a point is so high over it, times twice the area: x · normal + last
+  float margin;        ///< heights above which are certain, wherever points move by the room
+  std::uint32_t name;  ///< its lane in its block, and in bytes its corners' places there
+};
+
+/// What a team that searches keeps beside the pair.
+struct ExactSearchMemory {
+  static constexpr std::uint32_t kWaiting = 128;  ///< pairs of nodes, of the first pass
+  ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
+  ExactTriangle triangles[2][kWidth];             ///< likewise
+  Quad vertices[2][kWidth];
+  std::uint64_t waiting[kWaiting];
+  std::uint32_t queue[kExactWaiting][2];  ///< triangles to be sifted, 16 · block + lane
+  std::uint8_t lane[2][kWidth];           ///< of the boxes
+  std::uint8_t found[kWidth * kWidth];    ///< pairs of boxes of leaves that meet, 16 · A's + B's
+  std::uint8_t met[kWidth * kWidth];      ///< of triangles, likewise
 };
 
 /// What a lane has summed: a volume in two parts, vectors in three.
@@ -39,25 +78,10 @@ struct ExactSum {
   };
 };
 
-/// What a team keeps at hand of a pair.
-struct ExactMemory {
-  PairPlace place;
-  MeshTree mesh[2];
-  exact::Point aside, origin;
-  double moved[2];   ///< no point of a surface is further from where it ought to be
-  float reach[2];    ///< boxes that are as near are opened: A's frame, B's
-  float pad[2];      ///< what rounding does to boxes of A in B's frame, of B in A's
-  float slack;       ///< and to slabs
-  float map[2][12];  ///< to the other's frame: 3 × 3 row by row, then the shift
-  float turn[9];     ///< A's axes from B's
-  union {
-    ExactBoxes boxes[2];
-    ExactTriangles triangles[2];
-    InsideStack stack;
-  };
-  std::uint8_t left[2][kWidth];              ///< of each side what may meet the other
-  int count[2];                              ///< how many
-  std::uint32_t queue[2][kExactWaiting][2];  ///< of each stage: triangles, 16 · block + lane
+/// What a team that sums keeps beside the pair.
+struct ExactSumMemory {
+  InsideStack stack;
+  exact::Point origin;
   double sum[ExactSum::kCount][32];
   std::uint32_t flooded;  ///< blocks, of one side
 
@@ -70,12 +94,15 @@ struct ExactMemory {
   IST_HD void add(int lane, int of, const exact::Point& x) {
     for (int k = 0; k < 3; ++k) sum[of + k][lane] += x[k];
   }
-  /// A vertex in A's frame.
-  IST_HD exact::Point vertex(int side, std::uint32_t number) const {
-    const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
-    const exact::Point at = {x[0], x[1], x[2]};
-    return side == 0 ? at : map_point(place.a_from_b, at);
-  }
+};
+
+/// Of a team that does both, one after the other.
+struct ExactWholeMemory {
+  ExactPair pair;
+  union {
+    ExactSearchMemory search;
+    ExactSumMemory sum;
+  };
 };
 
 }  // namespace ist::gpu
