@@ -70,13 +70,13 @@ class ExactCrossings {
   }
 
   IST_HD void cross(bool has, const std::uint32_t (&pair)[2]) {
-    exact::Point corner[2][3];
-    PiercingEdge end[2];
+    const CornerView view = {memory_.corners, team_.lane()};
+    PiercingEdge end[2] = {};
     PairSays says = PairSays::apart;
     if (has) {
-      pair_.load(0, pair[0], corner[0]);
-      pair_.load(1, pair[1], corner[1]);
-      says = cross_pair<kExactly>(corner[0], corner[1], pair_.aside, end);
+      for (int side = 0; side < 2; ++side)
+        for (int k = 0; k < 3; ++k) view.set(side, k, pair_.corner(side, pair[side], k));
+      says = cross_pair<kExactly>(view, pair_.aside, end);
     }
     if (team_.any(says == PairSays::unsure)) {
       state_ = ExactState::unsure;
@@ -92,8 +92,12 @@ class ExactCrossings {
     if (total == 0) return;
     exact::EdgeEnd at[2] = {};
     if (crosses)
-      for (int e = 0; e < 2; ++e)
-        at[e] = exact::edge_end(end[e].p, end[e].q, end[e].height_p, end[e].height_q);
+      for (int e = 0; e < 2; ++e) {
+        const int s = static_cast<int>(end[e].of_b), k = static_cast<int>(end[e].edge),
+                  next = k == 2 ? 0 : k + 1;
+        at[e] = exact::edge_end(view.corner(s, k), view.corner(s, next), view.value(s, k),
+                                view.value(s, next));
+      }
     if (crossings_ == 0) {
       const exact::Point here = at[0].from + at[0].offset;
       const exact::Point origin = {team_.broadcast(here.x, first), team_.broadcast(here.y, first),
@@ -106,21 +110,19 @@ class ExactCrossings {
       mark(side, crosses, pair[side] / kWidth);
       if (state_ != ExactState::ok) return;
     }
-    if (crosses) add(pair, corner, end, at);
+    if (crosses) add(pair, view, end, at);
   }
 
-  IST_HD void add(const std::uint32_t (&pair)[2], exact::Point (&corner)[2][3],
+  IST_HD void add(const std::uint32_t (&pair)[2], const CornerView& view,
                   const PiercingEdge (&end)[2], const exact::EdgeEnd (&at)[2]) {
     const exact::Point o = memory_.origin;
     exact::Point apex[2];
     std::uint32_t opposite[2];  // the edge opposite to it
     for (int s = 0; s < 2; ++s) {
-      for (exact::Point& x : corner[s]) x = x - o;
-      const double which =
-          exact::apex_of(exact::length_bound(corner[s][0]), exact::length_bound(corner[s][1]),
-                         exact::length_bound(corner[s][2]));
-      apex[s] = which == 0 ? corner[s][0] : which == 1 ? corner[s][1] : corner[s][2];
-      opposite[s] = which == 0 ? 1 : which == 1 ? 2 : 0;
+      const auto far = [&](int k) { return exact::length_bound(view.corner(s, k) - o); };
+      const auto which = static_cast<int>(exact::apex_of(far(0), far(1), far(2)));
+      apex[s] = view.corner(s, which) - o;
+      opposite[s] = which == 2 ? 0 : static_cast<std::uint32_t>(which) + 1;
     }
     double counts[2];
     for (std::uint32_t e = 0; e < 2; ++e) {
@@ -132,14 +134,20 @@ class ExactCrossings {
     }
     exact::PieceTerms terms;
     exact::segment_terms({at[0].from - o, at[1].from - o}, {at[0].offset, at[1].offset}, apex,
-                         {end[0].of_b != 0, end[1].of_b != 0}, counts, {end[0].error, end[1].error},
-                         terms);
+                         {end[0].of_b != 0, end[1].of_b != 0}, counts,
+                         {error_of(view, end[0]), error_of(view, end[1])}, terms);
     const int lane = team_.lane();
     for (const double six : terms.six_volumes) memory_.add(lane, six);
     memory_.sum[ExactSum::kRounding][lane] += terms.rounding;
     memory_.add(lane, ExactSum::kMoment, terms.moment);
     memory_.add(lane, ExactSum::kPush, terms.force);
     memory_.add(lane, ExactSum::kTurn, terms.torque);
+  }
+
+  /// Of both ends' heights together.
+  IST_HD static double error_of(const CornerView& view, const PiercingEdge& edge) {
+    const int s = static_cast<int>(edge.of_b), k = static_cast<int>(edge.edge);
+    return view.error(s, k) + view.error(s, k == 2 ? 0 : k + 1);
   }
 
   /// An edge is pierced.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <new>
 
 #include "cuda/query/exact_crossings.h"
 #include "query/exact/block_insides.h"
@@ -53,7 +54,7 @@ class ExactInsides {
          first += static_cast<std::uint32_t>(Team::kWidth)) {
       const std::uint32_t r = first + lane;
       std::uint32_t unknown = kWidth;
-      BlockInsides found;
+      BlockInsides& found = *new (memory_.insides[lane]) BlockInsides;
       int side = 0;
       std::uint32_t block = 0;
       if (r < records_) {
@@ -62,7 +63,7 @@ class ExactInsides {
         block = record.block;
         if (record.all_pierced() != 0) {
           const MeshBlock& mesh = pair_.mesh[side].blocks[block];
-          found = BlockInsides(
+          new (&found) BlockInsides(
               mesh, record.all_pierced(), [&](std::uint32_t e) { return record.sum(e); },
               [](std::uint32_t) { return 0; });
           unknown = found.unknown(mesh);

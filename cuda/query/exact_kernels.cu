@@ -121,9 +121,10 @@ void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t str
   check(cudaMemsetAsync(batch.counters, 0, sizeof(ExactCounters), stream), "starting a batch");
   sift_meshes<<<blocks_for(batch.pairs.count, kThreadsEach), kThreadsEach, 0, stream>>>(batch);
   check_launch("sifting pairs of meshes");
-  constexpr std::uint64_t kLeastOfRound = 1 << 11;  // of pairs that keep some 130 chunks each
-  const auto rounds =
-      static_cast<std::uint32_t>((batch.pairs.count + kLeastOfRound - 1) / kLeastOfRound);
+  // Of many pairs rounds of 8,192 that keep some 30 chunks each; of few some of a quarter.
+  constexpr std::uint64_t kLeast = 1 << 13, kFew = 1 << 11;
+  const auto rounds = static_cast<std::uint32_t>(
+      1 + batch.pairs.count / kLeast + std::min<std::uint64_t>(batch.pairs.count, 8 * kFew) / kFew);
   const unsigned blocks =
       blocks_for(std::min<std::uint64_t>(batch.pairs.count, batch.query_room), kThreadsEach);
   const unsigned sums =

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "cuda/query/exact_arrays.h"
+#include "cuda/query/exact_pair.h"
+#include "numerics/bits.h"
 #include "query/base/pair_place.h"
+#include "query/exact/block_insides.h"
 #include "query/exact/box_integrals.h"
 
 namespace ist::gpu {
@@ -27,29 +31,36 @@ struct ExactPair : ExactFrame {
     const exact::Point at = {x[0], x[1], x[2]};
     return side == 0 ? at : map_point(place.a_from_b, at);
   }
-  IST_HD void load(int side, std::uint32_t triangle, exact::Point (&corners)[3]) const {
+  /// Of a triangle, 16 · block + lane, the k-th corner.
+  IST_HD exact::Point corner(int side, std::uint32_t triangle, int k) const {
     const MeshBlock& block = in_global_memory(mesh[side].blocks)[triangle / kWidth];
-    IST_ROLLED
-    for (int k = 0; k < 3; ++k)
-      corners[k] = vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
+    return vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
 };
 
-/// A child of a node, or a node alone. Own boxes are wider by the reach.
+/// A child of a node, or a node alone. Own boxes are wider by the reach. Of these, as of triangles,
+/// an odd number of quads, so that lanes that read one each do not meet in a bank.
 struct ExactBox {
   Quad low, high;              ///< in the solid's own frame; last its slab, A's frame
   Quad other_low, other_high;  ///< in the other's
   Quad normal;                 ///< of the slab, A's frame
   Quad turned;  ///< of A's: what a side of B's box, of length 1, reaches along the normal
+  std::uint32_t lane;
 };
 
 /// A triangle in A's frame, in floats.
 struct ExactTriangle {
-  Quad low, high;      ///< its box; A's is wider by the slack
-  Quad plane;          ///< a point is so high over it, times twice the area: x · normal + last
-  float margin;        ///< heights above which are certain, wherever points move by the room
-  std::uint32_t name;  ///< its lane in its block, and in bytes its corners' places there
+  Quad low, high;  ///< its box; A's is wider by the slack
+  Quad plane;      ///< a point is so high over it, times twice the area: x · normal + last
+
+  /// Heights above it are certain, wherever points move by the room.
+  IST_HD float& margin() { return low.x[3]; }
+  IST_HD float margin() const { return low.x[3]; }
+  /// Its lane in its block, and in bytes its corners' places there.
+  IST_HD void call(std::uint32_t name) { high.x[3] = float_of(name); }
+  IST_HD std::uint32_t name() const { return bits_of(high.x[3]); }
 };
+static_assert(sizeof(ExactBox) % 32 == 16 && sizeof(ExactTriangle) % 32 == 16);
 
 /// What a team that searches keeps beside the pair.
 struct ExactSearchMemory {
@@ -58,8 +69,10 @@ struct ExactSearchMemory {
   ExactTriangle triangles[2][kWidth];             ///< likewise
   Quad vertices[2][kWidth];
   std::uint64_t waiting[kWaiting];
+  ExactPool pool;
+  ExactChain crossing, near;   ///< triangles that may cross; others whose signs are not settled
+  std::uint32_t last_near[2];  ///< blocks of the last lane, if near
   std::uint32_t queue[kExactWaiting][2];  ///< triangles to be sifted, 16 · block + lane
-  std::uint8_t lane[2][kWidth];           ///< of the boxes
   std::uint8_t found[kWidth * kWidth];    ///< pairs of boxes of leaves that meet, 16 · A's + B's
   std::uint8_t met[kWidth * kWidth];      ///< of triangles, likewise
 };
@@ -80,7 +93,13 @@ struct ExactSum {
 
 /// What a team that sums keeps beside the pair.
 struct ExactSumMemory {
-  InsideStack stack;
+  union {
+    CornerMemory corners;
+    struct {
+      InsideStack stack;
+      alignas(BlockInsides) std::byte insides[32][sizeof(BlockInsides)];  ///< of a lane's record
+    };
+  };
   exact::Point origin;
   double sum[ExactSum::kCount][32];
   std::uint32_t flooded;  ///< blocks, of one side

@@ -5,7 +5,6 @@
 
 #include "cuda/atomics.h"
 #include "cuda/query/exact_memory.h"
-#include "cuda/query/exact_pair.h"
 #include "numerics/team.h"
 
 namespace ist::gpu {
@@ -15,75 +14,131 @@ template <class Team>
 IST_HD bool append(const Team& team, const ExactPool& pool, ExactChain& chain, bool adds,
                    std::uint32_t a, std::uint32_t b) {
   constexpr std::uint32_t kPairs = ExactChunk::kPairs;
+  const ExactChain before = chain;
   int total = 0;
   const std::uint32_t at =
-      chain.count + static_cast<std::uint32_t>(team.exclusive_count(adds, total));
-  const std::uint32_t end = chain.count + static_cast<std::uint32_t>(total);
-  const std::uint32_t chunks = (chain.count + kPairs - 1) / kPairs;  // so far
-  std::uint32_t last = chain.last;
+      before.count + static_cast<std::uint32_t>(team.exclusive_count(adds, total));
+  const std::uint32_t end = before.count + static_cast<std::uint32_t>(total);
+  const std::uint32_t chunks = (before.count + kPairs - 1) / kPairs;  // so far
+  std::uint32_t last = before.last;
   if (end > chunks * kPairs) {
     last = take(team, pool.taken, 1);
     if (last >= pool.room) return false;
-    if (chunks == 0)
-      chain.first = last;
-    else if (team.lane() == 0)
-      pool.next[chain.last] = last;
   }
   if (adds) {
     std::uint32_t(&slot)[2] =
-        pool.chunks[at < chunks * kPairs ? chain.last : last].pair[at % kPairs];
+        pool.chunks[at < chunks * kPairs ? before.last : last].pair[at % kPairs];
     slot[0] = a;
     slot[1] = b;
   }
-  chain.last = last;
-  chain.count = end;
+  team.sync();  // all have read the chain
+  if (team.lane() == 0) {
+    if (last != before.last && chunks > 0) pool.next[before.last] = last;
+    chain = {chunks == 0 ? last : before.first, last, end};
+  }
+  team.sync();
   return true;
 }
 
+enum class Apart {
+  no,
+  certain,  ///< as doubles tell, B moved aside
+  settled,  ///< wherever points move by the room, too
+};
+
+/// Whether the plane of the other side's triangle has a side's on one side.
+IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uint32_t (&pair)[2]) {
+  const auto largest = [](const exact::Point& x) {
+    return std::fmax(std::abs(x.x), std::fmax(std::abs(x.y), std::abs(x.z)));
+  };
+  const std::uint32_t other = side == 0 ? pair[1] : pair[0], one = side == 0 ? pair[0] : pair[1];
+  const exact::Point o = of.corner(1 - side, other, 0);
+  const exact::Point u = of.corner(1 - side, other, 1) - o, v = of.corner(1 - side, other, 2) - o;
+  const double room = of.reach[0];
+  const double longest = std::fmax(largest(u), largest(v)) + room;
+  const exact::FilteredPlane plane(u, v, (side == 1 ? 1 : -1) * of.aside);
+  int sum = 0;
+  bool settled = true;
+  IST_ROLLED
+  for (int k = 0; k < 3; ++k) {
+    const exact::Point r = of.corner(side, one, k) - o;
+    const exact::Determinant height = plane.height(r);
+    sum += height.sign;
+    // What the room moves: six products of three numbers; moving aside is within the room too.
+    const double moved = 12 * room * longest * (2 * largest(r) + longest);
+    settled = settled && std::abs(height.value) > height.error + moved;
+  }
+  if (sum != 3 && sum != -3) return Apart::no;
+  return settled ? Apart::settled : Apart::certain;
+}
+
+/// Of the next so many pairs of triangles that wait keeps those that no plane keeps apart, and
+/// those whose signs might differ if points moved by the room; false: no room. A function of its
+/// own: the search needs its registers.
+template <class Team>
+IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
+                                std::uint32_t first, std::uint32_t count) {
+  constexpr std::uint32_t kNone = ~0u;
+  const auto lane = static_cast<std::uint32_t>(team.lane());
+  const bool has = lane < count;
+  const std::uint32_t(&slot)[2] = memory.queue[(first + (has ? lane : 0)) % kExactWaiting];
+  const std::uint32_t pair[2] = {slot[0], slot[1]};
+  Apart apart = has ? Apart::no : Apart::settled;
+  IST_ROLLED
+  for (int side = 1; side >= 0; --side) {
+    if (apart == Apart::settled) break;
+    const Apart by = apart_by_plane(of, side, pair);
+    if (by > apart) apart = by;
+  }
+  // Of those that only are near once for each pair of blocks, where they follow each other.
+  const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
+                      of_b = pair[1] / kWidth;
+  const int before = team.lane() == 0 ? 0 : team.lane() - 1;
+  const std::uint32_t last_a = team.broadcast(of_a, before), last_b = team.broadcast(of_b, before);
+  const bool again = lane == 0 ? memory.last_near[0] == of_a && memory.last_near[1] == of_b
+                               : last_a == of_a && last_b == of_b;
+  team.sync();
+  if (lane == Team::kWidth - 1) memory.last_near[0] = of_a, memory.last_near[1] = of_b;
+  return append(team, memory.pool, memory.crossing, apart == Apart::no, pair[0], pair[1]) &&
+         append(team, memory.pool, memory.near, of_a != kNone && !again, pair[0], pair[1]);
+}
+
 /// Pairs of triangles of both meshes that may cross. Both trees are opened together, depth first;
-/// of pairs of blocks whose boxes and slabs meet the pairs of triangles whose boxes meet wait until
-/// a team's width of them can be sifted.
+/// of pairs of blocks whose boxes and slabs meet the pairs of triangles whose boxes meet, and that
+/// no plane keeps apart in floats, wait until a team's width of them can be sifted.
 template <class Team>
 class ExactSearch {
  public:
   /// `waiting`: room for pairs of nodes.
   IST_HD ExactSearch(const Team& team, const ExactPair& pair, ExactSearchMemory& memory,
                      std::uint64_t* waiting, std::uint32_t most_waiting, const ExactPool& pool)
-      : team_(team),
-        pair_(pair),
-        memory_(memory),
-        waiting_(waiting),
-        most_waiting_(most_waiting),
-        pool_(pool) {}
-
-  /// False where the memory does not hold it.
-  IST_HD bool run() {
-    if (team_.lane() == 0)
+      : team_(team), pair_(pair), memory_(memory), waiting_(waiting), most_waiting_(most_waiting) {
+    if (team_.lane() == 0) {
+      memory_.pool = pool;
+      memory_.crossing = memory_.near = {};
+      memory_.last_near[0] = memory_.last_near[1] = ~0u;
       waiting_[0] = pair_of(MeshNode::at(pair_.mesh[0].top, 0), MeshNode::at(pair_.mesh[1].top, 0));
-    count_ = 1;
-    // All in one loop: the code of each step is there once.
-    std::uint32_t next = 0;  // of the pairs of blocks found
-    for (;;) {
-      const bool last = count_ == 0 && next == found_ && at_ >= pairs_ && tested_ >= met_;
-      if (queued_ >= kBatch || (last && queued_ > 0)) {
-        if (!sift()) return false;
-      } else if (at_ < pairs_) {
-        meet_triangles();
-      } else if (tested_ < met_) {
-        test_planes();
-      } else if (next < found_) {
-        const std::uint32_t found = memory_.found[next++];
-        place_blocks(found / kWidth, found % kWidth);
-      } else if (count_ > 0) {
-        next = 0;
-        if (!open()) return false;
-      } else {
-        return true;
-      }
     }
   }
 
-  ExactChain crossing = {}, near = {};
+  /// False where the memory does not hold it.
+  IST_HD bool run() {
+    while (count_ > 0) {
+      if (!open()) return false;
+      for (std::uint32_t next = 0; next < found_; ++next) {
+        const std::uint32_t found = memory_.found[next];
+        const int pairs = place_blocks(found / kWidth, found % kWidth);
+        if (pairs == 0) continue;
+        const int met = meet_triangles(pairs);
+        for (int first = 0; first < met; first += Team::kWidth) {
+          test_planes(first, met);
+          if (queued_ >= kBatch && !sift()) return false;
+        }
+      }
+    }
+    return queued_ == 0 || sift();
+  }
+
   std::uint32_t visits = 0;  ///< pairs of nodes opened
 
  private:
@@ -124,18 +179,10 @@ class ExactSearch {
     for (int first = 0; first < kBoth; first += Team::kWidth) {
       const int k = first + team_.lane(), side = k / static_cast<int>(kWidth);
       const auto l = static_cast<std::uint32_t>(k) % kWidth;
-      ExactBox box;
+      Box box = {};
       const bool meets = place_child(side, l, box);
-      for (int s = 0; s < 2; ++s) {
-        int total = 0;
-        const bool mine = meets && side == s;
-        const int at = left[s] + team_.exclusive_count(mine, total);
-        if (mine) {
-          memory_.boxes[s][at] = box;
-          memory_.lane[s][at] = static_cast<std::uint8_t>(l);
-        }
-        left[s] += total;
-      }
+      const int at = listed(meets, side, left);
+      if (meets) keep(side, l, box, memory_.boxes[side][at]);
     }
     team_.sync();
     found_ = 0;
@@ -166,8 +213,9 @@ class ExactSearch {
   /// Of the node of a side the child whose box is the i-th, or the node itself.
   IST_HD MeshNode child(int side, std::uint32_t i) const {
     const MeshNode of = node_[side];
-    return opens_[side] ? MeshNode::at(of.level() - 1, kWidth * of.number() + memory_.lane[side][i])
-                        : of;
+    return opens_[side]
+               ? MeshNode::at(of.level() - 1, kWidth * of.number() + memory_.boxes[side][i].lane)
+               : of;
   }
 
   /// A node's box in its own frame and, with what rounding does, in the other's.
@@ -203,30 +251,51 @@ class ExactSearch {
     }
   }
 
+  /// Place of a lane's item in the list of its side; `left`: items of both.
+  IST_HD int listed(bool adds, int side, int (&left)[2]) const {
+    int at = 0;
+    for (int s = 0; s < 2; ++s) {
+      int total = 0;
+      const int before = team_.exclusive_count(adds && side == s, total);
+      if (side == s) at = left[s] + before;
+      left[s] += total;
+    }
+    return at;
+  }
+
+  // No array is indexed by what lanes differ in: it would lie in memory that is slow.
+  IST_HD MeshNode node_of(int side) const { return side == 0 ? node_[0] : node_[1]; }
+  IST_HD bool opened(int side) const { return side == 0 ? opens_[0] : opens_[1]; }
+
   /// Of a side's node the l-th child, or the node alone as the first; whether there is one, and
   /// its box meets that of the other side's node.
-  IST_HD bool place_child(int side, std::uint32_t l, ExactBox& out) const {
-    // No array is indexed by what lanes differ in: it would lie in memory.
-    const MeshNode node = side == 0 ? node_[0] : node_[1], other = side == 0 ? node_[1] : node_[0];
-    const bool opened = side == 0 ? opens_[0] : opens_[1];
-    const int level = opened ? node.level() - 1 : node.level();
-    const std::uint32_t n = opened ? kWidth * node.number() + l : node.number();
-    if (opened ? n >= pair_.mesh[side].level[level].count : l > 0) return false;
-    Box box, by;
-    place(side, level, n, box);
+  IST_HD bool place_child(int side, std::uint32_t l, Box& box) const {
+    const MeshNode node = child_of(side, l), other = node_of(1 - side);
+    if (opened(side) ? node.number() >= pair_.mesh[side].level[node.level()].count : l > 0)
+      return false;
+    Box by;
+    place(side, node.level(), node.number(), box);
     place(1 - side, other.level(), other.number(), by);
     const float reach = pair_.reach[side], by_reach = pair_.reach[1 - side];
     bool meets = true;
     for (int k = 0; k < 3; ++k) {
-      out.low.x[k] = box.low[k] - reach;
-      out.high.x[k] = box.high[k] + reach;
-      out.other_low.x[k] = box.other_low[k];
-      out.other_high.x[k] = box.other_high[k];
-      meets = meets && out.low.x[k] <= by.other_high[k] && out.high.x[k] >= by.other_low[k] &&
+      box.low[k] -= reach;
+      box.high[k] += reach;
+      meets = meets && box.low[k] <= by.other_high[k] && box.high[k] >= by.other_low[k] &&
               by.low[k] - by_reach <= box.other_high[k] &&
               by.high[k] + by_reach >= box.other_low[k];
     }
-    if (!meets) return false;
+    return meets;
+  }
+  IST_HD MeshNode child_of(int side, std::uint32_t l) const {
+    const MeshNode node = node_of(side);
+    return opened(side) ? MeshNode::at(node.level() - 1, kWidth * node.number() + l) : node;
+  }
+
+  IST_HD void keep(int side, std::uint32_t l, const Box& box, ExactBox& out) const {
+    const MeshNode node = child_of(side, l);
+    const int level = node.level();
+    const std::uint32_t n = node.number();
     float normal[3] = {0, 0, 0}, low = -kFar, high = kFar;
     if (level < pair_.mesh[side].top) {
       const BoxBlock& from = in_global_memory(pair_.mesh[side].level[level + 1].boxes)[n / kWidth];
@@ -234,22 +303,25 @@ class ExactSearch {
       low = from.slab_low[n % kWidth], high = from.slab_high[n % kWidth];
     }
     const auto scale = static_cast<float>(pair_.place.a_from_b.scale);
-    float shift = 0;
+    float shift = 0, turned[3], reach[3];
     for (int k = 0; k < 3; ++k) {
       const Quad m = pair_.turn[side][k];
-      const float turned =
-          std::fma(m.x[0], normal[0], std::fma(m.x[1], normal[1], m.x[2] * normal[2]));
-      shift = std::fma(turned, pair_.row[1][k].x[3], shift);
-      out.normal.x[k] = side == 0 ? normal[k] : turned;
-      out.turned.x[k] = scale * (std::abs(turned) + kError);
+      turned[k] = std::fma(m.x[0], normal[0], std::fma(m.x[1], normal[1], m.x[2] * normal[2]));
+      shift = std::fma(turned[k], pair_.row[1][k].x[3], shift);
+      reach[k] = scale * (std::abs(turned[k]) + kError);
     }
     if (side == 1) {
+      for (int k = 0; k < 3; ++k) normal[k] = turned[k];
       low = scale * low + shift - 2 * pair_.pad[1];
       high = scale * high + shift + 2 * pair_.pad[1];
     }
-    out.low.x[3] = low;
-    out.high.x[3] = high;
-    return true;
+    out.low = {{box.low[0], box.low[1], box.low[2], low}};
+    out.high = {{box.high[0], box.high[1], box.high[2], high}};
+    out.other_low = {{box.other_low[0], box.other_low[1], box.other_low[2], 0}};
+    out.other_high = {{box.other_high[0], box.other_high[1], box.other_high[2], 0}};
+    out.normal = {{normal[0], normal[1], normal[2], 0}};
+    out.turned = {{reach[0], reach[1], reach[2], 0}};
+    out.lane = l;
   }
   static constexpr float kFar = 3e38f;  ///< beyond any slab
 
@@ -276,8 +348,8 @@ class ExactSearch {
            along_b - reach_b <= b_high.x[3] && along_b + reach_b >= b_low.x[3];
   }
 
-  /// Of two blocks the triangles whose boxes meet that of the other.
-  IST_HD void place_blocks(std::uint32_t i, std::uint32_t j) {
+  /// Of two blocks the triangles whose boxes meet that of the other; how many pairs.
+  IST_HD int place_blocks(std::uint32_t i, std::uint32_t j) {
     block_[0] = child(0, i).number();
     block_[1] = child(1, j).number();
     for (int k = team_.lane(); k < kBoth; k += Team::kWidth) {
@@ -285,8 +357,7 @@ class ExactSearch {
       const MeshTree& mesh = pair_.mesh[side];
       const double* const x =
           in_global_memory(mesh.vertices) +
-          std::size_t{3} *
-              in_global_memory(mesh.blocks)[side == 0 ? block_[0] : block_[1]].vertex[v];
+          std::size_t{3} * in_global_memory(mesh.blocks)[block_of(side)].vertex[v];
       const float at[3] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
                            static_cast<float>(x[2])};
       Quad out = {{at[0], at[1], at[2], 0}};
@@ -303,8 +374,7 @@ class ExactSearch {
     for (int first = 0; first < kBoth; first += Team::kWidth) {
       const int k = first + team_.lane(), side = k / static_cast<int>(kWidth);
       const auto t = static_cast<std::uint32_t>(k) % kWidth;
-      const MeshBlock& block =
-          in_global_memory(pair_.mesh[side].blocks)[side == 0 ? block_[0] : block_[1]];
+      const MeshBlock& block = in_global_memory(pair_.mesh[side].blocks)[block_of(side)];
       const std::uint32_t corner[3] = {block.corner[0][t], block.corner[1][t], block.corner[2][t]};
       const Quad p = memory_.vertices[side][corner[0]], q = memory_.vertices[side][corner[1]],
                  r = memory_.vertices[side][corner[2]];
@@ -324,20 +394,21 @@ class ExactSearch {
       const std::uint32_t lanes = team_.ballot(meets);
       if (Team::kWidth == kBoth && (lanes >> kWidth == 0 || lanes << kWidth == 0)) break;
       place_plane(p, q, r, by_low, by_high, out);
-      out.name = t | corner[0] << 8 | corner[1] << 16 | corner[2] << 24;
-      for (int s = 0; s < 2; ++s) {
-        int total = 0;
-        const bool mine = meets && side == s;
-        const int at = left[s] + team_.exclusive_count(mine, total);
-        if (mine) memory_.triangles[s][at] = out;
-        left[s] += total;
+      out.call(t | corner[0] << 8 | corner[1] << 16 | corner[2] << 24);
+      const int at = listed(meets, side, left);
+      if (meets) {
+        ExactTriangle& to = memory_.triangles[side][at];
+        to.low = out.low;
+        to.high = out.high;
+        to.plane = out.plane;
       }
     }
     team_.sync();
-    at_ = met_ = tested_ = 0;
-    pairs_ = left[0] * left[1];
-    columns_ = Pairs(left[1]);
+    columns_ = left[1];
+    return left[0] * left[1];
   }
+
+  IST_HD std::uint32_t block_of(int side) const { return side == 0 ? block_[0] : block_[1]; }
 
   /// A triangle's plane, for heights of points of a box.
   IST_HD void place_plane(const Quad& p, const Quad& q, const Quad& r, const Quad& low,
@@ -359,44 +430,55 @@ class ExactSearch {
     const float moved = 0.5f * pair_.slack;
     longest += moved;
     farthest += moved;
-    out.margin = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
+    out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
   }
 
-  /// The next of their pairs of triangles: those whose boxes meet.
-  IST_HD void meet_triangles() {
-    const int k = at_ + team_.lane();
-    const std::uint32_t i = k < pairs_ ? columns_.row(static_cast<std::uint32_t>(k)) : 0,
-                        j = k < pairs_ ? static_cast<std::uint32_t>(k) - i * columns_.columns : 0;
-    const Quad a_low = memory_.triangles[0][i].low, a_high = memory_.triangles[0][i].high,
-               b_low = memory_.triangles[1][j].low, b_high = memory_.triangles[1][j].high;
-    bool meets = k < pairs_;
-    for (int axis = 0; axis < 3; ++axis)
-      meets = meets && a_low.x[axis] <= b_high.x[axis] && a_high.x[axis] >= b_low.x[axis];
-    at_ += Team::kWidth;
-    int total = 0;
-    const int before = team_.exclusive_count(meets, total);
-    if (meets) memory_.met[met_ + before] = static_cast<std::uint8_t>(kWidth * i + j);
-    met_ += total;
-    if (at_ >= pairs_) team_.sync();
+  /// Their pairs of triangles whose boxes meet: how many.
+  IST_HD int meet_triangles(int pairs) {
+    const Pairs of(columns_);
+    int met = 0;
+    for (int first = 0; first < pairs; first += Team::kWidth) {
+      const int k = first + team_.lane();
+      const std::uint32_t i = k < pairs ? of.row(static_cast<std::uint32_t>(k)) : 0,
+                          j = k < pairs ? static_cast<std::uint32_t>(k) - i * of.columns : 0;
+      const Quad a_low = memory_.triangles[0][i].low, a_high = memory_.triangles[0][i].high,
+                 b_low = memory_.triangles[1][j].low, b_high = memory_.triangles[1][j].high;
+      bool meets = k < pairs;
+      for (int axis = 0; axis < 3; ++axis)
+        meets = meets && a_low.x[axis] <= b_high.x[axis] && a_high.x[axis] >= b_low.x[axis];
+      int total = 0;
+      const int before = team_.exclusive_count(meets, total);
+      if (meets) memory_.met[met + before] = static_cast<std::uint8_t>(kWidth * i + j);
+      met += total;
+    }
+    team_.sync();
+    return met;
   }
 
-  /// Of the next of these: what no plane keeps apart, as floats tell, waits.
-  IST_HD void test_planes() {
-    const int k = tested_ + team_.lane();
-    const std::uint32_t met = memory_.met[k < met_ ? k : tested_];
-    const ExactTriangle &a = memory_.triangles[0][met / kWidth],
-                        &b = memory_.triangles[1][met % kWidth];
-    const bool waits = k < met_ && !apart_by(a, b.name, 1) && !apart_by(b, a.name, 0);
-    tested_ += Team::kWidth;
+  /// Of so many of these what no plane keeps apart, as floats tell, waits.
+  IST_HD void test_planes(int first, int met) {
+    const int k = first + team_.lane();
+    const std::uint32_t pair = memory_.met[k < met ? k : first];
+    const ExactTriangle &a = memory_.triangles[0][pair / kWidth],
+                        &b = memory_.triangles[1][pair % kWidth];
+    const bool waits = k < met && !apart_by(a, b.name(), 1) && !apart_by(b, a.name(), 0);
     int total = 0;
     const auto before = static_cast<std::uint32_t>(team_.exclusive_count(waits, total));
     if (waits) {
       std::uint32_t(&slot)[2] = memory_.queue[(head_ + queued_ + before) % kExactWaiting];
-      slot[0] = kWidth * block_[0] + a.name % kWidth;
-      slot[1] = kWidth * block_[1] + b.name % kWidth;
+      slot[0] = kWidth * block_[0] + a.name() % kWidth;
+      slot[1] = kWidth * block_[1] + b.name() % kWidth;
     }
     queued_ += static_cast<std::uint32_t>(total);
-    if (tested_ >= met_) team_.sync();  // all have read what the next blocks overwrite
+    team_.sync();
+  }
+
+  /// The next that wait.
+  IST_HD bool sift() {
+    const std::uint32_t count = queued_ < kBatch ? queued_ : kBatch, first = head_;
+    head_ = (head_ + count) % kExactWaiting;
+    queued_ -= count;
+    return sift_triangles(team_, pair_, memory_, first, count);
   }
 
   /// Whether a triangle's plane has another, of a side, on one side for certain.
@@ -410,76 +492,7 @@ class ExactSearch {
       least = std::fmin(least, height);
       most = std::fmax(most, height);
     }
-    return least > plane.margin || most < -plane.margin;
-  }
-
-  /// Keeps pairs that no plane keeps apart, and those whose signs might differ if points moved by
-  /// the room.
-  IST_HD bool sift() {
-    team_.sync();
-    const std::uint32_t taken = queued_ < kBatch ? queued_ : kBatch;
-    const auto lane = static_cast<std::uint32_t>(team_.lane());
-    const bool has = lane < taken;
-    const std::uint32_t(&slot)[2] = memory_.queue[(head_ + (has ? lane : 0)) % kExactWaiting];
-    const std::uint32_t pair[2] = {slot[0], slot[1]};
-    head_ = (head_ + taken) % kExactWaiting;
-    queued_ -= taken;
-    team_.sync();
-    Apart apart = Apart::settled;
-    if (has) {
-      apart = by_plane(1, pair);
-      if (apart != Apart::settled) {
-        const Apart other = by_plane(0, pair);
-        if (other > apart) apart = other;
-      }
-    }
-    // Of those that only are near once for each pair of blocks, if they follow each other.
-    const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
-                        of_b = pair[1] / kWidth;
-    const int before = team_.lane() - 1;
-    const std::uint32_t before_a = team_.broadcast(of_a, before < 0 ? 0 : before),
-                        before_b = team_.broadcast(of_b, before < 0 ? 0 : before);
-    const bool again =
-        before < 0 ? near_[0] == of_a && near_[1] == of_b : before_a == of_a && before_b == of_b;
-    near_[0] = team_.broadcast(of_a, Team::kWidth - 1);
-    near_[1] = team_.broadcast(of_b, Team::kWidth - 1);
-    return append(team_, pool_, crossing, apart == Apart::no, pair[0], pair[1]) &&
-           append(team_, pool_, near, of_a != kNone && !again, pair[0], pair[1]);
-  }
-  static constexpr std::uint32_t kNone = ~0u;
-
-  enum class Apart {
-    no,
-    certain,  ///< as doubles tell, B moved aside
-    settled,  ///< wherever points move by the room, too
-  };
-
-  /// Whether the plane of the other side's triangle has a side's on one side.
-  IST_HD Apart by_plane(int side, const std::uint32_t (&pair)[2]) const {
-    exact::Point plane[3];
-    pair_.load(1 - side, pair[1 - side], plane);
-    const auto largest = [](const exact::Point& x) {
-      return std::fmax(std::abs(x.x), std::fmax(std::abs(x.y), std::abs(x.z)));
-    };
-    const double room = pair_.reach[0];
-    const exact::Point u = plane[1] - plane[0], v = plane[2] - plane[0];
-    const double longest = std::fmax(largest(u), largest(v)) + room;
-    const exact::FilteredPlane filtered(u, v, (side == 1 ? 1 : -1) * pair_.aside);
-    const MeshBlock& block = in_global_memory(pair_.mesh[side].blocks)[pair[side] / kWidth];
-    int sum = 0;
-    bool settled = true;
-    IST_ROLLED
-    for (int k = 0; k < 3; ++k) {
-      const exact::Point r =
-          pair_.vertex(side, block.vertex[block.corner[k][pair[side] % kWidth]]) - plane[0];
-      const exact::Determinant height = filtered.height(r);
-      sum += height.sign;
-      // What the room moves: six products of three numbers; moving aside is within the room too.
-      const double moved = 12 * room * longest * (2 * largest(r) + longest);
-      settled = settled && std::abs(height.value) > height.error + moved;
-    }
-    if (sum != 3 && sum != -3) return Apart::no;
-    return settled ? Apart::settled : Apart::certain;
+    return least > plane.margin() || most < -plane.margin();
   }
 
   const Team& team_;
@@ -487,17 +500,13 @@ class ExactSearch {
   ExactSearchMemory& memory_;
   std::uint64_t* const waiting_;
   const std::uint32_t most_waiting_;
-  const ExactPool pool_;
   MeshNode node_[2] = {};            ///< that are opened
   bool opens_[2] = {false, false};   ///< whose children are looked at
-  std::uint32_t count_ = 0;          ///< that wait
+  std::uint32_t count_ = 1;          ///< that wait
   std::uint32_t found_ = 0;          ///< pairs of blocks
   std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
-  int at_ = 0, pairs_ = 0;           ///< pairs of them
-  int tested_ = 0, met_ = 0;         ///< of which the boxes meet
-  Pairs columns_{0};
+  int columns_ = 0;                  ///< of B's
   std::uint32_t head_ = 0, queued_ = 0;
-  std::uint32_t near_[2] = {kNone, kNone};  ///< blocks of the last lane, if near
 };
 
 }  // namespace ist::gpu

@@ -254,8 +254,8 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
   if (team.lane() == 0) {
     query.state = fits ? ExactState::ok : ExactState::no_room;
     query.visits = search.visits;
-    query.crossing = search.crossing;
-    query.near = search.near;
+    query.crossing = memory.crossing;
+    query.near = memory.near;
   }
 }
 
@@ -305,9 +305,11 @@ IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::
   ExactSearch<Team> search(team, memory.pair, memory.search, room.waiting, room.most_waiting,
                            room.pool);
   ExactState state = ExactState::no_room;
-  if (search.run())
-    state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool,
-                              search.crossing, search.near, search.visits);
+  if (search.run()) {
+    const ExactChain crossing = memory.search.crossing, near = memory.search.near;
+    state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
+                              near, search.visits);
+  }
   if (state != ExactState::ok && team.lane() == 0) leave_to_next(batch, pass, i);
 }
 

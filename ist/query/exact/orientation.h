@@ -117,12 +117,14 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
 }
 
 /// In doubles, whose sign may be 0, or with `kExactly` whatever it takes.
-template <bool kExactly, class... Points>
-IST_HD inline Determinant determinant_of(const Points&... of) {
+template <bool kExactly>
+IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const Point& u1,
+                                         const Point& u0, const Point& v1, const Point& v0,
+                                         int moved, const Point& aside) {
   if constexpr (kExactly)
-    return determinant(of...);
+    return determinant(r1, r0, u1, u0, v1, v0, moved, aside);
   else
-    return filtered_determinant(of...);
+    return FilteredPlane(u1 - u0, v1 - v0, moved * aside).height(r1 - r0);
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
