@@ -22,6 +22,7 @@ constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles to be sifte
 /// What a team keeps at hand of a pair.
 struct ExactPair : ExactFrame {
   MeshTree mesh[2];
+  const FloatBlock* in_floats[2];
   Quad row[2][3];   ///< of the map to the other's frame, the shift last
   Quad turn[2][3];  ///< of the other's axes from one's own
 
@@ -67,11 +68,12 @@ struct ExactSearchMemory {
   static constexpr std::uint32_t kWaiting = 128;  ///< pairs of nodes, of the first pass
   ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
   ExactTriangle triangles[2][kWidth];             ///< likewise
-  Quad vertices[2][kWidth];
+  Quad vertices[2][kWidth];  ///< of two blocks, A's frame; last the corners of a triangle
   std::uint64_t waiting[kWaiting];
   ExactPool pool;
   ExactChain crossing, near;   ///< triangles that may cross; others whose signs are not settled
   std::uint32_t last_near[2];  ///< blocks of the last lane, if near
+  std::uint32_t inverse[kWidth + 1];      ///< of a number of columns, times 2^16
   std::uint32_t queue[kExactWaiting][2];  ///< triangles to be sifted, 16 · block + lane
   std::uint8_t found[kWidth * kWidth];    ///< pairs of boxes of leaves that meet, 16 · A's + B's
   std::uint8_t met[kWidth * kWidth];      ///< of triangles, likewise

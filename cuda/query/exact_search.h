@@ -77,7 +77,7 @@ IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uin
 /// own: the search needs its registers.
 template <class Team>
 IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
-                                std::uint32_t first, std::uint32_t count) {
+                           std::uint32_t first, std::uint32_t count) {
   constexpr std::uint32_t kNone = ~0u;
   const auto lane = static_cast<std::uint32_t>(team.lane());
   const bool has = lane < count;
@@ -113,6 +113,8 @@ class ExactSearch {
   IST_HD ExactSearch(const Team& team, const ExactPair& pair, ExactSearchMemory& memory,
                      std::uint64_t* waiting, std::uint32_t most_waiting, const ExactPool& pool)
       : team_(team), pair_(pair), memory_(memory), waiting_(waiting), most_waiting_(most_waiting) {
+    for (auto k = static_cast<std::uint32_t>(team_.lane()); k <= kWidth; k += kBatch)
+      memory_.inverse[k] = k == 0 ? 0 : (0xFFFFu + k) / k;
     if (team_.lane() == 0) {
       memory_.pool = pool;
       memory_.crossing = memory_.near = {};
@@ -154,11 +156,12 @@ class ExactSearch {
   /// Numbers two lists' pairs row by row.
   struct Pairs {
     std::uint32_t columns, inverse;
-    IST_HD explicit Pairs(int count) : columns(static_cast<std::uint32_t>(count)) {
-      inverse = (0xFFFFu + columns) / (columns | static_cast<std::uint32_t>(columns == 0));
-    }
     IST_HD std::uint32_t row(std::uint32_t k) const { return k * inverse >> 16; }
   };
+
+  IST_HD Pairs pairs_of(int columns) const {
+    return {static_cast<std::uint32_t>(columns), memory_.inverse[columns]};
+  }
 
   IST_HD bool open() {
     team_.sync();
@@ -175,21 +178,21 @@ class ExactSearch {
     opens_[0] = level[0] > 0 && (level[1] == 0 || size[1] <= kAlone * size[0]);
     opens_[1] = level[1] > 0 && (level[0] == 0 || size[0] <= kAlone * size[1]);
     team_.sync();
-    int left[2] = {0, 0};
+    int of_a = 0, of_b = 0;
     for (int first = 0; first < kBoth; first += Team::kWidth) {
       const int k = first + team_.lane(), side = k / static_cast<int>(kWidth);
       const auto l = static_cast<std::uint32_t>(k) % kWidth;
       Box box = {};
       const bool meets = place_child(side, l, box);
-      const int at = listed(meets, side, left);
+      const int at = listed(meets, side, of_a, of_b);
       if (meets) keep(side, l, box, memory_.boxes[side][at]);
     }
     team_.sync();
     found_ = 0;
     const bool leaves =
         level[0] == static_cast<int>(opens_[0]) && level[1] == static_cast<int>(opens_[1]);
-    const Pairs of(left[1]);
-    const int pairs = left[0] * left[1];
+    const Pairs of = pairs_of(of_b);
+    const int pairs = of_a * of_b;
     for (int first = 0; first < pairs; first += Team::kWidth) {
       const int k = first + team_.lane();
       const std::uint32_t i = k < pairs ? of.row(static_cast<std::uint32_t>(k)) : 0,
@@ -251,16 +254,14 @@ class ExactSearch {
     }
   }
 
-  /// Place of a lane's item in the list of its side; `left`: items of both.
-  IST_HD int listed(bool adds, int side, int (&left)[2]) const {
-    int at = 0;
-    for (int s = 0; s < 2; ++s) {
-      int total = 0;
-      const int before = team_.exclusive_count(adds && side == s, total);
-      if (side == s) at = left[s] + before;
-      left[s] += total;
-    }
-    return at;
+  /// Place of a lane's item in the list of its side, of which there are so many before.
+  IST_HD int listed(bool adds, int side, int& of_a, int& of_b) const {
+    int more_a = 0, more_b = 0;
+    const int before_a = of_a + team_.exclusive_count(adds && side == 0, more_a);
+    const int before_b = of_b + team_.exclusive_count(adds && side == 1, more_b);
+    of_a += more_a;
+    of_b += more_b;
+    return side == 0 ? before_a : before_b;
   }
 
   // No array is indexed by what lanes differ in: it would lie in memory that is slow.
@@ -354,13 +355,9 @@ class ExactSearch {
     block_[1] = child(1, j).number();
     for (int k = team_.lane(); k < kBoth; k += Team::kWidth) {
       const int side = k / static_cast<int>(kWidth), v = k % static_cast<int>(kWidth);
-      const MeshTree& mesh = pair_.mesh[side];
-      const double* const x =
-          in_global_memory(mesh.vertices) +
-          std::size_t{3} * in_global_memory(mesh.blocks)[block_of(side)].vertex[v];
-      const float at[3] = {static_cast<float>(x[0]), static_cast<float>(x[1]),
-                           static_cast<float>(x[2])};
-      Quad out = {{at[0], at[1], at[2], 0}};
+      const FloatBlock& block = in_global_memory(pair_.in_floats[side])[block_of(side)];
+      const float at[3] = {block.x[0][v], block.x[1][v], block.x[2][v]};
+      Quad out = {{at[0], at[1], at[2], float_of(block.corner[v])}};
       if (side == 1)
         for (int axis = 0; axis < 3; ++axis) {
           const Quad m = pair_.row[1][axis];
@@ -370,19 +367,19 @@ class ExactSearch {
       memory_.vertices[side][v] = out;
     }
     team_.sync();
-    int left[2] = {0, 0};
+    int of_a = 0, of_b = 0;
     for (int first = 0; first < kBoth; first += Team::kWidth) {
       const int k = first + team_.lane(), side = k / static_cast<int>(kWidth);
       const auto t = static_cast<std::uint32_t>(k) % kWidth;
-      const MeshBlock& block = in_global_memory(pair_.mesh[side].blocks)[block_of(side)];
-      const std::uint32_t corner[3] = {block.corner[0][t], block.corner[1][t], block.corner[2][t]};
-      const Quad p = memory_.vertices[side][corner[0]], q = memory_.vertices[side][corner[1]],
-                 r = memory_.vertices[side][corner[2]];
+      const std::uint32_t corners = bits_of(memory_.vertices[side][t].x[3]);
+      const Quad p = memory_.vertices[side][corners & 0xFF],
+                 q = memory_.vertices[side][corners >> 8 & 0xFF],
+                 r = memory_.vertices[side][corners >> 16 & 0xFF];
       const Quad by_low = side == 0 ? memory_.boxes[1][j].other_low : memory_.boxes[0][i].low,
                  by_high = side == 0 ? memory_.boxes[1][j].other_high : memory_.boxes[0][i].high;
       const float slack = pair_.slack, wider = side == 0 ? slack : 0;
       ExactTriangle out;
-      bool meets = t < block.triangles;
+      bool meets = corners >> 24 != 0;
       for (int axis = 0; axis < 3; ++axis) {
         const float low = std::fmin(p.x[axis], std::fmin(q.x[axis], r.x[axis]));
         const float high = std::fmax(p.x[axis], std::fmax(q.x[axis], r.x[axis]));
@@ -394,8 +391,8 @@ class ExactSearch {
       const std::uint32_t lanes = team_.ballot(meets);
       if (Team::kWidth == kBoth && (lanes >> kWidth == 0 || lanes << kWidth == 0)) break;
       place_plane(p, q, r, by_low, by_high, out);
-      out.call(t | corner[0] << 8 | corner[1] << 16 | corner[2] << 24);
-      const int at = listed(meets, side, left);
+      out.call(t | corners << 8);
+      const int at = listed(meets, side, of_a, of_b);
       if (meets) {
         ExactTriangle& to = memory_.triangles[side][at];
         to.low = out.low;
@@ -404,8 +401,8 @@ class ExactSearch {
       }
     }
     team_.sync();
-    columns_ = left[1];
-    return left[0] * left[1];
+    columns_ = of_b;
+    return of_a * of_b;
   }
 
   IST_HD std::uint32_t block_of(int side) const { return side == 0 ? block_[0] : block_[1]; }
@@ -435,7 +432,7 @@ class ExactSearch {
 
   /// Their pairs of triangles whose boxes meet: how many.
   IST_HD int meet_triangles(int pairs) {
-    const Pairs of(columns_);
+    const Pairs of = pairs_of(columns_);
     int met = 0;
     for (int first = 0; first < pairs; first += Team::kWidth) {
       const int k = first + team_.lane();

@@ -98,6 +98,10 @@ IST_HD void load_pair(const Team& team, const ExactArrays& batch, std::uint32_t 
                       ExactPair& pair) {
   copy_words(team, solid_of(batch, batch.pairs.a, i).mesh, pair.mesh[0]);
   copy_words(team, solid_of(batch, batch.pairs.b, i).mesh, pair.mesh[1]);
+  if (team.lane() == 0) {
+    pair.in_floats[0] = solid_of(batch, batch.pairs.a, i).in_floats;
+    pair.in_floats[1] = solid_of(batch, batch.pairs.b, i).in_floats;
+  }
   team.sync();
   for (int k = team.lane(); k < 24; k += Team::kWidth) {
     const int side = k / 12, row = k % 12 / 4, n = k % 4;
