@@ -65,7 +65,7 @@ static_assert(sizeof(ExactBox) % 32 == 16 && sizeof(ExactTriangle) % 32 == 16);
 
 /// What a team that searches keeps beside the pair.
 struct ExactSearchMemory {
-  static constexpr std::uint32_t kWaiting = 128;  ///< pairs of nodes, of the first pass
+  static constexpr std::uint32_t kWaiting = 192;  ///< pairs of nodes, of the first pass
   ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
   ExactTriangle triangles[2][kWidth];             ///< likewise
   Quad vertices[2][kWidth];  ///< of two blocks, A's frame; last the corners of a triangle
