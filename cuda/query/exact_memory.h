@@ -68,7 +68,8 @@ struct ExactSearchMemory {
   static constexpr std::uint32_t kWaiting = 192;  ///< pairs of nodes, of the first pass
   ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
   ExactTriangle triangles[2][kWidth];             ///< likewise
-  Quad vertices[2][kWidth];  ///< of two blocks, A's frame; last the corners of a triangle
+  float vertices[3][2]
+                [kWidth];  ///< of two blocks, A's frame: lanes read them from banks of their own
   std::uint64_t waiting[kWaiting];
   ExactPool pool;
   ExactChain crossing, near;   ///< triangles that may cross; others whose signs are not settled

@@ -129,9 +129,9 @@ class ExactSearch {
       if (!open()) return false;
       for (std::uint32_t next = 0; next < found_; ++next) {
         const std::uint32_t found = memory_.found[next];
-        const int pairs = place_blocks(found / kWidth, found % kWidth);
-        if (pairs == 0) continue;
-        const int met = meet_triangles(pairs);
+        const std::uint32_t left = place_blocks(found / kWidth, found % kWidth);
+        if (left == 0) continue;
+        const int met = meet_triangles(left % 256, left / 256);
         for (int first = 0; first < met; first += Team::kWidth) {
           test_planes(first, met);
           if (queued_ >= kBatch && !sift()) return false;
@@ -349,40 +349,43 @@ class ExactSearch {
            along_b - reach_b <= b_high.x[3] && along_b + reach_b >= b_low.x[3];
   }
 
-  /// Of two blocks the triangles whose boxes meet that of the other; how many pairs.
-  IST_HD int place_blocks(std::uint32_t i, std::uint32_t j) {
+  /// Of two blocks the triangles whose boxes meet that of the other; of A's how many, and
+  /// 256 · of B's; 0: of a side none.
+  IST_HD std::uint32_t place_blocks(std::uint32_t i, std::uint32_t j) {
     block_[0] = child(0, i).number();
     block_[1] = child(1, j).number();
     for (int k = team_.lane(); k < kBoth; k += Team::kWidth) {
       const int side = k / static_cast<int>(kWidth), v = k % static_cast<int>(kWidth);
-      const FloatBlock& block = in_global_memory(pair_.in_floats[side])[block_of(side)];
-      const float at[3] = {block.x[0][v], block.x[1][v], block.x[2][v]};
-      Quad out = {{at[0], at[1], at[2], float_of(block.corner[v])}};
-      if (side == 1)
+      const FloatBlock& block = float_block(side);
+      float at[3] = {block.x[0][v], block.x[1][v], block.x[2][v]};
+      if (side == 1) {
+        const float own[3] = {at[0], at[1], at[2]};
         for (int axis = 0; axis < 3; ++axis) {
           const Quad m = pair_.row[1][axis];
-          out.x[axis] =
-              std::fma(m.x[0], at[0], std::fma(m.x[1], at[1], std::fma(m.x[2], at[2], m.x[3])));
+          at[axis] =
+              std::fma(m.x[0], own[0], std::fma(m.x[1], own[1], std::fma(m.x[2], own[2], m.x[3])));
         }
-      memory_.vertices[side][v] = out;
+      }
+      for (int axis = 0; axis < 3; ++axis) memory_.vertices[axis][side][v] = at[axis];
     }
     team_.sync();
     int of_a = 0, of_b = 0;
     for (int first = 0; first < kBoth; first += Team::kWidth) {
       const int k = first + team_.lane(), side = k / static_cast<int>(kWidth);
       const auto t = static_cast<std::uint32_t>(k) % kWidth;
-      const std::uint32_t corners = bits_of(memory_.vertices[side][t].x[3]);
-      const Quad p = memory_.vertices[side][corners & 0xFF],
-                 q = memory_.vertices[side][corners >> 8 & 0xFF],
-                 r = memory_.vertices[side][corners >> 16 & 0xFF];
+      const std::uint32_t corners = float_block(side).corner[t];
+      float p[3], q[3], r[3];
+      vertex(side, corners, p);
+      vertex(side, corners >> 8, q);
+      vertex(side, corners >> 16, r);
       const Quad by_low = side == 0 ? memory_.boxes[1][j].other_low : memory_.boxes[0][i].low,
                  by_high = side == 0 ? memory_.boxes[1][j].other_high : memory_.boxes[0][i].high;
       const float slack = pair_.slack, wider = side == 0 ? slack : 0;
       ExactTriangle out;
       bool meets = corners >> 24 != 0;
       for (int axis = 0; axis < 3; ++axis) {
-        const float low = std::fmin(p.x[axis], std::fmin(q.x[axis], r.x[axis]));
-        const float high = std::fmax(p.x[axis], std::fmax(q.x[axis], r.x[axis]));
+        const float low = std::fmin(p[axis], std::fmin(q[axis], r[axis]));
+        const float high = std::fmax(p[axis], std::fmax(q[axis], r[axis]));
         meets = meets && low - slack <= by_high.x[axis] && high + slack >= by_low.x[axis];
         out.low.x[axis] = low - wider;
         out.high.x[axis] = high + wider;
@@ -401,28 +404,33 @@ class ExactSearch {
       }
     }
     team_.sync();
-    columns_ = of_b;
-    return of_a * of_b;
+    return of_a == 0 || of_b == 0 ? 0 : static_cast<std::uint32_t>(of_a + 256 * of_b);
   }
 
-  IST_HD std::uint32_t block_of(int side) const { return side == 0 ? block_[0] : block_[1]; }
+  IST_HD const FloatBlock& float_block(int side) const {
+    return in_global_memory(pair_.in_floats[side])[side == 0 ? block_[0] : block_[1]];
+  }
+  /// The vertex of a block that the last byte names.
+  IST_HD void vertex(int side, std::uint32_t name, float (&out)[3]) const {
+    for (int k = 0; k < 3; ++k) out[k] = memory_.vertices[k][side][name & 0xFF];
+  }
 
   /// A triangle's plane, for heights of points of a box.
-  IST_HD void place_plane(const Quad& p, const Quad& q, const Quad& r, const Quad& low,
-                          const Quad& high, ExactTriangle& out) const {
+  IST_HD void place_plane(const float (&p)[3], const float (&q)[3], const float (&r)[3],
+                          const Quad& low, const Quad& high, ExactTriangle& out) const {
     float u[3], v[3], longest = 0, farthest = 0;
     for (int k = 0; k < 3; ++k) {
-      u[k] = q.x[k] - p.x[k];
-      v[k] = r.x[k] - p.x[k];
+      u[k] = q[k] - p[k];
+      v[k] = r[k] - p[k];
       longest = std::fmax(longest, std::fmax(std::abs(u[k]), std::abs(v[k])));
-      farthest = std::fmax(farthest, std::fmax(high.x[k] - p.x[k], p.x[k] - low.x[k]));
+      farthest = std::fmax(farthest, std::fmax(high.x[k] - p[k], p[k] - low.x[k]));
     }
     Quad& n = out.plane;
     for (int k = 0; k < 3; ++k) {
       const int l = (k + 1) % 3, m = (k + 2) % 3;
       n.x[k] = std::fma(u[l], v[m], -(u[m] * v[l]));
     }
-    n.x[3] = -std::fma(n.x[0], p.x[0], std::fma(n.x[1], p.x[1], n.x[2] * p.x[2]));
+    n.x[3] = -std::fma(n.x[0], p[0], std::fma(n.x[1], p[1], n.x[2] * p[2]));
     // What moves points, as in by_plane(), and places them in floats; and what floats round.
     const float moved = 0.5f * pair_.slack;
     longest += moved;
@@ -430,19 +438,29 @@ class ExactSearch {
     out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
   }
 
-  /// Their pairs of triangles whose boxes meet: how many.
-  IST_HD int meet_triangles(int pairs) {
-    const Pairs of = pairs_of(columns_);
+  /// Their pairs of triangles whose boxes meet: how many. Row by row, of a power of two of columns:
+  /// a lane of a warp stays in its column.
+  IST_HD int meet_triangles(std::uint32_t rows, std::uint32_t columns) {
+    int shift = 0;
+    while (1u << shift < columns) ++shift;
+    const std::uint32_t mask = (1u << shift) - 1, end = rows << shift;
+    constexpr bool kStays = kBatch >= kWidth;
+    const auto lane = static_cast<std::uint32_t>(team_.lane());
+    std::uint32_t j = lane & mask;
+    ExactTriangle b = memory_.triangles[1][j];
     int met = 0;
-    for (int first = 0; first < pairs; first += Team::kWidth) {
-      const int k = first + team_.lane();
-      const std::uint32_t i = k < pairs ? of.row(static_cast<std::uint32_t>(k)) : 0,
-                          j = k < pairs ? static_cast<std::uint32_t>(k) - i * of.columns : 0;
-      const Quad a_low = memory_.triangles[0][i].low, a_high = memory_.triangles[0][i].high,
-                 b_low = memory_.triangles[1][j].low, b_high = memory_.triangles[1][j].high;
-      bool meets = k < pairs;
+    for (std::uint32_t first = 0; first < end; first += kBatch) {
+      const std::uint32_t i = (first + lane) >> shift;
+      if (!kStays) {
+        j = first & mask;
+        b = memory_.triangles[1][j];
+      }
+      const bool is = i < rows && j < columns;
+      const ExactTriangle& a = memory_.triangles[0][is ? i : 0];
+      const Quad a_low = a.low, a_high = a.high;
+      bool meets = is;
       for (int axis = 0; axis < 3; ++axis)
-        meets = meets && a_low.x[axis] <= b_high.x[axis] && a_high.x[axis] >= b_low.x[axis];
+        meets = meets && a_low.x[axis] <= b.high.x[axis] && a_high.x[axis] >= b.low.x[axis];
       int total = 0;
       const int before = team_.exclusive_count(meets, total);
       if (meets) memory_.met[met + before] = static_cast<std::uint8_t>(kWidth * i + j);
@@ -483,9 +501,10 @@ class ExactSearch {
     const Quad n = plane.plane;
     float least = kFar, most = -kFar;
     for (int k = 0; k < 3; ++k) {
-      const Quad x = memory_.vertices[side][name >> (8 + 8 * k) & 0xFF];
+      float x[3];
+      vertex(side, name >> (8 + 8 * k), x);
       const float height =
-          std::fma(n.x[0], x.x[0], std::fma(n.x[1], x.x[1], std::fma(n.x[2], x.x[2], n.x[3])));
+          std::fma(n.x[0], x[0], std::fma(n.x[1], x[1], std::fma(n.x[2], x[2], n.x[3])));
       least = std::fmin(least, height);
       most = std::fmax(most, height);
     }
@@ -502,7 +521,6 @@ class ExactSearch {
   std::uint32_t count_ = 1;          ///< that wait
   std::uint32_t found_ = 0;          ///< pairs of blocks
   std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
-  int columns_ = 0;                  ///< of B's
   std::uint32_t head_ = 0, queued_ = 0;
 };
 
