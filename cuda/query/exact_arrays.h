@@ -15,7 +15,7 @@ namespace ist::gpu {
 constexpr int kExactPasses = 3;
 /// [bytes] of a team's room beside what the largest mesh takes.
 IST_HD constexpr std::size_t exact_room(int pass) {
-  return pass == 0 ? 64u << 10 : pass == 1 ? 512u << 10 : 16u << 20;
+  return pass == 0 ? 80u << 10 : pass == 1 ? 512u << 10 : 16u << 20;
 }
 
 /// How the work on a pair stands.
@@ -33,6 +33,7 @@ enum class ExactState : std::uint32_t {
 struct ExactRound {
   std::uint32_t first;                     ///< of the pairs listed
   std::uint32_t searched, summed, redone;  ///< of them taken
+  std::uint32_t found;                     ///< of them, searches that are done
   std::uint32_t unsure;                    ///< of them
   std::uint32_t chunks;                    ///< taken
 };

@@ -39,7 +39,7 @@ __global__ void __launch_bounds__(kThreadsEach)
     place_meshes(const ExactArrays batch, const std::uint32_t n) {
   const std::uint32_t first = end_of(batch, round_of(batch, n + 1));
   const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x;
-  if (k == 0) round_of(batch, n) = {first, 0, 0, 0, 0, 0};
+  if (k == 0) round_of(batch, n) = {first, 0, 0, 0, 0, 0, 0};
   if (k < pairs_from(batch, first)) place_query(batch, k, first + k);
 }
 
@@ -54,7 +54,7 @@ __global__ void __launch_bounds__(kThreads, kSearchBlocks)
       [&](const WarpTeam& team, std::uint32_t k) {
         search_query(team, batch, round, k, pair[warp], memory[warp]);
       },
-      [&] { return goes_on(batch, round, gridDim.x * kWarps); });
+      [&] { return goes_on(batch, n); });
 }
 
 template <bool kExactly>

@@ -233,16 +233,18 @@ IST_HD inline std::uint32_t end_of(const ExactArrays& batch, const ExactRound& r
   return round.first + searched_of(batch, round);
 }
 
-/// Whether a round has room for one more pair, as far as can be told. `teams`: those that search,
-/// of which each may still need as many chunks as pairs took before.
-IST_HD inline bool goes_on(const ExactArrays& batch, const ExactRound& round, std::uint32_t teams) {
-  constexpr std::uint32_t kLeastEach = 4;
-  const std::uint32_t most = pairs_from(batch, round.first);
-  const std::uint32_t chunks = atomic_load(&round.chunks);
-  const std::uint32_t each = chunks / (atomic_load(&round.searched) + 1);
-  return chunks +
-             std::uint64_t{teams < most ? teams : most} * (each > kLeastEach ? each : kLeastEach) <=
-         batch.pool.room;
+/// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
+/// may still need as many chunks as pairs took before, in the last round too.
+IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n) {
+  const auto each = [](const ExactRound& round) {
+    return atomic_load(&round.chunks) / (atomic_load(&round.found) + 1);
+  };
+  const ExactRound &round = round_of(batch, n), &last = round_of(batch, n + 1);
+  constexpr std::uint32_t kLeast = 4;
+  std::uint32_t most = each(last) > kLeast ? each(last) : kLeast;
+  if (each(round) > most) most = each(round);
+  const std::uint32_t found = atomic_load(&round.found), searched = atomic_load(&round.searched);
+  return atomic_load(&round.chunks) + std::uint64_t{searched + 1 - found} * most <= batch.pool.room;
 }
 
 /// Searches the k-th pair of a round.
@@ -260,6 +262,7 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
     query.visits = search.visits;
     query.crossing = memory.crossing;
     query.near = memory.near;
+    atomic_add(&round.found, 1);
   }
 }
 

@@ -110,7 +110,7 @@ constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
 /// A round of pairs that triangles meet, and what they leave to be summed.
 constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
 /// A round of pairs of meshes, and chunks of triangles for each of them.
-constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 8;
+constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 12;
 constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace

@@ -108,10 +108,10 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   std::uint32_t n = 0;
   for (std::uint32_t first = 0; n < most_rounds && first < exact_counters.listed[0]; ++n) {
     gpu::ExactRound& round = gpu::round_of(batch, n);
-    round = {first, 0, 0, 0, 0, 0};
+    round = {first, 0, 0, 0, 0, 0, 0};
     const std::uint32_t count = gpu::pairs_from(batch, first);
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
-    for (; round.searched < count && gpu::goes_on(batch, round, 1); ++round.searched)
+    for (; round.searched < count && gpu::goes_on(batch, n); ++round.searched)
       by_team(seed, [&](const auto& team) {
         gpu::search_query(team, batch, round, round.searched, *pair, *search);
       });
@@ -208,7 +208,7 @@ void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
     round = {first, 0, 0, 0, 0};
     const std::uint32_t count = gpu::pairs_from(batch, first);
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
-    for (; round.walked < count && gpu::goes_on(batch, round, 1); ++round.walked)
+    for (; round.walked < count && gpu::goes_on(batch, n); ++round.walked)
       by_team(seed,
               [&](const auto& team) { gpu::walk_query(team, batch, round, round.walked, *walks); });
     for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
