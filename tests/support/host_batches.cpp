@@ -208,7 +208,7 @@ void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
     round = {first, 0, 0, 0, 0};
     const std::uint32_t count = gpu::pairs_from(batch, first);
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
-    for (; round.walked < count && gpu::goes_on(batch, n); ++round.walked)
+    for (; round.walked < count && gpu::goes_on(batch, round, 1); ++round.walked)
       by_team(seed,
               [&](const auto& team) { gpu::walk_query(team, batch, round, round.walked, *walks); });
     for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
