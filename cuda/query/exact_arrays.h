@@ -23,6 +23,7 @@ enum class ExactState : std::uint32_t {
   ok,
   unsure,   ///< doubles do not tell
   no_room,  ///< more than the team's memory holds
+  later,    ///< others have left no room in this round
   wrong,    ///< signs contradict each other
 };
 
@@ -31,7 +32,7 @@ enum class ExactState : std::uint32_t {
 /// do not tell by exact ones. The next round begins where the room for triangles has come to its
 /// end.
 struct ExactRound {
-  std::uint32_t first;                     ///< of the pairs listed
+  std::uint32_t first, count;              ///< of the pairs listed
   std::uint32_t searched, summed, redone;  ///< of them taken
   std::uint32_t found;                     ///< of them, searches that are done
   std::uint32_t unsure;                    ///< of them
@@ -156,7 +157,7 @@ struct ExactRoom {
 /// Its pairs of assets that keep their meshes, by Measure::exact.
 struct ExactArrays : SolidPairs {
   ExactCounters* counters;
-  std::uint32_t* list[kExactPasses];  ///< pairs that a pass asks
+  std::uint32_t* list[kExactPasses];  ///< pairs that a pass asks; the first's goes round
   // A round's, then the teams'; the later passes' teams have all of it.
   std::byte* memory;
   std::size_t bytes;

@@ -16,7 +16,7 @@ constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kWholeWarps = 2;
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 // A multiprocessor; more leave too few registers.
-constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4;
+constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 4, kWholeBlocks = 4;
 
 /// Shared memory runs no constructors.
 template <class T, unsigned kCount>
@@ -37,10 +37,10 @@ __global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays ba
 /// Begins the n-th round.
 __global__ void __launch_bounds__(kThreadsEach)
     place_meshes(const ExactArrays batch, const std::uint32_t n) {
-  const std::uint32_t first = end_of(batch, round_of(batch, n + 1));
-  const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x;
-  if (k == 0) round_of(batch, n) = {first, 0, 0, 0, 0, 0, 0};
-  if (k < pairs_from(batch, first)) place_query(batch, k, first + k);
+  const std::uint32_t first = end_of(round_of(batch, n + 1));
+  const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x, count = pairs_from(batch, first);
+  if (k == 0) round_of(batch, n) = {first, count, 0, 0, 0, 0, 0, 0};
+  if (k < count) place_query(batch, k, first + k);
 }
 
 __global__ void __launch_bounds__(kThreads, kSearchBlocks)
@@ -50,7 +50,7 @@ __global__ void __launch_bounds__(kThreads, kSearchBlocks)
   const unsigned warp = threadIdx.x / 32;
   ExactRound& round = round_of(batch, n);
   by_warps(
-      pairs_from(batch, round.first), &round.searched,
+      round.count, &round.searched,
       [&](const WarpTeam& team, std::uint32_t k) {
         search_query(team, batch, round, k, pair[warp], memory[warp]);
       },
@@ -66,8 +66,8 @@ __global__ void __launch_bounds__(kThreads, kExactly ? kExactBlocks : kSumBlocks
   ExactRound& round = round_of(batch, n);
   const ExactRoom room = batch.room(0, blockIdx.x * kWarps + warp);
   if (kExactly && blockIdx.x == 0 && threadIdx.x == 0) batch.counters->exactly += round.unsure;
-  by_warps(kExactly ? round.unsure : searched_of(batch, round),
-           kExactly ? &round.redone : &round.summed, [&](const WarpTeam& team, std::uint32_t k) {
+  by_warps(kExactly ? round.unsure : searched_of(round), kExactly ? &round.redone : &round.summed,
+           [&](const WarpTeam& team, std::uint32_t k) {
              sum_query<kExactly>(team, batch, round, k, room, pair[warp], memory[warp]);
            });
 }

@@ -90,8 +90,8 @@ IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
     const Apart by = apart_by_plane(of, side, pair);
     if (by > apart) apart = by;
   }
-  // Of those that only are near once for each pair of blocks, where they follow each other.
-  const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
+  // Blocks that are near once, where pairs of theirs follow each other.
+  const std::uint32_t of_a = apart != Apart::settled ? pair[0] / kWidth : kNone,
                       of_b = pair[1] / kWidth;
   const int before = team.lane() == 0 ? 0 : team.lane() - 1;
   const std::uint32_t last_a = team.broadcast(of_a, before), last_b = team.broadcast(of_b, before);
@@ -100,7 +100,8 @@ IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
   team.sync();
   if (lane == Team::kWidth - 1) memory.last_near[0] = of_a, memory.last_near[1] = of_b;
   return append(team, memory.pool, memory.crossing, apart == Apart::no, pair[0], pair[1]) &&
-         append(team, memory.pool, memory.near, of_a != kNone && !again, pair[0], pair[1]);
+         append(team, memory.pool, memory.near, apart == Apart::certain && !again, pair[0],
+                pair[1]);
 }
 
 /// Pairs of triangles of both meshes that may cross. Both trees are opened together, depth first;
@@ -131,7 +132,7 @@ class ExactSearch {
         const std::uint32_t found = memory_.found[next];
         const std::uint32_t left = place_blocks(found / kWidth, found % kWidth);
         if (left == 0) continue;
-        const int met = meet_triangles(left % 256, left / 256);
+        const int met = meet_triangles(static_cast<int>(left % 256), static_cast<int>(left / 256));
         for (int first = 0; first < met; first += Team::kWidth) {
           test_planes(first, met);
           if (queued_ >= kBatch && !sift()) return false;
@@ -438,29 +439,20 @@ class ExactSearch {
     out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
   }
 
-  /// Their pairs of triangles whose boxes meet: how many. Row by row, of a power of two of columns:
-  /// a lane of a warp stays in its column.
-  IST_HD int meet_triangles(std::uint32_t rows, std::uint32_t columns) {
-    int shift = 0;
-    while (1u << shift < columns) ++shift;
-    const std::uint32_t mask = (1u << shift) - 1, end = rows << shift;
-    constexpr bool kStays = kBatch >= kWidth;
-    const auto lane = static_cast<std::uint32_t>(team_.lane());
-    std::uint32_t j = lane & mask;
-    ExactTriangle b = memory_.triangles[1][j];
+  /// Their pairs of triangles whose boxes meet: how many.
+  IST_HD int meet_triangles(int rows, int columns) {
+    const Pairs of = pairs_of(columns);
+    const int pairs = rows * columns;
     int met = 0;
-    for (std::uint32_t first = 0; first < end; first += kBatch) {
-      const std::uint32_t i = (first + lane) >> shift;
-      if (!kStays) {
-        j = first & mask;
-        b = memory_.triangles[1][j];
-      }
-      const bool is = i < rows && j < columns;
-      const ExactTriangle& a = memory_.triangles[0][is ? i : 0];
-      const Quad a_low = a.low, a_high = a.high;
-      bool meets = is;
+    for (int first = 0; first < pairs; first += Team::kWidth) {
+      const int k = first + team_.lane();
+      const std::uint32_t i = k < pairs ? of.row(static_cast<std::uint32_t>(k)) : 0,
+                          j = k < pairs ? static_cast<std::uint32_t>(k) - i * of.columns : 0;
+      const Quad a_low = memory_.triangles[0][i].low, a_high = memory_.triangles[0][i].high,
+                 b_low = memory_.triangles[1][j].low, b_high = memory_.triangles[1][j].high;
+      bool meets = k < pairs;
       for (int axis = 0; axis < 3; ++axis)
-        meets = meets && a_low.x[axis] <= b.high.x[axis] && a_high.x[axis] >= b.low.x[axis];
+        meets = meets && a_low.x[axis] <= b_high.x[axis] && a_high.x[axis] >= b_low.x[axis];
       int total = 0;
       const int before = team_.exclusive_count(meets, total);
       if (meets) memory_.met[met + before] = static_cast<std::uint8_t>(kWidth * i + j);

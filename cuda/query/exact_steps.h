@@ -87,7 +87,7 @@ IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, Exac
 /// Places the k-th pair of a round, `listed` among all. One thread a pair.
 IST_HD inline void place_query(const ExactArrays& batch, std::uint32_t k, std::uint32_t listed) {
   ExactQuery& query = batch.queries[k];
-  query.pair = batch.list[0][listed];
+  query.pair = batch.list[0][listed % batch.pairs.count];
   place_exactly(batch, query.pair, query.frame.place);
   frame_exactly(batch, query.pair, query.frame);
 }
@@ -219,32 +219,33 @@ IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32
 IST_HD inline ExactRound& round_of(const ExactArrays& batch, std::uint32_t n) {
   return batch.counters->round[n % 2];
 }
-/// Pairs of a round that begins with the first-th of those listed, if all are searched.
+/// Pairs of a round that begins with the first-th of those listed.
 IST_HD inline std::uint32_t pairs_from(const ExactArrays& batch, std::uint32_t first) {
   const std::uint32_t left = batch.counters->listed[0] - first;
   return left < batch.query_room ? left : batch.query_room;
 }
-IST_HD inline std::uint32_t searched_of(const ExactArrays& batch, const ExactRound& round) {
-  const std::uint32_t most = pairs_from(batch, round.first);
-  return round.searched < most ? round.searched : most;
+IST_HD inline std::uint32_t searched_of(const ExactRound& round) {
+  return round.searched < round.count ? round.searched : round.count;
 }
 /// Where the round after this one begins.
-IST_HD inline std::uint32_t end_of(const ExactArrays& batch, const ExactRound& round) {
-  return round.first + searched_of(batch, round);
+IST_HD inline std::uint32_t end_of(const ExactRound& round) {
+  return round.first + searched_of(round);
 }
 
 /// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
 /// may still need as many chunks as pairs took before, in the last round too.
 IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n) {
-  const auto each = [](const ExactRound& round) {
-    return atomic_load(&round.chunks) / (atomic_load(&round.found) + 1);
-  };
-  const ExactRound &round = round_of(batch, n), &last = round_of(batch, n + 1);
   constexpr std::uint32_t kLeast = 4;
-  std::uint32_t most = each(last) > kLeast ? each(last) : kLeast;
-  if (each(round) > most) most = each(round);
+  std::uint32_t each = kLeast;
+  for (const ExactRound& round : batch.counters->round) {
+    const std::uint32_t chunks = atomic_load(&round.chunks);
+    const std::uint32_t taken = chunks / (atomic_load(&round.found) + 1);
+    const std::uint32_t needed = chunks <= batch.pool.room ? taken : 2 * taken;  // some had no room
+    if (needed > each) each = needed;
+  }
+  const ExactRound& round = round_of(batch, n);
   const std::uint32_t found = atomic_load(&round.found), searched = atomic_load(&round.searched);
-  return atomic_load(&round.chunks) + std::uint64_t{searched + 1 - found} * most <= batch.pool.room;
+  return atomic_load(&round.chunks) + std::uint64_t{searched + 1 - found} * each <= batch.pool.room;
 }
 
 /// Searches the k-th pair of a round.
@@ -259,6 +260,11 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
   const bool fits = search.run();
   if (team.lane() == 0) {
     query.state = fits ? ExactState::ok : ExactState::no_room;
+    // What others left no chunks for is listed again.
+    if (!fits && round.chunks > batch.pool.room) {
+      query.state = ExactState::later;
+      batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
+    }
     query.visits = search.visits;
     query.crossing = memory.crossing;
     query.near = memory.near;
@@ -279,7 +285,7 @@ IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& ro
     state = sum_exactly<kExactly>(team, batch, query.pair, room, pair, memory, batch.pool,
                                   query.crossing, query.near, query.visits);
   }
-  if (state == ExactState::ok || team.lane() != 0) return;
+  if (state == ExactState::ok || state == ExactState::later || team.lane() != 0) return;
   if (!kExactly && state == ExactState::unsure)
     batch.queries[atomic_add(&round.unsure, 1)].unsure = k;
   else
@@ -291,7 +297,7 @@ IST_HD inline std::uint32_t pairs_of_pass(const ExactArrays& batch, int pass,
                                           std::uint32_t rounds) {
   const ExactCounters& counters = *batch.counters;
   return counters.listed[pass] +
-         (pass == 1 ? counters.listed[0] - end_of(batch, round_of(batch, rounds + 1)) : 0);
+         (pass == 1 ? counters.listed[0] - end_of(round_of(batch, rounds + 1)) : 0);
 }
 
 /// A later pass over the k-th of its pairs, of which so many are `listed`. All of a team together.
@@ -300,8 +306,9 @@ IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::
                      std::uint32_t listed, std::uint32_t k, const ExactRoom& room,
                      ExactWholeMemory& memory) {
   const std::uint32_t i =
-      k < listed ? batch.list[pass][k]
-                 : batch.list[0][end_of(batch, round_of(batch, rounds + 1)) + (k - listed)];
+      k < listed
+          ? batch.list[pass][k]
+          : batch.list[0][(end_of(round_of(batch, rounds + 1)) + (k - listed)) % batch.pairs.count];
   team.sync();
   if (team.lane() == 0) {
     place_exactly(batch, i, memory.pair.place);

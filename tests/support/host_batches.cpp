@@ -106,10 +106,11 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   const auto whole = std::make_unique<gpu::ExactWholeMemory>();
   const gpu::ExactRoom first_room = room(0);
   std::uint32_t n = 0;
-  for (std::uint32_t first = 0; n < most_rounds && first < exact_counters.listed[0]; ++n) {
+  for (std::uint32_t first = 0; n < std::min(most_rounds, 100u) && first < exact_counters.listed[0];
+       ++n) {
     gpu::ExactRound& round = gpu::round_of(batch, n);
-    round = {first, 0, 0, 0, 0, 0, 0};
     const std::uint32_t count = gpu::pairs_from(batch, first);
+    round = {first, count, 0, 0, 0, 0, 0, 0};
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
     for (; round.searched < count && gpu::goes_on(batch, n); ++round.searched)
       by_team(seed, [&](const auto& team) {
@@ -125,7 +126,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     sum_all.template operator()<true>(round.unsure);
     exact_counters.exactly += round.unsure;
     if (round.searched == 0) throw std::logic_error("a round has no room for a pair");
-    first = gpu::end_of(batch, round);
+    first = gpu::end_of(round);
   }
   rounds = n;
   for (int pass = 1; pass < gpu::kExactPasses; ++pass) {

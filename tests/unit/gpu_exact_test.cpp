@@ -75,7 +75,7 @@ TEST(GpuExact, LittleRoomDoesNotShow) {
   batch.mesh_room = 7;
   batch.mesh_chunks = 12;
   expect_same_bits(batch.run(pairs, Measure::exact), expected);
-  EXPECT_GT(batch.exact_counters.listed[1], 10u);
+  EXPECT_GT(batch.exact_counters.listed[0], 400u);  // some more than once
   EXPECT_GT(batch.rounds, 3 * most);
   batch.most_rounds = 2;
   expect_same_bits(batch.run(pairs, Measure::exact), expected);
