@@ -16,7 +16,7 @@ constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kWholeWarps = 2;
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 // A multiprocessor; more leave too few registers.
-constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 4, kWholeBlocks = 4;
+constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4;
 
 /// Shared memory runs no constructors.
 template <class T, unsigned kCount>
