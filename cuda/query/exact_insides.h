@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <new>
 
 #include "cuda/query/exact_crossings.h"
 #include "query/exact/block_insides.h"
@@ -11,9 +12,14 @@ namespace ist::gpu {
 template <class Team, bool kExactly>
 class ExactInsides {
  public:
-  IST_HD ExactInsides(const Team& team, ExactMemory& memory, const ExactRoom& room,
-                      std::uint32_t records, bool crossed)
-      : team_(team), memory_(memory), room_(room), records_(records), crossed_(crossed) {}
+  IST_HD ExactInsides(const Team& team, const ExactPair& pair, ExactSumMemory& memory,
+                      const ExactRoom& room, std::uint32_t records, bool crossed)
+      : team_(team),
+        pair_(pair),
+        memory_(memory),
+        room_(room),
+        records_(records),
+        crossed_(crossed) {}
 
   /// False where doubles do not tell what is inside.
   IST_HD bool run() {
@@ -33,12 +39,12 @@ class ExactInsides {
   }
   /// All of the team together.
   IST_HD bool is_inside_other(int side, std::uint32_t vertex) {
-    const MeshTree& other = memory_.mesh[1 - side];
-    const MeshOfPair solid =
-        side == 1 ? MeshOfPair{other}
-                  : MeshOfPair{other, &memory_.place.a_from_b, &memory_.place.b_from_a};
-    return is_inside<kExactly>(team_, solid, memory_.vertex(side, vertex), memory_.aside,
-                               memory_.stack, unsure_);
+    const MeshTree& other = pair_.mesh[1 - side];
+    const MeshOfPair solid = side == 1
+                                 ? MeshOfPair{other}
+                                 : MeshOfPair{other, &pair_.place.a_from_b, &pair_.place.b_from_a};
+    return is_inside<kExactly>(team_, solid, pair_.vertex(side, vertex), pair_.aside, memory_.stack,
+                               unsure_);
   }
 
   /// Which vertices of records are inside.
@@ -48,7 +54,7 @@ class ExactInsides {
          first += static_cast<std::uint32_t>(Team::kWidth)) {
       const std::uint32_t r = first + lane;
       std::uint32_t unknown = kWidth;
-      BlockInsides found;
+      BlockInsides& found = *new (memory_.insides[lane]) BlockInsides;
       int side = 0;
       std::uint32_t block = 0;
       if (r < records_) {
@@ -56,8 +62,8 @@ class ExactInsides {
         side = record.of_b;
         block = record.block;
         if (record.all_pierced() != 0) {
-          const MeshBlock& mesh = memory_.mesh[side].blocks[block];
-          found = BlockInsides(
+          const MeshBlock& mesh = pair_.mesh[side].blocks[block];
+          new (&found) BlockInsides(
               mesh, record.all_pierced(), [&](std::uint32_t e) { return record.sum(e); },
               [](std::uint32_t) { return 0; });
           unknown = found.unknown(mesh);
@@ -69,7 +75,7 @@ class ExactInsides {
         const int next = team_.first(unknown < kWidth, waiting);
         if (next < 0) break;
         const int of_side = team_.broadcast(side, next);
-        const MeshBlock& mesh = memory_.mesh[of_side].blocks[team_.broadcast(block, next)];
+        const MeshBlock& mesh = pair_.mesh[of_side].blocks[team_.broadcast(block, next)];
         const bool is = is_inside_other(of_side, mesh.vertex[team_.broadcast(unknown, next)]);
         if (team_.lane() == next) {
           found.tell(unknown, is);
@@ -91,7 +97,7 @@ class ExactInsides {
 
   /// From blocks whose edges are pierced on, and whole shells.
   IST_HD void flood(int side) {
-    const MeshTree& mesh = memory_.mesh[side];
+    const MeshTree& mesh = pair_.mesh[side];
     const std::uint32_t shells = mesh.header->shell_count;
     team_.sync();  // all have read what the other side left there
     if (team_.lane() == 0) memory_.flooded = 0;
@@ -116,7 +122,7 @@ class ExactInsides {
       if (!is_inside_other(side, mesh.blocks[block].vertex[0])) continue;
       if (!crossed_) {
         crossed_ = true;
-        const exact::Point here = memory_.vertex(side, mesh.blocks[block].vertex[0]);
+        const exact::Point here = pair_.vertex(side, mesh.blocks[block].vertex[0]);
         team_.sync();
         if (team_.lane() == 0) memory_.origin = here;
       }
@@ -146,14 +152,14 @@ class ExactInsides {
          r += static_cast<std::uint32_t>(Team::kWidth)) {
       const CrossedRef& record = room_.records[r];
       pierced = pierced || (record.of_b == side && record.all_pierced() != 0 &&
-                            memory_.mesh[side].blocks[record.block].shell == shell);
+                            pair_.mesh[side].blocks[record.block].shell == shell);
     }
     return team_.any(pierced);
   }
 
   /// Blocks inside as a whole, as few lanes of boxes as hold them.
   IST_HD void sum_inside(int side) {
-    const MeshTree& mesh = memory_.mesh[side];
+    const MeshTree& mesh = pair_.mesh[side];
     if (memory_.flooded == 0) return;
     MeshNode* const stack = memory_.stack.node;
     std::uint32_t waiting = 1;
@@ -185,7 +191,7 @@ class ExactInsides {
   /// Whether all or none of the blocks below a lane are inside.
   IST_HD void look(int side, int level, std::uint32_t number, bool& all, bool& none) const {
     const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
-    const std::uint32_t count = memory_.mesh[side].level[0].count;
+    const std::uint32_t count = pair_.mesh[side].level[0].count;
     const std::uint32_t first = number << shift;
     const std::uint32_t end = count - first < 1u << shift ? count : first + (1u << shift);
     all = none = true;
@@ -199,14 +205,14 @@ class ExactInsides {
   }
 
   IST_HD void add_lane(int side, int level, std::uint32_t i, std::uint32_t lane) {
-    const MeshTree::Level& of = memory_.mesh[side].level[level];
+    const MeshTree::Level& of = pair_.mesh[side].level[level];
     const LaneSums found = lane_sums(of.boxes[i], of.sums[i], lane,
-                                     side == 0 ? nullptr : &memory_.place.a_from_b, memory_.origin);
+                                     side == 0 ? nullptr : &pair_.place.a_from_b, memory_.origin);
     memory_.add(team_.lane(), found.six_volumes);
     memory_.add(team_.lane(), ExactSum::kMoment, found.moment);
     memory_.sum[ExactSum::kRounding][team_.lane()] += found.six_volume_rounding;
     memory_.sum[ExactSum::kLayers][team_.lane()] +=
-        moved_layer(memory_.moved[side], found.area, found.width);
+        moved_layer(pair_.moved[side], found.area, found.width);
   }
 
   /// What rounding and deviations of blocks that are near the other surface do to the volume.
@@ -226,12 +232,12 @@ class ExactInsides {
       const CrossedRef& record = room_.records[n / kWidth];
       const std::uint32_t t = n % kWidth;
       const int side = record.of_b;
-      const MeshBlock& block = memory_.mesh[side].blocks[record.block];
+      const MeshBlock& block = pair_.mesh[side].blocks[record.block];
       if (t >= block.triangles || record.all_pierced() == 0) continue;
       const exact::Point corner[3] = {
-          memory_.vertex(side, block.vertex[block.corner[0][t]]) - memory_.origin,
-          memory_.vertex(side, block.vertex[block.corner[1][t]]) - memory_.origin,
-          memory_.vertex(side, block.vertex[block.corner[2][t]]) - memory_.origin};
+          pair_.vertex(side, block.vertex[block.corner[0][t]]) - memory_.origin,
+          pair_.vertex(side, block.vertex[block.corner[1][t]]) - memory_.origin,
+          pair_.vertex(side, block.vertex[block.corner[2][t]]) - memory_.origin};
       const auto apex = static_cast<std::uint32_t>(exact::apex_of(exact::length_bound(corner[0]),
                                                                   exact::length_bound(corner[1]),
                                                                   exact::length_bound(corner[2])));
@@ -249,19 +255,20 @@ class ExactInsides {
   }
 
   IST_HD void bound(int side, std::uint32_t b) {
-    const MeshTree::Level& of = memory_.mesh[side].level[1];
+    const MeshTree::Level& of = pair_.mesh[side].level[1];
     const BoxBlock& box = of.boxes[b / kWidth];
     const std::uint32_t lane = b % kWidth;
-    const double scale = side == 0 ? 1 : memory_.place.a_from_b.scale;
+    const double scale = side == 0 ? 1 : pair_.place.a_from_b.scale;
     double wide = 0;
     for (int k = 0; k < 3; ++k)
       wide += scale * (double{box.high[k][lane]} - double{box.low[k][lane]});
     memory_.sum[ExactSum::kLayers][team_.lane()] +=
-        moved_layer(memory_.moved[side], scale * scale * of.sums[b / kWidth].area[lane], wide);
+        moved_layer(pair_.moved[side], scale * scale * of.sums[b / kWidth].area[lane], wide);
   }
 
   const Team& team_;
-  ExactMemory& memory_;
+  const ExactPair& pair_;
+  ExactSumMemory& memory_;
   const ExactRoom& room_;
   std::uint32_t records_;
   bool crossed_;  ///< there is an origin

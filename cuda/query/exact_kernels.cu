@@ -10,69 +10,144 @@
 namespace ist::gpu {
 namespace {
 
-constexpr unsigned kSiftThreads = 128;
-constexpr unsigned kWarps = 2;
+constexpr unsigned kThreadsEach = 128;  ///< of what one thread does of a pair
+constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
-/// A multiprocessor, of the first pass; more leave too few registers.
-constexpr int kBlocksEach = 8;
+constexpr unsigned kWholeWarps = 2;
+constexpr unsigned kWholeThreads = 32 * kWholeWarps;
+// A multiprocessor; more leave too few registers.
+constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4;
 
-/// Places every pair and lists those whose boxes meet.
-__global__ void __launch_bounds__(kSiftThreads) sift_meshes(const ExactArrays batch) {
+/// Shared memory runs no constructors.
+template <class T, unsigned kCount>
+struct Raw {
+  alignas(16) std::byte bytes[kCount][sizeof(T)];
+  __device__ T& operator[](unsigned warp) { return *reinterpret_cast<T*>(bytes[warp]); }
+};
+
+/// Lists pairs whose boxes meet.
+__global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays batch) {
   const WarpTeam team;
-  const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
+  const std::uint64_t i = std::uint64_t{blockIdx.x} * kThreadsEach + threadIdx.x;
   const bool asks = i < batch.pairs.count && sift_exact(batch, static_cast<std::uint32_t>(i));
   const std::uint32_t place = append(team, asks, &batch.counters->listed[0]);
   if (asks) batch.list[0][place] = static_cast<std::uint32_t>(i);
 }
 
-template <int kPass>
-__global__ void __launch_bounds__(kThreads, kPass == 0 ? kBlocksEach : 4)
-    cross_meshes(const ExactArrays batch) {
-  // Shared memory runs no constructors.
-  __shared__ alignas(16) std::byte bytes[kWarps][sizeof(ExactMemory)];
+/// Begins the n-th round.
+__global__ void __launch_bounds__(kThreadsEach)
+    place_meshes(const ExactArrays batch, const std::uint32_t n) {
+  const std::uint32_t first = end_of(round_of(batch, n + 1));
+  const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x, count = pairs_from(batch, first);
+  if (k == 0) round_of(batch, n) = {first, count, 0, 0, 0, 0, 0, 0};
+  if (k < count) place_query(batch, k, first + k);
+}
+
+__global__ void __launch_bounds__(kThreads, kSearchBlocks)
+    search_meshes(const ExactArrays batch, const std::uint32_t n) {
+  __shared__ Raw<ExactPair, kWarps> pair;
+  __shared__ Raw<ExactSearchMemory, kWarps> memory;
   const unsigned warp = threadIdx.x / 32;
-  ExactMemory& memory = *reinterpret_cast<ExactMemory*>(bytes[warp]);
-  const ExactRoom room = batch.room(kPass, blockIdx.x * kWarps + warp);
-  ExactCounters& counters = *batch.counters;
-  by_warps(load_fresh(&counters.listed[kPass]), &counters.taken[kPass],
+  ExactRound& round = round_of(batch, n);
+  by_warps(
+      round.count, &round.searched,
+      [&](const WarpTeam& team, std::uint32_t k) {
+        search_query(team, batch, round, k, pair[warp], memory[warp]);
+      },
+      [&] { return goes_on(batch, n); });
+}
+
+template <bool kExactly>
+__global__ void __launch_bounds__(kThreads, kExactly ? kExactBlocks : kSumBlocks)
+    sum_meshes(const ExactArrays batch, const std::uint32_t n) {
+  __shared__ Raw<ExactPair, kWarps> pair;
+  __shared__ Raw<ExactSumMemory, kWarps> memory;
+  const unsigned warp = threadIdx.x / 32;
+  ExactRound& round = round_of(batch, n);
+  const ExactRoom room = batch.room(0, blockIdx.x * kWarps + warp);
+  if (kExactly && blockIdx.x == 0 && threadIdx.x == 0) batch.counters->exactly += round.unsure;
+  by_warps(kExactly ? round.unsure : searched_of(round), kExactly ? &round.redone : &round.summed,
            [&](const WarpTeam& team, std::uint32_t k) {
-             ask_pass<kPass>(team, batch, k, room, memory);
+             sum_query<kExactly>(team, batch, round, k, room, pair[warp], memory[warp]);
            });
 }
 
-template <int kPass>
-void launch_pass(const ExactArrays& batch, int most_blocks, cudaStream_t stream) {
-  const std::size_t each = batch.bytes_of_team(kPass);
-  const std::size_t fit = batch.room_bytes / (kWarps * each);
-  const auto blocks =
-      static_cast<unsigned>(std::clamp(fit, std::size_t{1}, static_cast<std::size_t>(most_blocks)));
-  // Marks of blocks are zero between pairs.
-  check(cudaMemset2DAsync(batch.rooms, each, 0, ExactRoom::fixed(batch.most_blocks),
-                          std::size_t{kWarps} * blocks, stream),
+__global__ void __launch_bounds__(kWholeThreads, kWholeBlocks)
+    ask_meshes(const ExactArrays batch, const int pass, const std::uint32_t rounds) {
+  __shared__ Raw<ExactWholeMemory, kWholeWarps> memory;
+  const unsigned warp = threadIdx.x / 32;
+  const ExactRoom room = batch.room(pass, blockIdx.x * kWholeWarps + warp);
+  const std::uint32_t listed = load_fresh(&batch.counters->listed[pass]);
+  by_warps(pairs_of_pass(batch, pass, rounds), &batch.counters->taken[pass],
+           [&](const WarpTeam& team, std::uint32_t k) {
+             ask_pass(team, batch, pass, rounds, listed, k, room, memory[warp]);
+           });
+}
+
+/// Blocks whose teams of a pass find room, of which the marks of blocks are zero between pairs.
+unsigned ready_rooms(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
+                     int most_blocks, cudaStream_t stream) {
+  const std::size_t each = batch.bytes_of_team(pass);
+  const auto blocks = static_cast<unsigned>(
+      std::clamp(bytes / (warps * each), std::size_t{1}, static_cast<std::size_t>(most_blocks)));
+  check(cudaMemset2DAsync(pass == 0 ? batch.rooms : batch.memory, each, 0,
+                          ExactRoom::fixed(batch.most_blocks), std::size_t{warps} * blocks, stream),
         "readying a pass");
-  cross_meshes<kPass><<<blocks, kThreads, 0, stream>>>(batch);
-  check_launch("crossing meshes");
+  return blocks;
 }
 
 }  // namespace
 
 void find_exact_grids(Grids& grids) {
-  grids.exact[0] = blocks_at_a_time(cross_meshes<0>, kThreads);
-  grids.exact[1] = blocks_at_a_time(cross_meshes<1>, kThreads);
-  grids.exact[2] = blocks_at_a_time(cross_meshes<2>, kThreads);
+  grids.exact = {
+      blocks_at_a_time(search_meshes, kThreads),
+      {blocks_at_a_time(sum_meshes<false>, kThreads), blocks_at_a_time(sum_meshes<true>, kThreads)},
+      blocks_at_a_time(ask_meshes, kWholeThreads)};
 }
 
-std::size_t least_exact_bytes(std::uint32_t most_blocks) {
-  return kWarps * (ExactRoom::fixed(most_blocks) + exact_room(kExactPasses - 1));
+bool has_room(const ExactArrays& batch) {
+  const auto before = static_cast<std::size_t>(batch.rooms - batch.memory);
+  return before + kWarps * batch.bytes_of_team(0) <= batch.bytes &&
+         kWholeWarps * batch.bytes_of_team(kExactPasses - 1) <= batch.bytes;
+}
+
+std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs) {
+  constexpr std::size_t kUsualMesh = 8 << 10;
+  const std::size_t teams = static_cast<std::size_t>(grids.exact.sum[0]) * kWarps;
+  return (std::min(teams, most_pairs) + kWarps) * (exact_room(0) + kUsualMesh);
 }
 
 void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(ExactCounters), stream), "starting a batch");
-  sift_meshes<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
-  check_launch("placing pairs of meshes");
-  launch_pass<0>(batch, grids.exact[0], stream);
-  launch_pass<1>(batch, grids.exact[1], stream);
-  launch_pass<2>(batch, grids.exact[2], stream);
+  sift_meshes<<<blocks_for(batch.pairs.count, kThreadsEach), kThreadsEach, 0, stream>>>(batch);
+  check_launch("sifting pairs of meshes");
+  // Of many pairs rounds of 8,192 that keep some 30 chunks each; of few some of a quarter.
+  constexpr std::uint64_t kLeast = 1 << 13, kFew = 1 << 11;
+  const auto rounds = static_cast<std::uint32_t>(
+      1 + batch.pairs.count / kLeast + std::min<std::uint64_t>(batch.pairs.count, 8 * kFew) / kFew);
+  const unsigned blocks =
+      blocks_for(std::min<std::uint64_t>(batch.pairs.count, batch.query_room), kThreadsEach);
+  const unsigned sums =
+      ready_rooms(batch, 0, batch.bytes - static_cast<std::size_t>(batch.rooms - batch.memory),
+                  kWarps, grids.exact.sum[0], stream);
+  for (std::uint32_t n = 0; n < rounds; ++n) {
+    place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
+    check_launch("placing meshes");
+    search_meshes<<<static_cast<unsigned>(grids.exact.search), kThreads, 0, stream>>>(batch, n);
+    check_launch("searching meshes");
+    sum_meshes<false><<<sums, kThreads, 0, stream>>>(batch, n);
+    check_launch("summing meshes");
+    sum_meshes<true>
+        <<<std::min(sums, static_cast<unsigned>(grids.exact.sum[1])), kThreads, 0, stream>>>(batch,
+                                                                                             n);
+    check_launch("summing meshes by exact signs");
+  }
+  for (int pass = 1; pass < kExactPasses; ++pass) {
+    const unsigned whole =
+        ready_rooms(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole, stream);
+    ask_meshes<<<whole, kWholeThreads, 0, stream>>>(batch, pass, rounds);
+    check_launch("asking what has no room");
+  }
 }
 
 }  // namespace ist::gpu

@@ -1,28 +1,83 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "cuda/query/exact_arrays.h"
+#include "cuda/query/exact_pair.h"
+#include "numerics/bits.h"
 #include "query/base/pair_place.h"
+#include "query/exact/block_insides.h"
 #include "query/exact/box_integrals.h"
 
 namespace ist::gpu {
 
-constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles, of a stage
-constexpr float kExactFar = 3e38f;  ///< where what is not there lies: beyond any ratio of sizes
-
-/// Children of a node, or a node alone: boxes and slabs.
-struct ExactBoxes {
-  float low[3][kWidth], high[3][kWidth];                         ///< in the solid's own frame
-  float other_low[3][kWidth], other_high[3][kWidth];             ///< in the other's
-  float normal[3][kWidth], slab_low[kWidth], slab_high[kWidth];  ///< A's frame
-  float turned[3][kWidth];  ///< of A's: what a side of B's box, of length 1, reaches along a normal
+/// Four numbers that are read and written at once.
+struct alignas(16) Quad {
+  float x[4];
 };
 
-/// Boxes of a block's triangles, A's frame.
-struct ExactTriangles {
-  float at[3][kWidth];  ///< vertices
-  float low[3][kWidth], high[3][kWidth];
+constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles to be sifted
+
+/// What a team keeps at hand of a pair.
+struct ExactPair : ExactFrame {
+  MeshTree mesh[2];
+  const FloatBlock* in_floats[2];
+  Quad row[2][3];   ///< of the map to the other's frame, the shift last
+  Quad turn[2][3];  ///< of the other's axes from one's own
+
+  /// A vertex in A's frame.
+  IST_HD exact::Point vertex(int side, std::uint32_t number) const {
+    const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
+    const exact::Point at = {x[0], x[1], x[2]};
+    return side == 0 ? at : map_point(place.a_from_b, at);
+  }
+  /// Of a triangle, 16 · block + lane, the k-th corner.
+  IST_HD exact::Point corner(int side, std::uint32_t triangle, int k) const {
+    const MeshBlock& block = in_global_memory(mesh[side].blocks)[triangle / kWidth];
+    return vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
+  }
+};
+
+/// A child of a node, or a node alone. Own boxes are wider by the reach. Of these, as of triangles,
+/// an odd number of quads, so that lanes that read one each do not meet in a bank.
+struct ExactBox {
+  Quad low, high;              ///< in the solid's own frame; last its slab, A's frame
+  Quad other_low, other_high;  ///< in the other's
+  Quad normal;                 ///< of the slab, A's frame
+  Quad turned;  ///< of A's: what a side of B's box, of length 1, reaches along the normal
+  std::uint32_t lane;
+};
+
+/// A triangle in A's frame, in floats.
+struct ExactTriangle {
+  Quad low, high;  ///< its box; A's is wider by the slack
+  Quad plane;      ///< a point is so high over it, times twice the area: x · normal + last
+
+  /// Heights above it are certain, wherever points move by the room.
+  IST_HD float& margin() { return low.x[3]; }
+  IST_HD float margin() const { return low.x[3]; }
+  /// Its lane in its block, and in bytes its corners' places there.
+  IST_HD void call(std::uint32_t name) { high.x[3] = float_of(name); }
+  IST_HD std::uint32_t name() const { return bits_of(high.x[3]); }
+};
+static_assert(sizeof(ExactBox) % 32 == 16 && sizeof(ExactTriangle) % 32 == 16);
+
+/// What a team that searches keeps beside the pair.
+struct ExactSearchMemory {
+  static constexpr std::uint32_t kWaiting = 192;  ///< pairs of nodes, of the first pass
+  ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
+  ExactTriangle triangles[2][kWidth];             ///< likewise
+  float vertices[3][2]
+                [kWidth];  ///< of two blocks, A's frame: lanes read them from banks of their own
+  std::uint64_t waiting[kWaiting];
+  ExactPool pool;
+  ExactChain crossing, near;   ///< triangles that may cross; others whose signs are not settled
+  std::uint32_t last_near[2];  ///< blocks of the last lane, if near
+  std::uint32_t inverse[kWidth + 1];      ///< of a number of columns, times 2^16
+  std::uint32_t queue[kExactWaiting][2];  ///< triangles to be sifted, 16 · block + lane
+  std::uint8_t found[kWidth * kWidth];    ///< pairs of boxes of leaves that meet, 16 · A's + B's
+  std::uint8_t met[kWidth * kWidth];      ///< of triangles, likewise
 };
 
 /// What a lane has summed: a volume in two parts, vectors in three.
@@ -39,25 +94,16 @@ struct ExactSum {
   };
 };
 
-/// What a team keeps at hand of a pair.
-struct ExactMemory {
-  PairPlace place;
-  MeshTree mesh[2];
-  exact::Point aside, origin;
-  double moved[2];   ///< no point of a surface is further from where it ought to be
-  float reach[2];    ///< boxes that are as near are opened: A's frame, B's
-  float pad[2];      ///< what rounding does to boxes of A in B's frame, of B in A's
-  float slack;       ///< and to slabs
-  float map[2][12];  ///< to the other's frame: 3 × 3 row by row, then the shift
-  float turn[9];     ///< A's axes from B's
+/// What a team that sums keeps beside the pair.
+struct ExactSumMemory {
   union {
-    ExactBoxes boxes[2];
-    ExactTriangles triangles[2];
-    InsideStack stack;
+    CornerMemory corners;
+    struct {
+      InsideStack stack;
+      alignas(BlockInsides) std::byte insides[32][sizeof(BlockInsides)];  ///< of a lane's record
+    };
   };
-  std::uint8_t left[2][kWidth];              ///< of each side what may meet the other
-  int count[2];                              ///< how many
-  std::uint32_t queue[2][kExactWaiting][2];  ///< of each stage: triangles, 16 · block + lane
+  exact::Point origin;
   double sum[ExactSum::kCount][32];
   std::uint32_t flooded;  ///< blocks, of one side
 
@@ -70,12 +116,15 @@ struct ExactMemory {
   IST_HD void add(int lane, int of, const exact::Point& x) {
     for (int k = 0; k < 3; ++k) sum[of + k][lane] += x[k];
   }
-  /// A vertex in A's frame.
-  IST_HD exact::Point vertex(int side, std::uint32_t number) const {
-    const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
-    const exact::Point at = {x[0], x[1], x[2]};
-    return side == 0 ? at : map_point(place.a_from_b, at);
-  }
+};
+
+/// Of a team that does both, one after the other.
+struct ExactWholeMemory {
+  ExactPair pair;
+  union {
+    ExactSearchMemory search;
+    ExactSumMemory sum;
+  };
 };
 
 }  // namespace ist::gpu

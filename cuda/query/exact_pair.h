@@ -16,84 +16,92 @@ enum class PairSays : std::uint32_t {
   wrong,   ///< signs contradict each other
 };
 
-/// An edge that goes through the other triangle.
-struct PiercingEdge {
-  std::uint32_t of_b, edge;  ///< edge k goes from corner k to the next
-  exact::Point p, q;
-  double height_p, height_q, error;
+/// What lanes index by what they differ in: as arrays of their own it would lie in slow memory.
+struct CornerMemory {
+  double x[2][3][3][32];                    ///< of A, of B: of a corner
+  double value[2][3][32], error[2][3][32];  ///< heights over the other's plane
 };
 
-/// Heights of corners over the other triangle's plane.
-template <bool kExactly>
-IST_HD inline exact::Determinant height_of(const exact::Point& p, const exact::Point (&plane)[3],
-                                           bool of_b, const exact::Point& aside) {
-  return exact::determinant_of<kExactly>(p, plane[0], plane[1], plane[0], plane[2], plane[0],
-                                         of_b ? 1 : -1, aside);
-}
+/// A lane's.
+struct CornerView {
+  CornerMemory& memory;
+  int lane;
+
+  IST_HD exact::Point corner(int s, int k) const {
+    const auto& x = memory.x[s][k];
+    return {x[0][lane], x[1][lane], x[2][lane]};
+  }
+  IST_HD void set(int s, int k, const exact::Point& x) const {
+    for (int axis = 0; axis < 3; ++axis) memory.x[s][k][axis][lane] = x[axis];
+  }
+  IST_HD double& value(int s, int k) const { return memory.value[s][k][lane]; }
+  IST_HD double& error(int s, int k) const { return memory.error[s][k][lane]; }
+};
+
+/// An edge that goes through the other triangle; edge k goes from corner k to the next.
+struct PiercingEdge {
+  std::uint32_t of_b, edge;
+};
 
 /// Where they cross, the edges that leave at the start of the segment that they share, and at its
 /// end: A's edges leave B at the start and enter it at the end; B's enter A at the start.
 template <bool kExactly>
-IST_HD PairSays cross_pair(const exact::Point (&a)[3], const exact::Point (&b)[3],
-                           const exact::Point& aside, PiercingEdge (&end)[2]) {
-  exact::Determinant height[2][3];  // of A's corners over B's plane, of B's over A's
+IST_HD PairSays cross_pair(const CornerView& pair, const exact::Point& aside,
+                           PiercingEdge (&end)[2]) {
   bool unsure = false;
-  const auto alike = [](const exact::Determinant(&h)[3]) {
-    return h[0].sign == h[1].sign && h[1].sign == h[2].sign && h[0].sign != 0;
-  };
+  std::uint32_t above[2] = {0, 0};  // a bit a corner
   // Loops stay rolled: what runs seldom must not crowd the device's instruction cache.
   IST_ROLLED
   for (int s = 1; s >= 0; --s) {
+    std::uint32_t bits = 0;
+    bool all = true;
+    const exact::Point o = pair.corner(1 - s, 0), p = pair.corner(1 - s, 1),
+                       q = pair.corner(1 - s, 2);
+    const int moved = s == 1 ? 1 : -1;
+    const exact::FilteredPlane plane(p - o, q - o, moved * aside);
     IST_ROLLED
     for (int k = 0; k < 3; ++k) {
-      exact::Determinant& h = height[s][k];
-      h = height_of<kExactly>(s == 1 ? b[k] : a[k], s == 1 ? a : b, s == 1, aside);
-      unsure = unsure || h.sign == 0;
+      const exact::Point x = pair.corner(s, k);
+      exact::Determinant h = plane.height(x - o);
+      if constexpr (kExactly)
+        if (h.sign == 0) h = exact::exact_determinant(x, o, p, o, q, o, moved, aside);
+      all = all && h.sign != 0;
+      bits |= (h.sign > 0 ? 1u : 0u) << k;
+      pair.value(s, k) = h.value;
       // Where moving aside decides, the plane may lie on the other side of the corner.
-      if (h.value * h.sign < 0) h.error += std::abs(h.value);
+      pair.error(s, k) = h.error + (h.value * h.sign < 0 ? std::abs(h.value) : 0);
     }
-    if (alike(height[s])) return PairSays::apart;
+    if (all && (bits == 0 || bits == 7)) return PairSays::apart;
+    unsure = unsure || !all;
+    (s == 0 ? above[0] : above[1]) = bits;
   }
   if (unsure) return PairSays::unsure;
-  std::uint32_t parts[2] = {0, 0};  // edges that go through the other's plane
-  IST_ROLLED
-  for (int s = 0; s < 2; ++s)
-    for (int k = 0; k < 3; ++k)
-      parts[s] |= (height[s][k].sign != height[s][(k + 1) % 3].sign ? 1u : 0u) << k;
-  std::uint32_t positive[3] = {0, 0, 0};  // of A's edge, a bit an edge of B's: the way round
+  // Edges that go through the other's plane.
+  const auto changes = [](std::uint32_t bits) { return bits ^ (bits >> 1 | (bits & 1) << 2); };
+  const std::uint32_t parts[2] = {changes(above[0]), changes(above[1])};
+  std::uint32_t positive = 0;  // the way round: bit 3 · edge of A + edge of B
   IST_ROLLED
   for (int n = 0; n < 9; ++n) {
     const int i = n / 3, j = n % 3;
     if (((parts[0] >> i | parts[1] >> j) & 1) == 0) continue;
-    const exact::Point &p = a[i], &q = a[(i + 1) % 3], &r = b[j], &s = b[(j + 1) % 3];
-    const int sign = exact::determinant_of<kExactly>(r, p, q, p, s, r, 1, aside).sign;
+    const int sign =
+        exact::way_round<kExactly>(pair.corner(0, i), pair.corner(0, (i + 1) % 3),
+                                   pair.corner(1, j), pair.corner(1, (j + 1) % 3), aside)
+            .sign;
     unsure = unsure || sign == 0;
-    positive[i] |= (sign > 0 ? 1u : 0u) << j;
+    positive |= (sign > 0 ? 1u : 0u) << n;
   }
   if (unsure) return PairSays::unsure;
   int count[2] = {0, 0};
-  const auto pierces = [&](int s, int k) {
-    if ((parts[s] >> k & 1) == 0) return false;
-    if (s == 0) return positive[k] == 0 || positive[k] == 7;
-    const std::uint32_t bits =
-        (positive[0] >> k & 1) + (positive[1] >> k & 1) + (positive[2] >> k & 1);
-    return bits == 0 || bits == 3;
-  };
   IST_ROLLED
-  for (int n = 0; n < 6; ++n) {
-    const int s = n / 3, k = n % 3;
-    if (!pierces(s, k)) continue;
-    const int next = (k + 1) % 3;
-    const bool down = height[s][k].sign > 0;  // enters the other solid
-    const int e = down == (s == 0) ? 1 : 0;
-    ++count[e];
-    end[e] = {static_cast<std::uint32_t>(s),
-              static_cast<std::uint32_t>(k),
-              s == 0 ? a[k] : b[k],
-              s == 0 ? a[next] : b[next],
-              height[s][k].value,
-              height[s][next].value,
-              height[s][k].error + height[s][next].error};
+  for (std::uint32_t n = 0; n < 6; ++n) {
+    const std::uint32_t s = n / 3, k = n % 3;
+    const std::uint32_t all = s == 0 ? 7u << 3 * k : 0b1001001u << k, bits = positive & all;
+    if (((s == 0 ? parts[0] : parts[1]) >> k & 1) == 0 || (bits != 0 && bits != all)) continue;
+    const bool down = ((s == 0 ? above[0] : above[1]) >> k & 1) != 0;  // enters the other solid
+    const bool at_end = down == (s == 0);
+    ++(at_end ? count[1] : count[0]);
+    (at_end ? end[1] : end[0]) = {s, k};
   }
   if (count[0] == 0 && count[1] == 0) return PairSays::apart;
   return count[0] == 1 && count[1] == 1 ? PairSays::crosses : PairSays::wrong;

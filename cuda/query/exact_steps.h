@@ -6,6 +6,7 @@
 #include "cuda/query/answers.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/exact_insides.h"
+#include "cuda/query/exact_search.h"
 #include "query/exact/exact_in_world.h"
 
 // A batch of pairs by Measure::exact, step by step: what a kernel's threads and warps do, and a
@@ -60,51 +61,72 @@ IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
   return false;
 }
 
-/// Readies a team's memory for pair i.
+/// What the steps of pair i begin with, once it is placed. One thread a pair.
+IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, ExactFrame& frame) {
+  const PairPlace& place = frame.place;
+  const MeshTree& a = solid_of(batch, batch.pairs.a, i).mesh;
+  const MeshTree& b = solid_of(batch, batch.pairs.b, i).mesh;
+  const auto offset = [&](const GpuPlacedSolids& side) {
+    return scale_of(side, i) * norm(solid_of(batch, side, i).frame.centre);
+  };
+  const MoveAside aside = aside_of(a, b, place.a_from_b);
+  frame.aside = aside.by;
+  frame.moved[0] = moved_in_mesh(a);
+  frame.moved[1] =
+      moved_by_poses(pose_of(batch.pairs.a, i).t, offset(batch.pairs.a),
+                     pose_of(batch.pairs.b, i).t, offset(batch.pairs.b), b.extent(), place) +
+      place.a_from_b.scale * moved_in_mesh(b) + aside.far;
+  frame.reach[0] = static_cast<float>(2 * (frame.moved[0] + frame.moved[1]) * (1 + 1e-6));
+  frame.reach[1] = frame.reach[0] * static_cast<float>(place.b_from_a.scale) * (1 + 1e-6f);
+  frame.pad[0] = placing_pad(place.b_from_a.scale, place.b_from_a.t, a);
+  frame.pad[1] = placing_pad(place.a_from_b.scale, place.a_from_b.t, b);
+  const double still[3] = {0, 0, 0};
+  frame.slack = 2 * frame.pad[1] + 2 * placing_pad(1, still, a) + 2 * frame.reach[0];
+}
+
+/// Places the k-th pair of a round, `listed` among all. One thread a pair.
+IST_HD inline void place_query(const ExactArrays& batch, std::uint32_t k, std::uint32_t listed) {
+  ExactQuery& query = batch.queries[k];
+  query.pair = batch.list[0][listed % batch.pairs.count];
+  place_exactly(batch, query.pair, query.frame.place);
+  frame_exactly(batch, query.pair, query.frame);
+}
+
+/// Readies a team's memory for pair i, whose frame is there.
 template <class Team>
-IST_HD void load_meshes(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                        ExactMemory& memory) {
-  team.sync();
-  copy_words(team, solid_of(batch, batch.pairs.a, i).mesh, memory.mesh[0]);
-  copy_words(team, solid_of(batch, batch.pairs.b, i).mesh, memory.mesh[1]);
-  if (team.lane() == 0) place_exactly(batch, i, memory.place);
-  for (auto& sums : memory.sum)
-    for (int k = team.lane(); k < 32; k += Team::kWidth) sums[k] = 0;
-  team.sync();
-  const MeshTree &a = memory.mesh[0], &b = memory.mesh[1];
-  const PairPlace& place = memory.place;
+IST_HD void load_pair(const Team& team, const ExactArrays& batch, std::uint32_t i,
+                      ExactPair& pair) {
+  copy_words(team, solid_of(batch, batch.pairs.a, i).mesh, pair.mesh[0]);
+  copy_words(team, solid_of(batch, batch.pairs.b, i).mesh, pair.mesh[1]);
   if (team.lane() == 0) {
-    const auto offset = [&](const GpuPlacedSolids& side) {
-      return scale_of(side, i) * norm(solid_of(batch, side, i).frame.centre);
-    };
-    const MoveAside aside = aside_of(a, b, place.a_from_b);
-    memory.aside = aside.by;
-    memory.origin = {0, 0, 0};
-    memory.moved[0] = moved_in_mesh(a);
-    memory.moved[1] =
-        moved_by_poses(pose_of(batch.pairs.a, i).t, offset(batch.pairs.a),
-                       pose_of(batch.pairs.b, i).t, offset(batch.pairs.b), b.extent(), place) +
-        place.a_from_b.scale * moved_in_mesh(b) + aside.far;
-    memory.reach[0] = static_cast<float>(2 * (memory.moved[0] + memory.moved[1]) * (1 + 1e-6));
-    memory.reach[1] = memory.reach[0] * static_cast<float>(place.b_from_a.scale) * (1 + 1e-6f);
-    memory.pad[0] = placing_pad(place.b_from_a.scale, place.b_from_a.t, a);
-    memory.pad[1] = placing_pad(place.a_from_b.scale, place.a_from_b.t, b);
-    const double still[3] = {0, 0, 0};
-    memory.slack = 2 * memory.pad[1] + 2 * placing_pad(1, still, a) + 2 * memory.reach[0];
-  }
-  for (int k = team.lane(); k < 24; k += Team::kWidth) {
-    const Similarity& map = k < 12 ? place.b_from_a : place.a_from_b;
-    const int n = k % 12;
-    memory.map[k / 12][n] = static_cast<float>(n < 9 ? map.m[n] : map.t[n - 9]);
-    if (k >= 12 && n < 9) memory.turn[n] = static_cast<float>(map.m[n] / map.scale);
+    pair.in_floats[0] = solid_of(batch, batch.pairs.a, i).in_floats;
+    pair.in_floats[1] = solid_of(batch, batch.pairs.b, i).in_floats;
   }
   team.sync();
+  for (int k = team.lane(); k < 24; k += Team::kWidth) {
+    const int side = k / 12, row = k % 12 / 4, n = k % 4;
+    const Similarity& map = side == 0 ? pair.place.b_from_a : pair.place.a_from_b;
+    pair.row[side][row].x[n] = static_cast<float>(n < 3 ? map.m[3 * row + n] : map.t[row]);
+    // The place is A's: what it turns into B's is the transpose of what turns into A's.
+    if (n < 3) pair.turn[side][row].x[n] = static_cast<float>(map.m[3 * row + n] / map.scale);
+  }
+  team.sync();
+}
+
+/// Readies it for the k-th pair of a round.
+template <class Team>
+IST_HD void load_query(const Team& team, const ExactArrays& batch, const ExactQuery& query,
+                       ExactPair& pair) {
+  team.sync();
+  copy_words(team, query.frame, static_cast<ExactFrame&>(pair));
+  load_pair(team, batch, query.pair, pair);
 }
 
 /// Adds what the lanes have summed, always in one order, and answers pair i.
 template <class Team>
 IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                        ExactMemory& memory, std::uint32_t visits, std::uint32_t crossings) {
+                        const ExactPair& pair, ExactSumMemory& memory, std::uint32_t visits,
+                        std::uint32_t crossings) {
   team.sync();
   const int lane = team.lane();
   double(&sum)[ExactSum::kCount][32] = memory.sum;
@@ -122,7 +144,7 @@ IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
   const double volume = (high + low) / 6;
   const ExactInWorld sums(volume, vector(ExactSum::kMoment), vector(ExactSum::kPush),
-                          vector(ExactSum::kTurn), memory.origin, memory.place);
+                          vector(ExactSum::kTurn), memory.origin, pair.place);
   const SolidRef &a = solid_of(batch, batch.pairs.a, i), &b = solid_of(batch, batch.pairs.b, i);
   const auto solid = [&](const SolidRef& of, const GpuPlacedSolids& side) {
     const double scale = scale_of(side, i);
@@ -131,7 +153,7 @@ IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   const double most = std::fmin(solid(a, batch.pairs.a), solid(b, batch.pairs.b));
   const double error = (1.01 * (total[ExactSum::kRounding] / 6 + total[ExactSum::kLayers]) +
                         4 * exact::kHalfUnit * std::abs(volume)) *
-                           memory.place.unit3() +
+                           pair.place.unit3() +
                        std::fmax(0.0, -sums.volume);
   PenetrationRow row = {};
   row.volume = std::fmax(0.0, sums.volume);
@@ -161,42 +183,148 @@ IST_HD void clear_room(const Team& team, const ExactRoom& room, std::uint32_t re
   team.sync();
 }
 
-/// Answers pair i if it can: ok.
+/// Answers pair i if it can, ok, from what was found.
 template <bool kExactly, class Team>
-IST_HD ExactState ask_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                              const ExactRoom& room, ExactMemory& memory) {
-  load_meshes(team, batch, i, memory);
-  ExactSearch<Team> search(team, memory, room);
-  ExactCrossings<Team, kExactly> crossings(team, memory, room);
-  ExactState state = ExactState::ok;
-  while (!search.ended() && state == ExactState::ok) {
-    const std::uint32_t blocks = search.next();
-    state = blocks == kNoRoom ? ExactState::no_room : crossings.run(blocks, search.ended());
-    team.sync();
-  }
+IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
+                              const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
+                              const ExactPool& pool, const ExactChain& crossing,
+                              const ExactChain& near, std::uint32_t visits) {
+  team.sync();
+  for (auto& sums : memory.sum)
+    for (int k = team.lane(); k < 32; k += Team::kWidth) sums[k] = 0;
+  if (team.lane() == 0) memory.origin = {0, 0, 0};
+  team.sync();
+  ExactCrossings<Team, kExactly> crossings(team, pair, memory, room);
+  ExactState state = crossings.run(pool, crossing, near);
   team.sync();
   if (state == ExactState::ok &&
-      !ExactInsides<Team, kExactly>(team, memory, room, crossings.records(), crossings.count() > 0)
+      !ExactInsides<Team, kExactly>(team, pair, memory, room, crossings.records(),
+                                    crossings.count() > 0)
            .run())
     state = ExactState::unsure;
-  if (state == ExactState::ok)
-    write_exact(team, batch, i, memory, search.visits(), crossings.count());
+  if (state == ExactState::ok) write_exact(team, batch, i, pair, memory, visits, crossings.count());
   clear_room(team, room, crossings.records());
   return state;
 }
 
-/// A pass over the k-th of its pairs: what it cannot answer goes to the next pass. All of a team
-/// together.
-template <int kPass, class Team>
-IST_HD void ask_pass(const Team& team, const ExactArrays& batch, std::uint32_t k,
-                     const ExactRoom& room, ExactMemory& memory) {
-  const std::uint32_t i = batch.list[kPass % 2][k];
-  const ExactState state = ask_exactly<(kPass > 0)>(team, batch, i, room, memory);
-  if (state == ExactState::ok || team.lane() != 0) return;
-  if constexpr (kPass + 1 < kExactPasses)
-    batch.list[(kPass + 1) % 2][atomic_add(&batch.counters->listed[kPass + 1], 1)] = i;
+/// What a pass has no room for goes to the next.
+IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32_t i) {
+  if (pass + 1 < kExactPasses)
+    batch.list[pass + 1][atomic_add(&batch.counters->listed[pass + 1], 1)] = i;
   else
     write_nothing(batch.answers, i, QueryStatus::budget_exhausted);
+}
+
+/// The counters of the n-th round.
+IST_HD inline ExactRound& round_of(const ExactArrays& batch, std::uint32_t n) {
+  return batch.counters->round[n % 2];
+}
+/// Pairs of a round that begins with the first-th of those listed.
+IST_HD inline std::uint32_t pairs_from(const ExactArrays& batch, std::uint32_t first) {
+  const std::uint32_t left = batch.counters->listed[0] - first;
+  return left < batch.query_room ? left : batch.query_room;
+}
+IST_HD inline std::uint32_t searched_of(const ExactRound& round) {
+  return round.searched < round.count ? round.searched : round.count;
+}
+/// Where the round after this one begins.
+IST_HD inline std::uint32_t end_of(const ExactRound& round) {
+  return round.first + searched_of(round);
+}
+
+/// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
+/// may still need as many chunks as pairs took before, in the last round too.
+IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n) {
+  constexpr std::uint32_t kLeast = 4;
+  std::uint32_t each = kLeast;
+  for (const ExactRound& round : batch.counters->round) {
+    const std::uint32_t chunks = atomic_load(&round.chunks);
+    const std::uint32_t taken = chunks / (atomic_load(&round.found) + 1);
+    const std::uint32_t needed = chunks <= batch.pool.room ? taken : 2 * taken;  // some had no room
+    if (needed > each) each = needed;
+  }
+  const ExactRound& round = round_of(batch, n);
+  const std::uint32_t found = atomic_load(&round.found), searched = atomic_load(&round.searched);
+  return atomic_load(&round.chunks) + std::uint64_t{searched + 1 - found} * each <= batch.pool.room;
+}
+
+/// Searches the k-th pair of a round.
+template <class Team>
+IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound& round,
+                         std::uint32_t k, ExactPair& pair, ExactSearchMemory& memory) {
+  ExactQuery& query = batch.queries[k];
+  load_query(team, batch, query, pair);
+  ExactPool pool = batch.pool;
+  pool.taken = &round.chunks;
+  ExactSearch<Team> search(team, pair, memory, memory.waiting, ExactSearchMemory::kWaiting, pool);
+  const bool fits = search.run();
+  if (team.lane() == 0) {
+    query.state = fits ? ExactState::ok : ExactState::no_room;
+    // What others left no chunks for is listed again.
+    if (!fits && round.chunks > batch.pool.room) {
+      query.state = ExactState::later;
+      batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
+    }
+    query.visits = search.visits;
+    query.crossing = memory.crossing;
+    query.near = memory.near;
+    atomic_add(&round.found, 1);
+  }
+}
+
+/// Answers the k-th pair of a round, or of those that doubles do not decide.
+template <bool kExactly, class Team>
+IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& round,
+                      std::uint32_t k, const ExactRoom& room, ExactPair& pair,
+                      ExactSumMemory& memory) {
+  if constexpr (kExactly) k = batch.queries[k].unsure;
+  const ExactQuery& query = batch.queries[k];
+  ExactState state = query.state;
+  if (state == ExactState::ok) {
+    load_query(team, batch, query, pair);
+    state = sum_exactly<kExactly>(team, batch, query.pair, room, pair, memory, batch.pool,
+                                  query.crossing, query.near, query.visits);
+  }
+  if (state == ExactState::ok || state == ExactState::later || team.lane() != 0) return;
+  if (!kExactly && state == ExactState::unsure)
+    batch.queries[atomic_add(&round.unsure, 1)].unsure = k;
+  else
+    leave_to_next(batch, 0, query.pair);
+}
+
+/// Pairs that a later pass asks; of the first of them also those after the last of `rounds`.
+IST_HD inline std::uint32_t pairs_of_pass(const ExactArrays& batch, int pass,
+                                          std::uint32_t rounds) {
+  const ExactCounters& counters = *batch.counters;
+  return counters.listed[pass] +
+         (pass == 1 ? counters.listed[0] - end_of(round_of(batch, rounds + 1)) : 0);
+}
+
+/// A later pass over the k-th of its pairs, of which so many are `listed`. All of a team together.
+template <class Team>
+IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::uint32_t rounds,
+                     std::uint32_t listed, std::uint32_t k, const ExactRoom& room,
+                     ExactWholeMemory& memory) {
+  const std::uint32_t i =
+      k < listed
+          ? batch.list[pass][k]
+          : batch.list[0][(end_of(round_of(batch, rounds + 1)) + (k - listed)) % batch.pairs.count];
+  team.sync();
+  if (team.lane() == 0) {
+    place_exactly(batch, i, memory.pair.place);
+    frame_exactly(batch, i, memory.pair);
+    *room.pool.taken = 0;
+  }
+  load_pair(team, batch, i, memory.pair);
+  ExactSearch<Team> search(team, memory.pair, memory.search, room.waiting, room.most_waiting,
+                           room.pool);
+  ExactState state = ExactState::no_room;
+  if (search.run()) {
+    const ExactChain crossing = memory.search.crossing, near = memory.search.near;
+    state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
+                              near, search.visits);
+  }
+  if (state != ExactState::ok && team.lane() == 0) leave_to_next(batch, pass, i);
 }
 
 }  // namespace ist::gpu

@@ -109,6 +109,8 @@ constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
                         kRoomForEntries = 1 << 21;
 /// A round of pairs that triangles meet, and what they leave to be summed.
 constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
+/// A round of pairs of meshes, and chunks of triangles for each of them.
+constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 12;
 constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
@@ -223,13 +225,22 @@ void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room)
   arrays.rooms = from + parts.used();
 }
 
-/// Likewise.
-void place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
+/// Rooms of teams take what is left of `bytes`; returns what it takes to have all.
+std::size_t place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
   gpu::Parts parts(from);
-  room.exact.counters = parts.take<gpu::ExactCounters>(1);
-  for (std::uint32_t*& list : room.exact.list) list = parts.take<std::uint32_t>(room.most_pairs);
-  room.exact.room_bytes = bytes - parts.used();
-  room.exact.rooms = from + parts.used();
+  gpu::ExactArrays& exact = room.exact;
+  exact.counters = parts.take<gpu::ExactCounters>(1);
+  for (std::uint32_t*& list : exact.list) list = parts.take<std::uint32_t>(room.most_pairs);
+  exact.memory = from + parts.used();
+  exact.bytes = bytes - parts.used();
+  exact.query_room =
+      static_cast<std::uint32_t>(std::min<std::size_t>(room.most_pairs, kRoomForMeshes));
+  exact.pool.room = 1024 + kChunksEach * exact.query_room;
+  exact.queries = parts.take<gpu::ExactQuery>(exact.query_room);
+  exact.pool.chunks = parts.take<gpu::ExactChunk>(exact.pool.room);
+  exact.pool.next = parts.take<std::uint32_t>(exact.pool.room);
+  exact.rooms = from + parts.used();
+  return parts.used() + gpu::exact_room_bytes(room.grids, room.most_pairs);
 }
 
 /// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take. All kinds
@@ -240,7 +251,8 @@ std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
   room.arrays.posted = flags.take<std::uint32_t>(kRoomForTasks);
   std::byte* const shared = from + flags.used();
   const std::size_t bytes =
-      std::max(place_penetrations(shared, room), place_separations(shared, room));
+      std::max({place_penetrations(shared, room), place_separations(shared, room),
+                place_exact(shared, 0, room)});
   place_patches(shared, bytes, room);
   place_exact(shared, bytes, room);
   return flags.used() + bytes;
@@ -307,7 +319,7 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
     gpu::ExactArrays batch = room.exact;
     static_cast<gpu::SolidPairs&>(batch) = asked;
     batch.most_blocks = solids.impl().most_blocks;
-    if (batch.room_bytes < gpu::least_exact_bytes(batch.most_blocks))
+    if (!gpu::has_room(batch))
       throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
     const gpu::DeviceGuard guard(room.device);
     gpu::launch_exact(batch, room.grids, stream);

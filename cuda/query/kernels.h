@@ -17,6 +17,12 @@ struct TriangleGrids {
   int walk, sum, rest;
 };
 
+struct ExactGrids {
+  int search;
+  int sum[2];  ///< by signs in doubles, by exact ones
+  int whole;
+};
+
 /// Blocks of each kernel that the current device runs at a time.
 struct Grids {
   int sum, details;      ///< of a batch of trees
@@ -24,7 +30,7 @@ struct Grids {
   int divide;            ///< of contact patches
   int smooth;            ///< of trees in smooth fields
   TriangleGrids facets;  ///< of trees in boxes and terrains
-  int exact[kExactPasses];
+  ExactGrids exact;
 };
 
 /// Each sets the members of its kernels.
@@ -37,8 +43,10 @@ TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
 void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream);
-/// [bytes] that the room of a batch takes at least; more is faster.
-std::size_t least_exact_bytes(std::uint32_t most_blocks);
+/// Whether a batch's memory holds rooms for its largest mesh.
+bool has_room(const ExactArrays& batch);
+/// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.
+std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs);
 void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream);
 /// As many divide contacts as `room_bytes` hold the rooms of.
 void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,

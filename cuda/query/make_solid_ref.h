@@ -201,8 +201,11 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
   const auto* const here = reinterpret_cast<const std::byte*>(&header);
   const std::byte* const bytes = put(std::span(here, header.file_bytes));
   ref.frame = frame_of(header);
-  if (header.mesh != 0)
-    ref.mesh = MeshTree(header, *at<MeshHeader>(header, header.mesh)).copied_to(bytes, header);
+  if (header.mesh != 0) {
+    const MeshTree mesh(header, *at<MeshHeader>(header, header.mesh));
+    ref.mesh = mesh.copied_to(bytes, header);
+    ref.in_floats = put(float_blocks(mesh));
+  }
   ref.volume = std::ldexp(header.volume + header.volume_error, 3 * header.exponent);
   if (asset.sphere_count() == 0) return ref;
   for (const Measure measure : {Measure::matched, Measure::inner}) {

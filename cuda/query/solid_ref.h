@@ -4,6 +4,7 @@
 #include "cuda/query/cuts_ref.h"
 #include "cuda/query/detail_ref.h"
 #include "cuda/query/field_ref.h"
+#include "cuda/query/float_block.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/tree_ref.h"
 #include "query/base/pair_place.h"
@@ -20,8 +21,9 @@ struct SolidRef {
   CutsRef cuts[2];   ///< by Measure
   CoverRef cover;    ///< of the inner tree
   AssetDetails details;
-  MeshTree mesh;  ///< without a header: none is kept
-  double volume;  ///< [u³] at most
+  MeshTree mesh;                ///< without a header: none is kept
+  const FloatBlock* in_floats;  ///< its blocks
+  double volume;                ///< [u³] at most
 
   IST_HD bool is_field() const { return field.kind != FieldKind::none; }
   IST_HD bool has_spheres() const { return tree[0].leaf_blocks > 0; }

@@ -49,7 +49,8 @@ class GpuSolids {
 /// Working memory of a batch on the device. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`. Takes 100 MB, plus 8 bytes per pair, or 40 bytes up to
+  /// For batches of up to `most_pairs`. Takes 100 MB, up to 410 MB on a large card for the exact
+  /// measure if `most_pairs` is 32,768 or more, plus 12 bytes per pair, or 40 bytes up to
   /// kFewGpuPairs.
   ///
   /// Up to kFewGpuPairs pairs are partitioned more finely: a small batch ends sooner, at the cost

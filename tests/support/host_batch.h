@@ -34,6 +34,8 @@ class HostBatch {
   // Of pairs of a tree and a field.
   gpu::FieldCounters field_counters;                               ///< of the last run
   std::uint32_t query_room = 7, part_room = 20, word_room = 3000;  ///< gpu::TriangleRoom
+  // Of pairs of meshes: pairs of a round, chunks of triangles.
+  std::uint32_t mesh_room = 50, mesh_chunks = 400;
   std::uint32_t most_rounds = ~0u;
   std::uint32_t rounds = 0;  ///< of the last run
 

@@ -80,26 +80,63 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   static_cast<gpu::SolidPairs&>(batch) = asked;
   exact_counters = {};
   batch.counters = &exact_counters;
-  std::vector<std::uint32_t> lists[2];
-  for (int k = 0; k < 2; ++k) {
+  std::vector<std::uint32_t> lists[gpu::kExactPasses], next(mesh_chunks);
+  std::vector<gpu::ExactQuery> mesh_queries(mesh_room);
+  std::vector<gpu::ExactChunk> chunks(mesh_chunks);
+  for (int k = 0; k < gpu::kExactPasses; ++k) {
     lists[k].resize(asked.pairs.count);
     batch.list[k] = lists[k].data();
   }
+  batch.queries = mesh_queries.data();
+  batch.query_room = mesh_room;
+  batch.pool = {chunks.data(), next.data(), nullptr, mesh_chunks};
   for (const gpu::SolidRef& solid : solids_.refs())
     batch.most_blocks = std::max(batch.most_blocks, solid.mesh.count);
   for (std::uint32_t i = 0; i < asked.pairs.count; ++i)
     if (gpu::sift_exact(batch, i)) lists[0][exact_counters.listed[0]++] = i;
-  const auto memory = std::make_unique<gpu::ExactMemory>();
-  const auto pass = [&]<int kPass>() {
-    std::vector<std::uint64_t> bytes(batch.bytes_of_team(kPass) / 8);
-    batch.rooms = reinterpret_cast<std::byte*>(bytes.data());
-    const gpu::ExactRoom room = batch.room(kPass, 0);
-    for (std::uint32_t k = 0; k < exact_counters.listed[kPass]; ++k)
-      by_team(seed, [&](const auto& team) { gpu::ask_pass<kPass>(team, batch, k, room, *memory); });
+  std::vector<std::uint64_t> bytes;
+  const auto room = [&](int pass) {
+    bytes.assign(batch.bytes_of_team(pass) / 8, 0);
+    batch.rooms = batch.memory = reinterpret_cast<std::byte*>(bytes.data());
+    return batch.room(pass, 0);
   };
-  pass.template operator()<0>();
-  pass.template operator()<1>();
-  pass.template operator()<2>();
+  const auto pair = std::make_unique<gpu::ExactPair>();
+  const auto search = std::make_unique<gpu::ExactSearchMemory>();
+  const auto sum = std::make_unique<gpu::ExactSumMemory>();
+  const auto whole = std::make_unique<gpu::ExactWholeMemory>();
+  const gpu::ExactRoom first_room = room(0);
+  std::uint32_t n = 0;
+  for (std::uint32_t first = 0; n < std::min(most_rounds, 100u) && first < exact_counters.listed[0];
+       ++n) {
+    gpu::ExactRound& round = gpu::round_of(batch, n);
+    const std::uint32_t count = gpu::pairs_from(batch, first);
+    round = {first, count, 0, 0, 0, 0, 0, 0};
+    for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
+    for (; round.searched < count && gpu::goes_on(batch, n); ++round.searched)
+      by_team(seed, [&](const auto& team) {
+        gpu::search_query(team, batch, round, round.searched, *pair, *search);
+      });
+    const auto sum_all = [&]<bool kExactly>(std::uint32_t all) {
+      for (std::uint32_t k = 0; k < all; ++k)
+        by_team(seed, [&](const auto& team) {
+          gpu::sum_query<kExactly>(team, batch, round, k, first_room, *pair, *sum);
+        });
+    };
+    sum_all.template operator()<false>(round.searched);
+    sum_all.template operator()<true>(round.unsure);
+    exact_counters.exactly += round.unsure;
+    if (round.searched == 0) throw std::logic_error("a round has no room for a pair");
+    first = gpu::end_of(round);
+  }
+  rounds = n;
+  for (int pass = 1; pass < gpu::kExactPasses; ++pass) {
+    const gpu::ExactRoom of_pass = room(pass);
+    const std::uint32_t listed = exact_counters.listed[pass];
+    for (std::uint32_t k = 0; k < gpu::pairs_of_pass(batch, pass, n); ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::ask_pass(team, batch, pass, n, listed, k, of_pass, *whole);
+      });
+  }
 }
 
 void HostBatch::cut_for(std::size_t most_pairs) {

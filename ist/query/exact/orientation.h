@@ -72,22 +72,34 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
-/// The same in doubles, of rounded differences: sign 0 where these are not certain. `shift`: aside,
-/// or its opposite where r0 moves.
+/// r · (u × v) in doubles, of rounded differences, for many r: sign 0 where it is not certain.
+struct FilteredPlane {
+  Point normal, size;
+  double shift, shift_error;  ///< what moving aside adds
+
+  /// `by`: aside, or its opposite where r's start moves.
+  IST_HD FilteredPlane(const Point& u, const Point& v, const Point& by) {
+    const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by_ = u.x * v.z, az = u.x * v.y,
+                 bz = u.y * v.x;
+    normal = {ax - bx, ay - by_, az - bz};
+    size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by_), std::abs(az) + std::abs(bz)};
+    shift = dot(by, normal);
+    shift_error = kFilter * absolute_dot(by, size);
+  }
+  IST_HD Determinant height(const Point& r) const {
+    const double value = dot(r, normal), error = kFilter * absolute_dot(r, size);
+    const double signed_value = value + shift;
+    const bool certain = std::abs(signed_value) > error + shift_error;
+    return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+  }
+};
+
 IST_HD_ONCE inline Determinant filtered_determinant(double rx, double ry, double rz, double ux,
                                                     double uy, double uz, double vx, double vy,
                                                     double vz, double shift_x, double shift_y,
                                                     double shift_z) {
-  const Point r = {rx, ry, rz}, by = {shift_x, shift_y, shift_z};
-  const double ax = uy * vz, bx = uz * vy, ay = uz * vx, by_ = ux * vz, az = ux * vy, bz = uy * vx;
-  const Point n = {ax - bx, ay - by_, az - bz};
-  const Point size = {std::abs(ax) + std::abs(bx), std::abs(ay) + std::abs(by_),
-                      std::abs(az) + std::abs(bz)};
-  const double value = dot(r, n);
-  const double error = kFilter * absolute_dot(r, size);
-  const double signed_value = value + dot(by, n);
-  const bool certain = std::abs(signed_value) > error + kFilter * absolute_dot(by, size);
-  return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
+  return FilteredPlane({ux, uy, uz}, {vx, vy, vz}, {shift_x, shift_y, shift_z})
+      .height({rx, ry, rz});
 }
 IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0, const Point& u1,
                                                const Point& u0, const Point& v1, const Point& v0,
@@ -105,12 +117,14 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
 }
 
 /// In doubles, whose sign may be 0, or with `kExactly` whatever it takes.
-template <bool kExactly, class... Points>
-IST_HD inline Determinant determinant_of(const Points&... of) {
+template <bool kExactly>
+IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const Point& u1,
+                                         const Point& u0, const Point& v1, const Point& v0,
+                                         int moved, const Point& aside) {
   if constexpr (kExactly)
-    return determinant(of...);
+    return determinant(r1, r0, u1, u0, v1, v0, moved, aside);
   else
-    return filtered_determinant(of...);
+    return FilteredPlane(u1 - u0, v1 - v0, moved * aside).height(r1 - r0);
 }
 
 /// How far B's point lies above triangle A's plane: > 0 outside.
