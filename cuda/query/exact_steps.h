@@ -235,8 +235,8 @@ IST_HD inline std::uint32_t end_of(const ExactRound& round) {
 /// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
 /// may still need as many chunks as pairs took before, in the last round too.
 IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n) {
-  constexpr std::uint32_t kLeast = 4;
-  std::uint32_t each = kLeast;
+  constexpr std::uint32_t kLeastChunks = 4;
+  std::uint32_t each = kLeastChunks;
   for (const ExactRound& round : batch.counters->round) {
     const std::uint32_t chunks = atomic_load(&round.chunks);
     const std::uint32_t taken = chunks / (atomic_load(&round.found) + 1);

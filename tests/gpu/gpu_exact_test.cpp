@@ -10,6 +10,7 @@
 #include <ist/gpu_query.h>
 #include <ist/types.h>
 
+#include "cuda/check.h"
 #include "support/device_batch.h"
 #include "support/exact_batches.h"
 #include "support/gpu_test.h"
@@ -46,6 +47,27 @@ TEST_F(GpuExactTest, HasTheBitsOfAWarpOnTheHost) {
   pairs[40].a = 1000;
   HostBatch host(exact_solids());
   expect_same_bits(ask_device(exact_solids(), pairs), host.run(pairs, Measure::exact, 1));
+}
+
+TEST_F(GpuExactTest, AGraphMayCaptureThem) {
+  std::vector<BatchPair> pairs = exact_pairs(45, 5000);
+  for (const BatchPair& pair : aligned_pairs(46, 5000)) pairs.push_back(pair);
+  const std::vector<Penetration> expected = ask_device(exact_solids(), pairs);
+  const GpuSolids solids(exact_solids());
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  const DeviceBatch batch(pairs);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t ready = nullptr;
+  gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
+  penetration_batch(solids, batch.pairs(), {Measure::exact}, workspace, batch.answers(), stream);
+  gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
+  gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
+  for (int k = 0; k < 3; ++k) gpu::check(cudaGraphLaunch(ready, stream), "launching a graph");
+  stream.wait();
+  expect_same_bits(batch.get(), expected);
+  cudaGraphExecDestroy(ready);
+  cudaGraphDestroy(graph);
 }
 
 TEST_F(GpuExactTest, AnswersAreTheCpus) {
