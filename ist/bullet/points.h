@@ -32,7 +32,7 @@ class Points {
   std::vector<btPersistentManifold*> manifolds;  // the first ones are full
 
  private:
-  /// [u/s] At which a point of them may part the bodies, times a direction: see spring_at().
+  /// [u/s] At which the contact may part the bodies, in the direction in which all points push.
   Eigen::Vector3d together(const btCollisionObject& first, const btCollisionObject& second,
                            const Contact& contact, const Spring& spring);
   void set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
