@@ -116,7 +116,8 @@ int main(int argc, char** argv) {
   Report report("bullet_scenes", argc, argv);
   report.page("Scenes in Bullet");
   report.remark(
-      "Steps a second of stepSimulation() alone, at 240 Hz, the fastest of the turns; ist (patches "
+      "Steps a second of stepSimulation() alone, by processor time, at 240 Hz, the fastest of the "
+      "turns; ist (patches "
       "in the solver) and GImpact by turns, each run a process of its own, as many scenes at a "
       "time "
       "as a third of the cores. Works: every truth of "

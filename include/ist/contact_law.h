@@ -364,6 +364,12 @@ class SupportPolygon {
   /// A face without end. `normal`: unit, outward.
   void add_plane(bool of_b, const Eigen::Vector3d& normal, const Eigen::Vector3d& point) noexcept;
 
+  /// Whether the faces given so far of that side may be part of a polygon. Where not, corners()
+  /// answers nothing, whatever the other side has.
+  bool has_faces(bool of_b) const noexcept {
+    return flat_ && (sides_[of_b].endless || sides_[of_b].count > 0);
+  }
+
   /// Writes the corners, those of the true hull if they fit and of as many directions as fit if
   /// not. Returns how many, or nothing if the contact is not flat or if there is no room for three:
   /// then use the patches. Where the faces are apart, and spheres alone reach from one to the

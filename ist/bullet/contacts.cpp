@@ -18,30 +18,11 @@
 
 #include <ist/bullet/convert.h>
 
-#include "bullet/meeting.h"
+#include "bullet/points.h"
 
 namespace ist::bullet {
 
 namespace {
-
-constexpr std::size_t kPointsOfAManifold = MANIFOLD_CACHE_SIZE;
-
-/// A patch's name in the fields in which Bullet keeps the triangles of a point.
-void set_name(btManifoldPoint& point, std::uint64_t id) {
-  point.m_partId0 = static_cast<int>(id >> 32);
-  point.m_index0 = static_cast<int>(id & 0xffffffffu);
-}
-bool same_name(const btManifoldPoint& a, const btManifoldPoint& b) {
-  return a.m_partId0 == b.m_partId0 && a.m_index0 == b.m_index0;
-}
-
-/// The solver begins with the last step's impulses. What stopped an impact is not needed again: no
-/// more than twice what the point's spring gives in a step to bodies at rest.
-void forget_impact(btManifoldPoint& point, double step) {
-  const btScalar most = static_cast<btScalar>(2 * step) * point.m_combinedContactStiffness1 *
-                        std::max(-point.m_distance1, btScalar(0));
-  point.m_appliedImpulse = std::min(point.m_appliedImpulse, most);
-}
 
 btRigidBody* movable(const btCollisionObject& object) {
   btRigidBody* const body = btRigidBody::upcast(const_cast<btCollisionObject*>(&object));
@@ -78,12 +59,6 @@ void for_each_part(const btCollisionShape& shape, const btTransform& in_body, co
     for_each_part(*compound.getChildShape(i), in_body * compound.getChildTransform(i), visit);
 }
 
-btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
-  const btRigidBody* const body = btRigidBody::upcast(&object);
-  if (body == nullptr) return {0, 0, 0};
-  return body->getVelocityInLocalPoint(point - body->getCenterOfMassPosition());
-}
-
 Unsaid unsaid_motion(const btCollisionObject& object, const btTransform& before,
                      const btTransform& now, btScalar step) {
   Unsaid motion;
@@ -106,34 +81,18 @@ double motion_until_asked(const Contact& contact, const Settings& settings, cons
   return std::min(settings.follow * std::max(spring.rest, mean_depth(contact)), spring.rest);
 }
 
-/// Where a patch pushes: a force on its wrench's axis has no twist left but that about itself. The
-/// axis runs away where a patch pushes both ways, so no farther from its middle than it is wide.
-Eigen::Vector3d place_of(const ContactPatch& patch) {
-  const Eigen::Vector3d aside = patch.point - patch.centroid;
-  const double far = aside.norm(), width = std::sqrt(patch.area);
-  return patch.centroid + (far > width ? width / far : 1) * aside;
-}
-
 }  // namespace
 
 struct PairAlgorithm::State {
   State(const btCollisionShape& first, const btCollisionShape& second, const Contacts& world)
       : meeting(first, second, &world) {}
 
-  void move_points(const btCollisionObject& first, const btCollisionObject& second, double step);
-  void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
-            const Contact& contact, const Spring& spring, btDispatcher& dispatcher);
-  std::size_t points() const;
-
   Meeting meeting;
   std::optional<Places> before;  // where the shapes were in the last step
-  std::array<Unsaid, 2> unsaid;
-  std::vector<btPersistentManifold*> manifolds;       // the first ones are full
-  std::array<btVector3, Settings::kPatches> normals;  // of all points, in the first's frame
-  btTransform second_in_first;                        // when last asked
-  double closing = 0;  // [u/s] of an impact, forgotten as the bodies part
-  double still = -1;   // [u] until a point has moved by more than this that answer holds
-  bool apart = true;   // it has no points
+  Points points;
+  btTransform second_in_first;  // when last asked
+  double still = -1;            // [u] until a point has moved by more than this that answer holds
+  bool apart = true;            // it has no points
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -256,18 +215,7 @@ PairAlgorithm::PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info,
       contacts_(contacts),
       state_(new State(first, second, contacts)) {}
 
-PairAlgorithm::~PairAlgorithm() {
-  for (btPersistentManifold* manifold : state_->manifolds) {
-    // The end of a contact is reported once, with the first manifold.
-    if (manifold != state_->manifolds.front()) {
-      for (int i = 0; i < manifold->getNumContacts(); ++i) {
-        manifold->clearUserCache(manifold->getContactPoint(i));
-      }
-      manifold->setNumContacts(0);
-    }
-    m_dispatcher->releaseManifold(manifold);
-  }
-}
+PairAlgorithm::~PairAlgorithm() { state_->points.release(*m_dispatcher); }
 
 void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
                                      const btCollisionObjectWrapper* b,
@@ -290,10 +238,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     // contactTest() and its like collect points through a manifold.
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
-    if (state_->manifolds.empty()) {
-      state_->manifolds.push_back(m_dispatcher->getNewManifold(&first, &second));
-    }
-    result->setPersistentManifold(state_->manifolds[0]);
+    result->setPersistentManifold(state_->points.first_manifold(first, second, *m_dispatcher));
     for (std::size_t i = 0; i < contact.count; ++i) {
       const ContactPatch& patch = contact.patches[i];
       if (!(patch.area > 0)) continue;
@@ -318,174 +263,29 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
   if (state_->before) {
     const auto time = static_cast<btScalar>(step);
-    state_->unsaid = {unsaid_motion(first, (*state_->before)[0], at_first, time),
-                      unsaid_motion(second, (*state_->before)[1], at_second, time)};
+    state_->points.unsaid = {unsaid_motion(first, (*state_->before)[0], at_first, time),
+                             unsaid_motion(second, (*state_->before)[1], at_second, time)};
   }
   state_->before = Places{at_first, at_second};
   if (holds) {
-    state_->move_points(first, second, step);
+    state_->points.move(first, second, step);
   } else {
     const Spring spring = spring_of(state_->meeting, first, second, settings, step);
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact, state_->apart);
-    state_->fill(*a, *b, contact, spring, *m_dispatcher);
+    state_->points.fill(*a, *b, contact, spring, *m_dispatcher);
     state_->second_in_first = second_in_first;
     state_->still = std::max(motion_until_asked(contact, settings, spring), contact.clearance);
-    state_->apart = state_->points() == 0;
+    state_->apart = state_->points.count() == 0;
   }
   if (gContactProcessedCallback == nullptr) return;
-  for (btPersistentManifold* manifold : state_->manifolds) {
+  for (btPersistentManifold* manifold : state_->points.manifolds) {
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
       gContactProcessedCallback(manifold->getContactPoint(i),
                                 const_cast<btCollisionObject*>(&first),
                                 const_cast<btCollisionObject*>(&second));
     }
   }
-}
-
-std::size_t PairAlgorithm::State::points() const {
-  std::size_t sum = 0;
-  for (const btPersistentManifold* manifold : manifolds) {
-    sum += static_cast<std::size_t>(manifold->getNumContacts());
-  }
-  return sum;
-}
-
-void PairAlgorithm::State::move_points(const btCollisionObject& first,
-                                       const btCollisionObject& second, double step) {
-  const btTransform& to_world_first = first.getWorldTransform();
-  const btTransform& to_world_second = second.getWorldTransform();
-  std::size_t at = 0;
-  for (btPersistentManifold* manifold : manifolds) {
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      btManifoldPoint& point = manifold->getContactPoint(i);
-      point.m_positionWorldOnA = to_world_first * point.m_localPointA;
-      point.m_positionWorldOnB = to_world_second * point.m_localPointB;
-      point.m_normalWorldOnB = to_world_first.getBasis() * normals[at++];
-      point.m_distance1 =
-          (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
-      forget_impact(point, step);
-      ++point.m_lifeTime;
-    }
-  }
-}
-
-void PairAlgorithm::State::fill(const btCollisionObjectWrapper& a,
-                                const btCollisionObjectWrapper& b, const Contact& contact,
-                                const Spring& spring, btDispatcher& dispatcher) {
-  const btCollisionObject &first = *a.getCollisionObject(), &second = *b.getCollisionObject();
-  // Bullet's own functions report an end whenever a manifold is empty, so they are not called.
-  std::array<btManifoldPoint, Settings::kPatches> old;
-  std::size_t old_count = 0;
-  for (btPersistentManifold* manifold : manifolds) {
-    for (int i = 0; i < manifold->getNumContacts(); ++i) {
-      old[old_count++] = manifold->getContactPoint(i);
-    }
-    manifold->setNumContacts(0);
-  }
-  const bool touched = old_count > 0;
-
-  // Points that push against each other, as of wedged bodies, part none.
-  Eigen::Vector3d together = Eigen::Vector3d::Zero();
-  double apart = 0;
-  closing *= 1 - spring.step / (8 * (spring.step + spring.relaxation));
-  for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
-    const double force = spring.at(patch.depth) * patch.area * patch.depth;
-    if (!(force > 0)) continue;
-    together += force * patch.normal;
-    apart += force;
-    const btVector3 middle = to_bullet(place_of(patch));
-    const btVector3 motion = velocity_of(first, middle) + unsaid[0].at(middle) -
-                             velocity_of(second, middle) - unsaid[1].at(middle);
-    closing = std::max(closing, to_eigen(motion).dot(patch.normal));
-  }
-  if (contact.count == 0) closing = 0;
-  const double most = std::max(spring.push_out, spring.rebound * closing);
-  if (apart > 0) together *= most / apart;
-
-  // Bullet's normal pushes the manifold's first body.
-  const btTransform to_first = first.getWorldTransform().inverse();
-  const btTransform to_second = second.getWorldTransform().inverse();
-  std::size_t used = 0;
-  for (std::size_t i = 0; i < contact.count; ++i) {
-    const ContactPatch& patch = contact.patches[i];
-    if (!(patch.area > 0)) continue;
-    const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
-    const btVector3 middle = to_bullet(place_of(patch));
-    const btScalar depth = static_cast<btScalar>(patch.depth);
-    const btVector3 on_first = middle - normal * (depth / 2);
-    const btVector3 on_second = middle + normal * (depth / 2);
-    btManifoldPoint point(to_first * on_first, to_second * on_second, normal, -depth);
-    point.m_positionWorldOnA = on_first;
-    point.m_positionWorldOnB = on_second;
-    point.m_combinedFriction = gCalculateCombinedFrictionCallback(&first, &second);
-    point.m_combinedRollingFriction = gCalculateCombinedRollingFrictionCallback(&first, &second);
-    point.m_combinedSpinningFriction = gCalculateCombinedSpinningFrictionCallback(&first, &second);
-    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(&first, &second);
-    const double approach =
-        normal.dot(velocity_of(second, on_second) - velocity_of(first, on_first));
-    if (point.m_combinedRestitution > 0 && approach > spring.slow) {
-      if (patch.depth < 0) continue;  // or the gap would take from the speed
-      // A damped spring would absorb the speed, so a point that bounces is rigid in this step.
-      point.m_contactPointFlags |=
-          BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
-    } else {
-      // Bullet takes spring and damper, and makes of them the speed at which they part bodies,
-      // depth · spring / (step · spring + damper), and the impulse of a unit of speed that is
-      // missing. At rest, against what is placed, the force is the spring's.
-      double stiffness = spring.at(patch.depth) * patch.area, relaxation = spring.relaxation;
-      if (patch.depth > 0) {
-        const double parting = spring.parting(patch.depth, together.dot(patch.normal));
-        // As the point moves along, its speed grows with its depth: hardly any is no measure.
-        const double placed =
-            to_eigen(unsaid[0].at(middle) - unsaid[1].at(middle)).dot(patch.normal);
-        const double speed =
-            parting + std::max(0.0, placed) *
-                          std::min(1.0, patch.depth / std::max(0.2 * spring.rest, 1e-300));
-        stiffness *= speed / parting;
-        relaxation = patch.depth / speed - spring.step;
-      }
-      point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
-      point.m_combinedContactStiffness1 = static_cast<btScalar>(stiffness);
-      point.m_combinedContactDamping1 = static_cast<btScalar>(stiffness * relaxation);
-    }
-    set_name(point, patch.id);
-    for (std::size_t k = 0; k < old_count; ++k) {
-      if (!same_name(old[k], point)) continue;
-      point.m_userPersistentData = old[k].m_userPersistentData;
-      point.m_appliedImpulse = old[k].m_appliedImpulse;
-      forget_impact(point, spring.step);
-      point.m_prevRHS = old[k].m_prevRHS;
-      point.m_appliedImpulseLateral1 = old[k].m_appliedImpulseLateral1;
-      point.m_appliedImpulseLateral2 = old[k].m_appliedImpulseLateral2;
-      point.m_lateralFrictionDir1 = old[k].m_lateralFrictionDir1;
-      point.m_lateralFrictionDir2 = old[k].m_lateralFrictionDir2;
-      point.m_lifeTime = old[k].m_lifeTime + 1;
-      old[k] = old[--old_count];
-      break;
-    }
-    if (gContactAddedCallback != nullptr &&
-        ((first.getCollisionFlags() | second.getCollisionFlags()) &
-         btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK)) {
-      gContactAddedCallback(point, &a, point.m_partId0, point.m_index0, &b, point.m_partId1,
-                            point.m_index1);
-    }
-    normals[used] = to_first.getBasis() * normal;
-    const std::size_t at = used++ / kPointsOfAManifold;
-    if (at == manifolds.size()) {
-      manifolds.push_back(dispatcher.getNewManifold(&first, &second));
-      // Bullet forgets no point of ours by itself, as it does of a compound's children.
-      manifolds.back()->setContactBreakingThreshold(BT_LARGE_FLOAT);
-    }
-    btPersistentManifold& manifold = *manifolds[at];
-    manifold.setNumContacts(manifold.getNumContacts() + 1);
-    manifold.getContactPoint(manifold.getNumContacts() - 1) = point;
-  }
-  for (std::size_t k = 0; k < old_count; ++k) manifolds[0]->clearUserCache(old[k]);
-  if (used > 0 && !touched && gContactStartedCallback != nullptr) {
-    gContactStartedCallback(manifolds[0]);
-  }
-  if (used == 0 && touched && gContactEndedCallback != nullptr) gContactEndedCallback(manifolds[0]);
 }
 
 double PairAlgorithm::share_until_impact(const btCollisionObject& first,
@@ -497,7 +297,7 @@ double PairAlgorithm::share_until_impact(const btCollisionObject& first,
 }
 
 void PairAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
-  for (btPersistentManifold* manifold : state_->manifolds) manifolds.push_back(manifold);
+  for (btPersistentManifold* manifold : state_->points.manifolds) manifolds.push_back(manifold);
 }
 
 const ContactForce& PairAlgorithm::pushed() const { return state_->pushed; }

@@ -140,6 +140,12 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   };
   // How far apart flat faces may be and push: as spheres do that stick out, and meshes shall.
   const double reach = exact ? kReach * std::cbrt(volume()) : blur(first_) + blur(second_);
+  Separation gap;
+  const auto find_gap = [&] {
+    gap = separation(a, b, {.max_distance = 2 * reach, .pair_id = pair_id_}, workspace());
+    return gap.distance_min > 0;
+  };
+  bool apart = false;  // certainly
   if (likely_apart) {
     // A lower bound suffices: the first few nodes give one.
     constexpr SeparationSettings kGlance{.max_visits = 8, .inner_spheres = true};
@@ -150,10 +156,13 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
       contact.clearance = bound - reach;
       return;
     }
+    apart = exact && find_gap();
   }
-  const ContactPatches found = contact_patches(a, b, query, workspace(), room);
-  contact.whole = found.penetration;
-  contact.count = found.count;
+  if (!apart) {
+    const ContactPatches found = contact_patches(a, b, query, workspace(), room);
+    contact.whole = found.penetration;
+    contact.count = found.count;
+  }
   if (std::isnan(contact.whole.volume)) {
     warn(
         "A contact query gave no answer, so two bodies pass through each other: a transform is not "
@@ -165,9 +174,8 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   const bool waits = exact && !(contact.whole.volume > 0);
   std::optional<Penetration> whole = contact.whole;
   if (waits) {
-    Separation gap;
     if (!contact.whole.touching) {
-      gap = separation(a, b, {.max_distance = 2 * reach, .pair_id = pair_id_}, workspace());
+      if (!apart) find_gap();
       contact.clearance = gap.distance_min - reach;
       if (contact.clearance > 0 || !(gap.distance > 0)) return;
       // Faces that do not look at each other now may do so halfway.
@@ -190,10 +198,16 @@ void Meeting::find(const btTransform& first, const btTransform& second, const Se
   SupportPolygon polygon(*whole, contact.origin, to_eigen(by_second ? second : first).linear(),
                          2 * std::min(radius(first_), radius(second_)),
                          exact && !waits ? 0 : reach);
-  for (const bool of_second : {false, true}) {
+  // First the side with fewer triangles: in most contacts nothing of it is flat.
+  const auto triangles = [](const Shape* shape) {
+    return shape != nullptr ? shape->tree().mesh_triangles() : 0;
+  };
+  const bool second_first = triangles(second_) < triangles(first_);
+  for (const bool of_second : {second_first, !second_first}) {
     const PlacedSolid& solid = of_second ? b : a;
-    if (polygon.add(of_second, solid)) continue;
-    if (partner_) partner_->add_faces(std::get<PlacedShape>(solid.placed), of_second, polygon);
+    if (!polygon.add(of_second, solid) && partner_)
+      partner_->add_faces(std::get<PlacedShape>(solid.placed), of_second, polygon);
+    if (!polygon.has_faces(of_second)) return;
   }
   const std::optional<std::size_t> corners = polygon.corners(room);
   if (!corners) return;

@@ -124,6 +124,40 @@ TEST(Support, FeetShareAPolygonAndBallsHaveNone) {
   for (const ContactPatch& patch : std::span(patches, found.count)) EXPECT_EQ(patch.id >> 63, 0u);
 }
 
+// A ball that has rolled on touches with other triangles, and its patch has another name: what it
+// bore is where the solver begins.
+TEST(BulletSupport, APatchThatGetsAnotherNameKeepsItsImpulse) {
+  static const Asset ball = baked(icosphere_mesh(3), "ball", 500);
+  World world;
+  world.add(cube_of_side(4), 0, btVector3(0, 0, -2));
+  btRigidBody& body =
+      world.add(std::make_unique<bullet::Shape>(ball.view()), 1, btVector3(0, 0, 0.99));
+  body.setAngularFactor(0);
+  world.step(480);
+  const auto borne = [&](std::uint64_t& name) {
+    double sum = 0;
+    for (int m = 0; m < world.world.getDispatcher()->getNumManifolds(); ++m) {
+      const auto& manifold = *world.world.getDispatcher()->getManifoldByIndexInternal(m);
+      for (int i = 0; i < manifold.getNumContacts(); ++i) {
+        const btManifoldPoint& point = manifold.getContactPoint(i);
+        sum += point.m_appliedImpulse;
+        name = static_cast<std::uint64_t>(point.m_partId0) << 32 |
+               static_cast<std::uint32_t>(point.m_index0);
+      }
+    }
+    return sum;
+  };
+  std::uint64_t name = 0, other = 0;
+  const double before = borne(name), weight = 9.81 / 240;
+  ASSERT_NEAR(before, weight, 1e-3 * weight);
+  btTransform rolled = body.getWorldTransform();
+  rolled.setRotation(btQuaternion({1, 0.3, 0}, 0.5));
+  body.setWorldTransform(rolled);
+  world.world.performDiscreteCollisionDetection();
+  EXPECT_GE(borne(other), 0.4 * weight);
+  EXPECT_NE(name, other);
+}
+
 /// Whether a box that lies over a table's edge by a share of its side is there after 3 s.
 bool stands(std::unique_ptr<btCollisionShape> table, const btVector3& at, double over,
             bool exact = false) {

@@ -3,7 +3,7 @@
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <ist/bullet/convert.h>
 
-#include <chrono>
+#include <ctime>
 #include <stdexcept>
 
 #include "scene_broadphase.h"
@@ -105,9 +105,9 @@ btRigidBody& SceneWorld::add_still(std::unique_ptr<btCollisionShape> shape,
 }
 
 void SceneWorld::step() {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();
   world_.stepSimulation(settings_.step, 0);
-  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  seconds_ += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
   ++steps_;
 }
 

@@ -397,7 +397,13 @@ ContactPatches contact_points(const PlacedSolid& a, const PlacedSolid& b,
                          to_isometry((by_b ? tree_b : tree_a)->pose).linear(),
                          2 * std::min(radius(tree_a), radius(tree_b)),
                          settings.measure == Measure::exact ? 0 : blur(tree_a) + blur(tree_b));
-  if (!polygon.add(false, a) || !polygon.add(true, b)) return found;
+  // First the side with fewer triangles: in most contacts nothing of it is flat.
+  const auto triangles = [](const PlacedAsset* tree) {
+    return tree != nullptr ? tree->asset.mesh_triangles() : 0;
+  };
+  const bool b_first = triangles(tree_b) < triangles(tree_a);
+  for (const bool of_b : {b_first, !b_first})
+    if (!polygon.add(of_b, of_b ? b : a) || !polygon.has_faces(of_b)) return found;
   found.count = polygon.corners(patches).value_or(found.count);
   if (found.count > 0 && !(patches[0].force.squaredNorm() > 0)) found.count = 0;  // apart
   return found;
