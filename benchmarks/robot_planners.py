@@ -165,6 +165,38 @@ def main():
     parser.add_argument("--only", default=",".join(ROBOTS))
     arguments = parser.parse_args()
     rows, targets, close = [], [], []
+    content = arguments.robots / "curobo/content"
+    urdf = content / "assets/robot/franka_description/franka_panda.urdf"
+    theirs, ignored, locked = shipped(content / "configs/robot/franka.yml")
+    file, report, _ = spheres_of(arguments.ist, urdf, [])
+    contenders = {
+        "cuRobo's franka.yml": (theirs, ignored),
+        "ist spheres": ({link: np.array(one["spheres"]) for link, one in file["links"].items()},
+                        {frozenset(one["links"]) for one in file["self_collision"]["ignored"]})}
+    collides, shares = beside(Robot(urdf), contenders, locked)
+    shown = [{"spheres": name, "count": sum(len(s) for link, s in contenders[name][0].items()),
+              "truly colliding": int(collides.sum()), "of these called free [%]": 100 * missed,
+              "free ones called colliding [%]": 100 * wrong} for name, (missed, wrong) in shares.items()]
+    print(shown)
+
+    def write():
+        cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
+        commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
+        report = {
+            "benchmark": "robot_planners", "page": "Robots for planners",
+            "made_by": "benchmarks/robot_planners.py", "commit": commit, "date": datetime.date.today().isoformat(),
+            "cpu": cpu, "cores": len(os.sched_getaffinity(0)), "compiler": "–", "quick": False,
+            "tables": {"ist spheres with its defaults": rows, "Links in the way": close,
+                       "The Panda that cuRobo ships": shown},
+            "targets": targets,
+            "remarks": [
+                "Robots of example-robot-data 6.0.0. Shares are those that ist spheres reports: in 2,000 poses in which "
+                "nothing was decided, by exact queries of the links' solids.",
+                "The Panda of curobo-metal 1.0.1, its spheres, buffers and ignored pairs as shipped; truth by FCL, of "
+                "pairs that are no neighbours, the gripper open.",
+                "cuRobo ships its UR10e without meshes. foam, another maker of spheres, is not on PyPI: not compared."]}
+        pathlib.Path(arguments.out).write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+
     data = arguments.robots / DATA
     for name in arguments.only.split(","):
         urdf, options = ROBOTS[name]
@@ -185,35 +217,7 @@ def main():
         close += [{"robot": name, "links": " and ".join(one["links"]), "gap [mm]": 1e3 * one["gap"],
                    "spheres of both that would tell, about": one["spheres"]} for one in self["too_close"]]
         print(rows[-1], flush=True)
-    content = arguments.robots / "curobo/content"
-    urdf = content / "assets/robot/franka_description/franka_panda.urdf"
-    theirs, ignored, locked = shipped(content / "configs/robot/franka.yml")
-    file, report, _ = spheres_of(arguments.ist, urdf, [])
-    contenders = {
-        "cuRobo's franka.yml": (theirs, ignored),
-        "ist spheres": ({link: np.array(one["spheres"]) for link, one in file["links"].items()},
-                        {frozenset(one["links"]) for one in file["self_collision"]["ignored"]})}
-    collides, shares = beside(Robot(urdf), contenders, locked)
-    shown = [{"spheres": name, "count": sum(len(s) for link, s in contenders[name][0].items()),
-              "truly colliding": int(collides.sum()), "of these called free [%]": 100 * missed,
-              "free ones called colliding [%]": 100 * wrong} for name, (missed, wrong) in shares.items()]
-    print(shown)
-    cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
-    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
-    report = {
-        "benchmark": "robot_planners", "page": "Robots for planners",
-        "made_by": "benchmarks/robot_planners.py", "commit": commit, "date": datetime.date.today().isoformat(),
-        "cpu": cpu, "cores": len(os.sched_getaffinity(0)), "compiler": "–", "quick": False,
-        "tables": {"ist spheres with its defaults": rows, "Links in the way": close,
-                   "The Panda that cuRobo ships": shown},
-        "targets": targets,
-        "remarks": [
-            "Robots of example-robot-data 6.0.0. Shares are those that ist spheres reports: in 2,000 poses in which "
-            "nothing was decided, by exact queries of the links' solids.",
-            "The Panda of curobo-metal 1.0.1, its spheres, buffers and ignored pairs as shipped; truth by FCL, of "
-            "pairs that are no neighbours, the gripper open.",
-            "cuRobo ships its UR10e without meshes. foam, another maker of spheres, is not on PyPI: not compared."]}
-    pathlib.Path(arguments.out).write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+        write()  # a robot may take minutes
 
 
 main()

@@ -176,7 +176,8 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     if (fixed.contains(link.name) || !(protrusion > 0)) mesh = nullptr;
     links.push_back({mesh, link.cover.spheres.size() - link.given.size(), protrusion});
     before += links.back().own;
-    if (mesh != nullptr) settings.max_protrusion = std::max(settings.max_protrusion, protrusion);
+    if (mesh != nullptr)
+      settings.max_protrusion = std::max(settings.max_protrusion, kElsewhere * protrusion);
   }
   settings.count = kMostCoverSpheres;
   const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
