@@ -207,7 +207,7 @@ def main():
         share = self["false"] / max(free, 1)
         rows.append({"robot": name, "links": len(report["links"]),
                      "spheres": sum(link["spheres"] for link in report["links"].values()),
-                     "largest protrusion [mm]": 1e3 * max(link["protrusion"] for link in report["links"].values()),
+                     "largest protrusion [mm]": 1e3 * max(link["protrusion"] or 0 for link in report["links"].values()),
                      "truly colliding": self["colliding"], "of these called free": self["missed"], "free": free,
                      "called colliding [%]": 100 * share, "seconds": seconds})
         targets += [{"what": f"{name}: colliding poses called free", "value": self["missed"], "limit": "≤ 0",
