@@ -227,10 +227,12 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     std::vector<SphereCover> covers = cover_with_spheres(meshes, settings, progress);
     for (std::size_t i = 0; i < changed.size(); ++i) {
       SphereLink& link = robot.links[changed[i]];
+      const SphereCoverProof proof = prove_cover(meshes[i], covers[i].spheres);
+      if (!proof.covered) continue;
       covers[i].reached = true;  // a wish
       covers[i].seconds += link.cover.seconds;
       covers[i].protrusion.largest += link.slack;
-      link.proof = prove_cover(meshes[i], covers[i].spheres);
+      link.proof = proof;
       link.cover = std::move(covers[i]);
       complete_cover(link, true);
     }
