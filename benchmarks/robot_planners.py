@@ -165,26 +165,6 @@ def main():
     parser.add_argument("--only", default=",".join(ROBOTS))
     arguments = parser.parse_args()
     rows, targets, close = [], [], []
-    data = arguments.robots / DATA
-    for name in arguments.only.split(","):
-        urdf, options = ROBOTS[name]
-        _, report, seconds = spheres_of(arguments.ist, data / "robots" / urdf,
-                                        ["--package", f"example-robot-data={data}", *options])
-        self = report["self_collision"]
-        free = self["samples"] - self["colliding"]
-        share = self["false"] / max(free, 1)
-        rows.append({"robot": name, "links": len(report["links"]),
-                     "spheres": sum(link["spheres"] for link in report["links"].values()),
-                     "largest protrusion [mm]": 1e3 * max(link["protrusion"] for link in report["links"].values()),
-                     "truly colliding": self["colliding"], "of these called free": self["missed"], "free": free,
-                     "called colliding [%]": 100 * share, "seconds": seconds})
-        targets += [{"what": f"{name}: colliding poses called free", "value": self["missed"], "limit": "≤ 0",
-                     "met": self["missed"] == 0},
-                    {"what": f"{name}: free poses called colliding [%]", "value": 100 * share, "limit": "≤ 10.0",
-                     "met": share <= 0.1}]
-        close += [{"robot": name, "links": " and ".join(one["links"]), "gap [mm]": 1e3 * one["gap"],
-                   "spheres of both that would tell, about": one["spheres"]} for one in self["too_close"]]
-        print(rows[-1], flush=True)
     content = arguments.robots / "curobo/content"
     urdf = content / "assets/robot/franka_description/franka_panda.urdf"
     theirs, ignored, locked = shipped(content / "configs/robot/franka.yml")
@@ -198,22 +178,46 @@ def main():
               "truly colliding": int(collides.sum()), "of these called free [%]": 100 * missed,
               "free ones called colliding [%]": 100 * wrong} for name, (missed, wrong) in shares.items()]
     print(shown)
-    cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
-    commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
-    report = {
-        "benchmark": "robot_planners", "page": "Robots for planners",
-        "made_by": "benchmarks/robot_planners.py", "commit": commit, "date": datetime.date.today().isoformat(),
-        "cpu": cpu, "cores": len(os.sched_getaffinity(0)), "compiler": "–", "quick": False,
-        "tables": {"ist spheres with its defaults": rows, "Links in the way": close,
-                   "The Panda that cuRobo ships": shown},
-        "targets": targets,
-        "remarks": [
-            "Robots of example-robot-data 6.0.0. Shares are those that ist spheres reports: in 2,000 poses in which "
-            "nothing was decided, by exact queries of the links' solids.",
-            "The Panda of curobo-metal 1.0.1, its spheres, buffers and ignored pairs as shipped; truth by FCL, of "
-            "pairs that are no neighbours, the gripper open.",
-            "cuRobo ships its UR10e without meshes. foam, another maker of spheres, is not on PyPI: not compared."]}
-    pathlib.Path(arguments.out).write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+
+    def write():
+        cpu = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "?")
+        commit = subprocess.run(["git", "rev-parse", "--short=8", "HEAD"], capture_output=True, text=True).stdout.strip()
+        report = {
+            "benchmark": "robot_planners", "page": "Robots for planners",
+            "made_by": "benchmarks/robot_planners.py", "commit": commit, "date": datetime.date.today().isoformat(),
+            "cpu": cpu, "cores": len(os.sched_getaffinity(0)), "compiler": "–", "quick": False,
+            "tables": {"ist spheres with its defaults": rows, "Links in the way": close,
+                       "The Panda that cuRobo ships": shown},
+            "targets": targets,
+            "remarks": [
+                "Robots of example-robot-data 6.0.0. Shares are those that ist spheres reports: in 2,000 poses in which "
+                "nothing was decided, by exact queries of the links' solids.",
+                "The Panda of curobo-metal 1.0.1, its spheres, buffers and ignored pairs as shipped; truth by FCL, of "
+                "pairs that are no neighbours, the gripper open.",
+                "cuRobo ships its UR10e without meshes. foam, another maker of spheres, is not on PyPI: not compared."]}
+        pathlib.Path(arguments.out).write_text(json.dumps(report, indent=1, ensure_ascii=False) + "\n")
+
+    data = arguments.robots / DATA
+    for name in arguments.only.split(","):
+        urdf, options = ROBOTS[name]
+        _, report, seconds = spheres_of(arguments.ist, data / "robots" / urdf,
+                                        ["--package", f"example-robot-data={data}", *options])
+        self = report["self_collision"]
+        free = self["samples"] - self["colliding"]
+        share = self["false"] / max(free, 1)
+        rows.append({"robot": name, "links": len(report["links"]),
+                     "spheres": sum(link["spheres"] for link in report["links"].values()),
+                     "largest protrusion [mm]": 1e3 * max(link["protrusion"] or 0 for link in report["links"].values()),
+                     "truly colliding": self["colliding"], "of these called free": self["missed"], "free": free,
+                     "called colliding [%]": 100 * share, "seconds": seconds})
+        targets += [{"what": f"{name}: colliding poses called free", "value": self["missed"], "limit": "≤ 0",
+                     "met": self["missed"] == 0},
+                    {"what": f"{name}: free poses called colliding [%]", "value": 100 * share, "limit": "≤ 10.0",
+                     "met": share <= 0.1}]
+        close += [{"robot": name, "links": " and ".join(one["links"]), "gap [mm]": 1e3 * one["gap"],
+                   "spheres of both that would tell, about": one["spheres"]} for one in self["too_close"]]
+        print(rows[-1], flush=True)
+        write()  # a robot may take minutes
 
 
 main()

@@ -176,7 +176,8 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     if (fixed.contains(link.name) || !(protrusion > 0)) mesh = nullptr;
     links.push_back({mesh, link.cover.spheres.size() - link.given.size(), protrusion});
     before += links.back().own;
-    if (mesh != nullptr) settings.max_protrusion = std::max(settings.max_protrusion, protrusion);
+    if (mesh != nullptr)
+      settings.max_protrusion = std::max(settings.max_protrusion, kElsewhere * protrusion);
   }
   settings.count = kMostCoverSpheres;
   const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
@@ -226,10 +227,12 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     std::vector<SphereCover> covers = cover_with_spheres(meshes, settings, progress);
     for (std::size_t i = 0; i < changed.size(); ++i) {
       SphereLink& link = robot.links[changed[i]];
+      const SphereCoverProof proof = prove_cover(meshes[i], covers[i].spheres);
+      if (!proof.covered) continue;
       covers[i].reached = true;  // a wish
       covers[i].seconds += link.cover.seconds;
       covers[i].protrusion.largest += link.slack;
-      link.proof = prove_cover(meshes[i], covers[i].spheres);
+      link.proof = proof;
       link.cover = std::move(covers[i]);
       complete_cover(link, true);
     }

@@ -143,6 +143,9 @@ TEST_F(Mistakes, InNamesAndExclusions) {
                 {"3: exclude: 3 is not a quoted string"});
   expect_faults("[[assets]]\nmesh = \"meshes/*.obj\"\n",
                 {"1: unknown 'assets': did you mean 'asset'?"});
+  // Letters in each other's places.
+  expect_faults("[[asset]]\nmesh = \"meshes/*.obj\"\nmehs = 3\n",
+                {"3: unknown key 'mehs': did you mean 'mesh'?"});
 }
 
 TEST_F(Mistakes, AnExclusionOfNothingIsAWarning) {

@@ -291,7 +291,9 @@ TEST(CoverSpheres, ProtrudeLessWhereThereIsLessRoom) {
   const SphereCover even = cover_with_spheres(mesh, settings);
   EXPECT_GT(protrusion_above(3.8, even, box), 0.07);
   const double least = 0.03;
-  const auto room = [&](const Vector3d& place, const Vector3d&) { return place.x() > 3.5 ? least : 0.1; };
+  const auto room = [&](const Vector3d& place, const Vector3d&) {
+    return place.x() > 3.5 ? least : 0.1;
+  };
   settings.room = {room};
   const SphereCover cover = cover_with_spheres(mesh, settings);
   EXPECT_TRUE(prove_cover(mesh, cover.spheres).covered);
