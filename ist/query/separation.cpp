@@ -199,7 +199,8 @@ bool is_seen_within(const SphereTree& tree, const Eigen::Vector3d& point, double
     std::uint32_t block;
     float depth;
   };
-  Waiting stack[kWidth * (kMaxLevels + 1)] = {{tree.top, 0, 0}};
+  Waiting stack[kWidth * (kMaxLevels + 1)];  // to fill it would take as long as all else
+  stack[0] = {tree.top, 0, 0};
   std::size_t size = 1;
   for (int visit = 0; visit < kMostVisits && size > 0; ++visit) {
     const auto [level, block, depth] = stack[--size];
@@ -243,6 +244,9 @@ class InnerSpheres {
             pose.rounding_of_world()),
         pose_(pose) {}
 
+  const SphereTree a, b;
+  const double off;  ///< what rounding may move a point by; A's unit frame
+
   /// Whether spheres of both are seen to hold a point of A's unit frame: then the solids overlap.
   bool share(const Eigen::Vector3d& point) const {
     if (!is_seen_within(a, point, off)) return false;
@@ -251,8 +255,18 @@ class InnerSpheres {
     return is_seen_within(b, vector(in_b), off / pose_.a_from_b.scale);
   }
 
-  /// The middle of what the balls around them share.
-  Eigen::Vector3d likely_point() const {
+  /// Whether the middle of what the balls around them share is seen to be in both: of solids that
+  /// fill these balls it mostly is.
+  bool share_the_middle() const {
+    constexpr double kFull = 0.25;
+    const auto is_full = [](const SphereTree& tree) {
+      return tree.sums(tree.top, 0).volume > kFull * ball_volume(tree.root().r);
+    };
+    return is_full(a) && is_full(b) && share(middle_of_balls());
+  }
+
+ private:
+  Eigen::Vector3d middle_of_balls() const {
     const RootBall root_a = a.root(), root_b = b.root();
     double moved[3];
     pose_.a_from_b.apply(root_b.centre, moved);
@@ -263,10 +277,6 @@ class InnerSpheres {
     return centre + (low + high) / (2 * length) * between;
   }
 
-  const SphereTree a, b;
-  const double off;  ///< what rounding may move a point by; A's unit frame
-
- private:
   const RelativePose& pose_;
 };
 
@@ -315,7 +325,7 @@ class SurfaceGap {
   /// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
   void ask_spheres() {
     const InnerSpheres spheres(a_, b_, pose_);
-    overlap_ = spheres.share(spheres.likely_point());
+    overlap_ = spheres.share_the_middle();
     if (overlap_) return;
     GapDescent descent(spheres.a, spheres.b, pose_,
                        std::min(kGlance, visit_limit(settings_.max_visits)), question_.most, false,
