@@ -25,7 +25,8 @@ struct CoverSphere {
 inline constexpr std::size_t kMostCoverSpheres = 4096;
 
 /// How far spheres may protrude from a place of a mesh's surface outward, such as where another
-/// link of a robot passes close by: [u] above 0. `outward`: unit, or zero for the least of any way.
+/// link of a robot passes close by: [u] above 0. `outward`: unit, or zero for the least in any
+/// direction.
 /// Called from many threads at once.
 using ProtrusionRoom =
     std::function<double(const Eigen::Vector3d& place, const Eigen::Vector3d& outward)>;
@@ -42,8 +43,9 @@ struct SphereCoverSettings {
   /// [u] ≥ 0. 0: `count` spheres that protrude as little as possible. Else: the fewest spheres
   /// found that protrude by no more.
   double max_protrusion = 0;
-  /// With max_protrusion: where spheres are to protrude less than that, a wish that is never
-  /// proven; about as few spheres as do are looked for. Empty, or one per mesh, which may be null.
+  /// With max_protrusion: places where spheres should protrude by less. This guides the search, for
+  /// about as few spheres as will do, and is never proven. Empty, or one per mesh, which may be
+  /// null.
   std::vector<ProtrusionRoom> room = {};
   std::uint64_t seed = 0;  ///< of the search; any value works equally well
   unsigned threads = 0;    ///< 0 = all cores; never changes the result

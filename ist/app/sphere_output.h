@@ -24,8 +24,7 @@ struct SphereLink {
   SphereCoverProof proof;
 };
 
-/// Two links that are in the way of few false collisions: their solids come so close that it takes
-/// many spheres to tell.
+/// Two links whose solids come so close that only many spheres would keep them apart.
 struct ClosePair {
   std::string a, b;
   double gap;           ///< [u] in which both protrude, where a tenth of the free poses is given up

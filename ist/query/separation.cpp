@@ -390,8 +390,8 @@ bool spheres_share(const PlacedAsset& a, const PlacedAsset& b, const Penetration
   const Eigen::Vector3d middle =
       pose->rotation().transpose() * (found.centroid - vector(pose->origin_a)) / pose->unit_a;
   if (spheres.share(middle)) return true;
-  // Of an overlap in parts the middle may lie beside them: on its sides are 70 of 100 of the rows
-  // of an elephant and a dino that overlap by 0.01 to 10 %, in the middle 39.
+  // The middle of an overlap in parts may lie beside them, and between spheres that are small near
+  // the surface: points on its sides are in spheres of both about as often again.
   constexpr double kAside = 0.4;
   const Eigen::Vector3d push = pose->rotation().transpose() * found.force;
   if (!(push.squaredNorm() > 0)) return false;

@@ -383,6 +383,14 @@ struct Scene::Impl {
     pass(~std::uint64_t{0});
   }
 
+  /// visit(index) of bodies without a box, and of those whose boxes enter(box) lets in.
+  template <class Enter, class Visit>
+  void each_body(const Enter& enter, const Visit& visit) const noexcept {
+    for (const std::uint32_t i : endless) visit(i);
+    still.each(enter, visit);
+    moving.each(enter, visit);
+  }
+
   SceneSettings settings;
   std::array<SceneRule, kSceneGroups * kSceneGroups> rules;
   BoxWidths widths = {.by_spheres = true};  ///< as the rules need

@@ -37,9 +37,7 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
     best = {body.given.number, hit};
     longest = hit.distance;
   };
-  for (const std::uint32_t i : impl_->endless) visit(i);
-  impl_->still.each(enter, visit);
-  impl_->moving.each(enter, visit);
+  impl_->each_body(enter, visit);
   return best;
 }
 
@@ -65,9 +63,7 @@ SceneNearest Scene::nearest(const Eigen::Vector3d& point,
     best = {body.given.number, here};
     farthest = here.distance;
   };
-  for (const std::uint32_t i : impl_->endless) visit(i);
-  impl_->still.each(enter, visit);
-  impl_->moving.each(enter, visit);
+  impl_->each_body(enter, visit);
   return best;
 }
 

@@ -48,8 +48,9 @@ double expected_crossings(const MeshView& mesh, const LineLattice& lattice) {
   double doubled = 0;
   for (std::uint32_t triangle = 0; triangle < mesh.triangle_count; ++triangle) {
     const Corners t = corners_of(mesh, triangle);
-    doubled += std::abs((t.p[1][1] - t.p[0][1]) * (t.p[2][2] - t.p[0][2]) -
-                        (t.p[1][2] - t.p[0][2]) * (t.p[2][1] - t.p[0][1]));
+    double normal[3];
+    area_normal(t.p[0], t.p[1], t.p[2], normal);
+    doubled += std::abs(normal[0]);
   }
   return doubled / 2 / (lattice.step_y * lattice.step_z);
 }

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -109,12 +110,20 @@ TEST(Query, TellsTheSeparation) {
   for (const std::size_t n : {2u, 17u, 300u}) {
     const Asset a = make_random_asset({n, 0.2, {}, 0}, 22);
     const Asset b = make_random_asset({n, 0.05, {0.3, 0, 0}, 3}, 23);
-    for (int i = 0; i < 300; ++i) {
+    for (int i = 0; i < 600; ++i) {
       const double far = i % 3 == 0 ? 1e3 : 0;
       PlacedAsset pa{a.view(), random_pose(random, far), 1.0};
       PlacedAsset pb{b.view(), random_pose(random, 0.3), 0.11};
-      for (int k = 0; k < 3; ++k) pb.pose.t[k] += pa.pose.t[k];
-      pb.pose.t[0] += 1.0 + 0.004 * i;
+      if (i % 2 == 0) {
+        for (int k = 0; k < 3; ++k) pb.pose.t[k] += pa.pose.t[k];
+        pb.pose.t[0] += 1.0 + 0.002 * i;
+      } else {  // copies, in place and moved along an axis, turned by right angles
+        pb = pa;
+        const double turn[4][4] = {{1, 0, 0, 0}, {1, 1, 0, 0}, {0, 0, 1, 0}, {1, 0, 0, -1}};
+        std::copy_n(turn[i / 2 % 4], 4, pa.pose.q);
+        std::copy_n(turn[i / 8 % 4], 4, pb.pose.q);
+        pb.pose.t[i / 2 % 3] += 0.125 * (i / 32);
+      }
       const PenetrationAndSeparation both = query(pa, pb, {}, workspace);
       const Separation alone = separation(pa, pb, {}, workspace);
       EXPECT_EQ(both.separation.distance, alone.distance);

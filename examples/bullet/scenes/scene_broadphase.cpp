@@ -22,12 +22,14 @@ ist::Pose pose_of(const btCollisionObject& object) {
   return to_pose(part != nullptr ? body * part->mesh_in_body() : body);
 }
 
-/// A shape of Bullet's is its plane, or the box around it.
+/// A shape of Bullet's is its plane, or the box around it. Throws for one that moves.
 ist::PlacedSolid solid_of(const btCollisionObject& object, const btVector3& lower,
                           const btVector3& upper) {
   const btCollisionShape* const shape = object.getCollisionShape();
   if (const auto* const part = dynamic_cast<const ist::bullet::Shape*>(shape))
     return {part->tree(), pose_of(object), part->scale()};
+  if (!object.isStaticObject())
+    throw std::invalid_argument("SceneBroadphase: a body that moves must be an ist::bullet::Shape");
   if (const auto* const plane = dynamic_cast<const btStaticPlaneShape*>(shape))
     return {ist::HalfSpaceShape{to_eigen(plane->getPlaneNormal()), plane->getPlaneConstant()},
             pose_of(object)};

@@ -25,7 +25,7 @@ const kNames = {
   'timeOfImpact()': [...kLimits, 'motionA', 'motionB', 'duration', 'tolerance'],
   'Scene()': ['maxBodies', 'maxPairs'],
   'Scene.add()': ['number', 'moves', 'group', 'layers', 'meets'],
-  'Scene.setRule()': ['answer', 'margin', ...kContact.slice(3).filter((name) => name !== 'pairId'), 'maxVisits'],
+  'Scene.setRule()': ['answer', 'margin', ...kContact.filter((name) => !['poseA', 'into', 'pairId'].includes(name))],
   'Scene.step()': ['into'],
   'Scene.raycast()': ['maxDistance', 'into'],
   'Scene.nearest()': ['maxDistance', 'into'],

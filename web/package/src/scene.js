@@ -59,7 +59,7 @@ export class Scene {
   }
 
   add(given, pose, options) {
-    const wasm = functions('Scene.add()'), at = solid(given, '', 'Scene.add()');
+    const wasm = functions('Scene.add()'), at = solid(given, 'A', 'Scene.add()');
     checkOptions('Scene.add()', options);
     writePose(0, pose, 'pose');
     let number = count(options?.number, -1, 'number');
