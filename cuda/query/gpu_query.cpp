@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
+#include "cuda/base/queue.h"
 #include "cuda/query/kernels.h"
 #include "cuda/query/make_solid_ref.h"
-#include "cuda/queue.h"
 
 namespace ist {
 
