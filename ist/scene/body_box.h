@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
+#include "query/solid_box.h"
 #include "scene/box_tree.h"
 
 namespace ist {
@@ -30,9 +30,7 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-SceneBox box_around(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) noexcept;
-
-/// What of a solid's box does not change with its pose.
+/// What of a body's box does not change with its pose.
 class BodyBox {
  public:
   BodyBox() = default;
@@ -42,16 +40,9 @@ class BodyBox {
   PlacedBox placed(const Pose& pose, const BoxWidths& widths, const Motion& motion) const noexcept;
 
  private:
-  struct Turned {
-    Eigen::Vector3d middle, half;
-  };
-  static std::optional<Turned> of(const Shape& field) noexcept;
-
-  std::optional<Turned> box_;  ///< in the solid's own frame, scaled; none: it has no end
+  SolidBox box_;  ///< scaled
   double scale_ = 1;
-  double sticks_out_ = 0;  ///< [u]
-  double tolerance_ = 0;   ///< [u] at least this body's share of an impact's
-  bool empty_ = false;
+  double tolerance_ = 0;  ///< [u] at least this body's share of an impact's
 };
 
 }  // namespace ist
