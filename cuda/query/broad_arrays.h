@@ -3,11 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu_scene.h>
+#include <ist/types.h>
 
 #include "cuda/query/parts.h"
 #include "numerics/bits.h"
-#include "query/solid_box.h"
+#include "query/base/solid_box.h"
 
 namespace ist::gpu {
 
@@ -54,10 +54,10 @@ struct BroadArrays {
   int key_bits;    ///< of a place on the curve: the world first
   int index_bits;  ///< of a body's index
 
-  std::uint64_t *keys, *sorted_keys;   ///< [count]
-  std::uint32_t *indices, *order;      ///< [count] 0, 1, …; sorted by keys
-  BroadBox* placed;                    ///< [count] by index
-  BroadBox* boxes[kMostLevels + 1];    ///< by level, whole nodes' worth
+  std::uint64_t *keys, *sorted_keys;      ///< [count]
+  std::uint32_t *indices, *order;         ///< [count] 0, 1, …; sorted by keys
+  BroadBox* placed;                       ///< [count] by index
+  BroadBox* boxes[kMostLevels + 1];       ///< by level, whole nodes' worth
   std::uint32_t* still[kMostLevels + 1];  ///< by node: bit k: child k has bodies that do not move
   std::uint32_t nodes[kMostLevels + 1];   ///< by level; of level 0: bodies
   int top;                                ///< the level of one node

@@ -44,8 +44,8 @@ __global__ void __launch_bounds__(kThreads) write_pairs(const BroadArrays scene)
 cudaError_t sort_bodies(const BroadArrays& scene, void* scratch, std::size_t& bytes,
                         cudaStream_t stream) {
   return cub::DeviceRadixSort::SortPairs(scratch, bytes, scene.keys, scene.sorted_keys,
-                                         scene.indices, scene.order, scene.count, 0,
-                                         scene.key_bits, stream);
+                                         scene.indices, scene.order, scene.count, 0, scene.key_bits,
+                                         stream);
 }
 cudaError_t sort_found(const BroadArrays& scene, void* scratch, std::size_t& bytes,
                        cudaStream_t stream) {

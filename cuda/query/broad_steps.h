@@ -139,10 +139,9 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
     const std::uint32_t stills = scene.still[level][j];
     const bool is_still = (stills >> team.lane() & 1) != 0;
     // Of bodies that stand before these on the curve the ones that do not move alone.
-    const bool wanted =
-        child < scene.nodes[level - 1] &&
-        (is_still || (std::uint64_t{child} + 1) << 5 * (level - 1) > first) &&
-        all.meets(scene.boxes[level - 1][child]);
+    const bool wanted = child < scene.nodes[level - 1] &&
+                        (is_still || (std::uint64_t{child} + 1) << 5 * (level - 1) > first) &&
+                        all.meets(scene.boxes[level - 1][child]);
     if (level > 1) {
       int total = 0;
       const int before = team.exclusive_count(wanted, total);

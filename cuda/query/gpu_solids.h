@@ -10,7 +10,7 @@
 #include "cuda/query/field_batch.h"
 #include "cuda/query/solid_ref.h"
 #include "cuda/queue.h"
-#include "query/solid_box.h"
+#include "query/find_solid_box.h"
 
 namespace ist {
 

@@ -49,8 +49,8 @@ inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
     box.scale(body.scale);
     const double wider =
         settings.margin / 2 + (settings.measure == Measure::matched ? box.protrusion : 0);
-    scene.bodies.push_back({box, wider, body.scale, body.world, body.solid, body.layers, body.meets,
-                            body.moves});
+    scene.bodies.push_back(
+        {box, wider, body.scale, body.world, body.solid, body.layers, body.meets, body.moves});
     worlds = std::max(worlds, body.world + 1);
     const double size = norm(box.half) + wider;
     if (size > 0 && std::isfinite(size)) {

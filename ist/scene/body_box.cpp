@@ -25,8 +25,8 @@ PlacedBox BodyBox::placed(const Pose& pose, const BoxWidths& widths,
   const Rotation rotation = Rotation::of(pose.q);
   if (!usable(rotation, pose.t, scale_) || box_.empty) return {};
   if (box_.endless) return {Place::endless};
-  const double wider = widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
-                       (widths.by_size ? tolerance_ : 0);
+  const double wider =
+      widths.margin + (widths.by_spheres ? box_.protrusion : 0) + (widths.by_size ? tolerance_ : 0);
   WorldBox box = box_.placed(rotation, pose.t, wider);
   if (widths.duration > 0) {
     if (!motion.velocity.allFinite() || !motion.angular_velocity.allFinite() ||

@@ -5,7 +5,7 @@
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
-#include "query/solid_box.h"
+#include "query/find_solid_box.h"
 #include "scene/box_tree.h"
 
 namespace ist {

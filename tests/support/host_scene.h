@@ -10,7 +10,8 @@
 
 #include "cuda/query/broad_steps.h"
 #include "cuda/query/make_broad_scene.h"
-#include "support/host_team.h"
+#include "query/find_solid_box.h"
+#include "support/fiber_team.h"
 
 namespace ist::testing {
 
@@ -38,9 +39,8 @@ class HostScene {
     all.poses = poses.data();
     for (std::uint32_t i = 0; i < all.count; ++i) gpu::place_body(all, i);
     std::copy_n(all.indices, all.count, all.order);
-    std::stable_sort(all.order, all.order + all.count, [&](std::uint32_t i, std::uint32_t j) {
-      return all.keys[i] < all.keys[j];
-    });
+    std::stable_sort(all.order, all.order + all.count,
+                     [&](std::uint32_t i, std::uint32_t j) { return all.keys[i] < all.keys[j]; });
     for (int level = 1; level <= all.top; ++level)
       for (std::uint32_t j = 0; j < all.nodes[level]; ++j)
         by_fibers(seed, [&](const auto& team) { gpu::fit_node(team, all, level, j); });

@@ -41,8 +41,8 @@ struct RandomScene {
     }
     move(side);
     for (std::size_t k = 0; k < count / 4; ++k)
-      excluded.push_back({static_cast<std::uint32_t>(below(count)),
-                          static_cast<std::uint32_t>(below(count))});
+      excluded.push_back(
+          {static_cast<std::uint32_t>(below(count)), static_cast<std::uint32_t>(below(count))});
     settings.max_pairs = 64 * count;
     settings.margin = below(2) == 0 ? 0 : 0.25;
     settings.measure = below(2) == 0 ? Measure::matched : Measure::exact;

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <ist/asset.h>
-#include <ist/shapes.h>
-
 #include "query/base/pair_place.h"
 
 // Boxes around placed solids, for broad phases on the CPU and on the GPU.
@@ -12,7 +9,7 @@ namespace ist {
 /// A float that is lower, by more than what doubles round.
 IST_HD inline float float_below(double x) noexcept {
   const auto nearest = static_cast<float>(x);
-  return nearest - std::fabs(nearest) * 1.2e-7f - 1e-37f;
+  return nearest - (nearest < 0 ? -nearest : nearest) * 1.2e-7f - 1e-37f;
 }
 
 /// A box along the world's axes [u].
@@ -42,7 +39,7 @@ struct SolidBox {
   Vec3 middle = {0, 0, 0}, half = {0, 0, 0};  ///< [u]
   double protrusion = 0;                      ///< [u] of matched spheres out of the solid
   double mesh_error = 0;                      ///< [u]
-  bool endless = false;  ///< there is no box
+  bool endless = false;                       ///< there is no box
   bool is_shape = false;
   bool empty = false;
 
@@ -58,13 +55,10 @@ struct SolidBox {
     double m[9];
     rotation.matrix(m);
     const Vec3 at = turned(m, middle) + vec3(t);
-    for (double& x : m) x = std::fabs(x);
+    for (double& x : m) x = x < 0 ? -x : x;
     const Vec3 reach = turned(m, half) + Vec3{wider, wider, wider};
     return {at - reach, at + reach};
   }
 };
-
-SolidBox solid_box(const AssetView& asset) noexcept;
-SolidBox solid_box(const Shape& shape) noexcept;
 
 }  // namespace ist

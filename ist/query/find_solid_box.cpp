@@ -1,4 +1,4 @@
-#include "query/solid_box.h"
+#include "query/find_solid_box.h"
 
 #include <ist/mass_properties.h>
 
@@ -10,8 +10,13 @@ namespace ist {
 
 SolidBox solid_box(const AssetView& asset) noexcept {
   const Bounds own = bounds(asset);
-  return {plain((own.lower + own.upper) / 2), plain((own.upper - own.lower) / 2),
-          asset.protrusion(), asset.mesh_error(), false, false, asset.empty()};
+  return {plain((own.lower + own.upper) / 2),
+          plain((own.upper - own.lower) / 2),
+          asset.protrusion(),
+          asset.mesh_error(),
+          false,
+          false,
+          asset.empty()};
 }
 
 SolidBox solid_box(const Shape& shape) noexcept {
