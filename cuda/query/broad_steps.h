@@ -110,6 +110,18 @@ struct BroadMemory {
   } waiting[kFan * kMostLevels];
 };
 
+template <class Team>
+IST_HD BroadBox broadcast(const Team& team, const BroadBox& box, int from) {
+  BroadBox out;
+  for (int k = 0; k < 3; ++k) {
+    out.low[k] = team.broadcast(box.low[k], from);
+    out.high[k] = team.broadcast(box.high[k], from);
+  }
+  out.first_world = team.broadcast(box.first_world, from);
+  out.last_world = team.broadcast(box.last_world, from);
+  return out;
+}
+
 /// Finds the pairs of the bodies that move of node g of level 1: with all that do not move, and
 /// with those that stand after them on the curve.
 template <class Team>
@@ -137,23 +149,24 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
     team.sync();
     const std::uint32_t child = kFan * j + static_cast<std::uint32_t>(team.lane());
     const std::uint32_t stills = scene.still[level][j];
+    const BroadBox box =
+        child < scene.nodes[level - 1] ? scene.boxes[level - 1][child] : BroadBox::none();
+    // Of what stands before these bodies on the curve only what does not move.
     const bool is_still = (stills >> team.lane() & 1) != 0;
-    // Of bodies that stand before these on the curve the ones that do not move alone.
-    const bool wanted = child < scene.nodes[level - 1] &&
-                        (is_still || (std::uint64_t{child} + 1) << 5 * (level - 1) > first) &&
-                        all.meets(scene.boxes[level - 1][child]);
-    if (level > 1) {
-      int total = 0;
-      const int before = team.exclusive_count(wanted, total);
-      if (wanted) memory.waiting[waiting + before] = {level - 1, child};
-      waiting += total;
-      continue;
-    }
-    for (std::uint32_t left = team.ballot(wanted); left != 0; left &= left - 1) {
-      const auto lane = static_cast<std::uint32_t>(lowest_bit(left));
-      const std::uint32_t other = kFan * j + lane;
-      const bool other_moves = (stills >> lane & 1) == 0;
-      bool meets = mine.meets(scene.boxes[0][other]) && (!other_moves || me < other);
+    const bool behind = (std::uint64_t{child} + 1) << 5 * (level - 1) > first;
+    for (std::uint32_t left = team.ballot((is_still || behind) && all.meets(box)); left != 0;
+         left &= left - 1) {
+      const int lane = lowest_bit(left);
+      const std::uint32_t other = kFan * j + static_cast<std::uint32_t>(lane);
+      bool meets = mine.meets(broadcast(team, box, lane));
+      if (level > 1) {
+        // (all these bodies together may lie far apart)
+        if (!team.any(meets)) continue;
+        if (team.lane() == 0) memory.waiting[waiting] = {level - 1, other};
+        ++waiting;
+        continue;
+      }
+      meets = meets && ((stills >> lane & 1) != 0 || me < other);
       if (!team.any(meets)) continue;
       const std::uint32_t partner = scene.order[other];
       meets = meets && may_meet(scene, body, partner);

@@ -83,6 +83,7 @@ TEST_F(GpuSceneTest, AGraphAsksThePairsThatAStepFinds) {
   RandomScene random(any, 3'200, 100, 77);
   random.settings.max_pairs = kPairs;
   random.settings.measure = Measure::exact;
+  random.settings.excluded = random.excluded;
   GpuScene scene(solids, random.bodies, random.settings);
   GpuWorkspace workspace(kPairs);
   const OnDevice<double> volume(kPairs);
