@@ -33,6 +33,8 @@ class HostScene {
     for (std::uint32_t i = 0; i < arrays.count; ++i) arrays.indices[i] = i;
   }
 
+  GpuScenePairs pairs() const { return gpu::pairs_of(scene_.arrays); }
+
   /// `seed` > 0: of the order of lanes.
   GpuScenePairs find_pairs(const std::vector<Pose>& poses, unsigned seed) {
     gpu::BroadArrays& all = scene_.arrays;
