@@ -9,8 +9,8 @@
 #include <ist/query.h>
 
 #include "mesh/mesh_solid.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/oracle_rows.h"
 #include "timing.h"
 

@@ -22,8 +22,8 @@
 #include <ist/gpu.h>
 #include <ist/mesh.h>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/shared_data.h"
 
 namespace {

@@ -16,7 +16,7 @@
 
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/tree_builder.h"
-#include "bake/kept_mesh.h"
+#include "bake/mesh/kept_mesh.h"
 #include "packing/cover/cover.h"
 #include "report.h"
 #include "support/on_host.h"

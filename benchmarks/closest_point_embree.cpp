@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/closest_point.h"
+#include "mesh/geometry/closest_point.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
 #include "support/shared_data.h"

@@ -16,8 +16,8 @@
 #include <tuple>
 #include <vector>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/oracle_assets.h"
 #include "timing.h"
 

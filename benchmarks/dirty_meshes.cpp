@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/shared_data.h"
 
 namespace {

@@ -19,8 +19,8 @@
 #include <memory>
 #include <numbers>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"
 #include "support/shared_data.h"

@@ -12,8 +12,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/oracle_rows.h"
 #include "support/shared_data.h"
 #include "timing.h"

@@ -25,8 +25,8 @@
 #include <numbers>
 
 #include "manifold_mesh.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/bullet_mesh.h"
 #include "support/fcl_mesh.h"
 #include "support/oracle_rows.h"

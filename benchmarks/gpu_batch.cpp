@@ -10,11 +10,11 @@
 
 #include <ist/gpu_query.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "gpu_batch_on_cpu.h"
 #include "gpu_batch_scenes.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/device_patches.h"
 #include "support/device_separations.h"
 #include "timing.h"

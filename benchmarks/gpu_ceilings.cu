@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "report.h"
 
 namespace {

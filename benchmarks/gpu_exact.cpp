@@ -12,10 +12,10 @@
 #include <ist/gpu_query.h>
 #include <ist/query_tbb.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "gpu_batch_scenes.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/device_batch.h"
 #include "support/mated_rows.h"
 #include "timing.h"

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "cuda/device_mesh.h"
+#include "cuda/packing/mesh/device_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
 #include "support/gpu_mesh_queries.h"

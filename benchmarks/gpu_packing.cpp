@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "cuda/banded/banded_pack.h"
-#include "cuda/device_mesh.h"
+#include "cuda/packing/banded/banded_pack.h"
+#include "cuda/packing/mesh/device_mesh.h"
 #include "fingerprint.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"

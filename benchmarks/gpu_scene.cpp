@@ -18,9 +18,9 @@
 #include <ist/gpu_scene.h>
 #include <ist/mass_properties.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "report.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/device_batch.h"
 #include "timing.h"
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "cuda/queue.h"
+#include "cuda/base/queue.h"
 #include "mesh/mesh_solid.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/grid_history.h"
 #include "support/shared_data.h"
 #include "timing.h"

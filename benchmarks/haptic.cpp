@@ -13,8 +13,8 @@
 
 #include <ist/bake.h>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/baked.h"
 #include "support/shared_data.h"
 

@@ -8,8 +8,8 @@
 #include <ist/bake.h>
 #include <ist/deadline.h>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/nut_on_bolt.h"
 #include "support/ring_in_knot.h"
 #include "timing.h"

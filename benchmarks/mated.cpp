@@ -18,8 +18,8 @@
 #include <vector>
 
 #include "manifold_mesh.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/mated_rows.h"
 #include "timing.h"
 

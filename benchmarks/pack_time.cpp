@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "fingerprint.h"
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/shared_data.h"
 
 namespace {

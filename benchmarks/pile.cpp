@@ -14,8 +14,8 @@
 #include <vector>
 
 #include <ist/mass_properties.h>
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "timing.h"
 
 namespace {

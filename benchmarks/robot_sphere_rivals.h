@@ -12,10 +12,10 @@
 #include "bake/backend/make_backend.h"
 #include "mesh/mesh_solid.h"
 #include "packing/cover/cover.h"
-#include "spheres/cover_proof.h"
-#include "spheres/cover_search.h"
-#include "spheres/offset_surface.h"
-#include "spheres/sampled_solid.h"
+#include "robots/covers/cover_proof.h"
+#include "robots/covers/cover_search.h"
+#include "robots/covers/offset_surface.h"
+#include "robots/covers/sampled_solid.h"
 
 // Simpler ways to a few spheres around a solid, unit frame. All are made just so much larger that
 // the same proof succeeds.

@@ -7,8 +7,8 @@
 #include <ist/types.h>
 
 #include "report.h"
-#include "robot/link_mesh.h"
 #include "robot_sphere_rivals.h"
+#include "robots/description/link_mesh.h"
 #include "support/shared_data.h"
 #include "timing.h"
 

@@ -12,7 +12,7 @@
 #include <ist/types.h>
 
 #include "report.h"
-#include "robot/link_mesh.h"
+#include "robots/description/link_mesh.h"
 
 // Spheres that a planner ships for a robot beside as many of ours: what of the links' surface they
 // leave uncovered, and how far they protrude.

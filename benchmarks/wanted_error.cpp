@@ -12,7 +12,7 @@
 
 #include <ist/query.h>
 
-#include "query/detail/wanted_error.h"
+#include "query/lod/wanted_error.h"
 #include "report.h"
 #include "support/turns.h"
 #include "timing.h"

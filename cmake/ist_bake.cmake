@@ -1,6 +1,5 @@
 # ist::ist is all of it: import, solid, packing, calibration, trees, assets, queries.
 find_package(assimp QUIET)
-find_package(TBB QUIET)
 find_path(NLOHMANN_JSON_INCLUDE_DIR nlohmann/json.hpp)  # header only
 find_path(IST_BOOST_INCLUDE_DIR boost/multiprecision/cpp_int.hpp)  # header only
 if(NOT assimp_FOUND OR NOT TBB_FOUND OR NOT NLOHMANN_JSON_INCLUDE_DIR OR NOT IST_BOOST_INCLUDE_DIR)
@@ -14,7 +13,7 @@ include(cmake/ist_openvdb.cmake)
 
 add_subdirectory(src)
 add_subdirectory(ist/bake)
-add_subdirectory(ist/spheres)
+add_subdirectory(ist/robots)
 
 get_property(objects GLOBAL PROPERTY IST_ROOM_OBJECTS)
 ist_add_library(ist ist ${objects})

@@ -2,12 +2,12 @@
 
 #include <cstdint>
 
+#include "base/bits.h"
+#include "base/host_device.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
 #include "cuda/query/seen_triangles.h"
-#include "numerics/bits.h"
-#include "numerics/host_device.h"
 
 // Balls of leaf blocks tested against triangles, by one team. Those that no triangle meets are
 // inside or outside as a whole, and summed; the others are held, with what may meet them, for

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "base/host_device.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/answers.h"
 #include "cuda/query/batch_arrays.h"
-#include "numerics/host_device.h"
-#include "query/detail/coincidence.h"
+#include "query/lod/coincidence.h"
 
 // A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
 // threads on the host. An answer depends on its pair and on how finely the batch is cut up

@@ -5,8 +5,8 @@
 
 #include <ist/types.h>
 
+#include "base/bits.h"
 #include "cuda/query/parts.h"
-#include "numerics/bits.h"
 #include "query/base/solid_box.h"
 
 namespace ist::gpu {

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "cuda/check.h"
-#include "cuda/launch.h"
+#include "cuda/base/check.h"
+#include "cuda/base/launch.h"
+#include "cuda/base/warp_team.h"
 #include "cuda/query/broad_steps.h"
-#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 namespace {

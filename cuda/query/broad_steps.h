@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/broad_arrays.h"
 
 // The steps of a scene's broad phase, for warps and for teams of 32 on the host: bodies are placed,

@@ -4,9 +4,9 @@
 
 #include <cstdint>
 
-#include "cuda/atomics.h"
-#include "cuda/check.h"
-#include "cuda/warp_team.h"
+#include "cuda/base/atomics.h"
+#include "cuda/base/check.h"
+#include "cuda/base/warp_team.h"
 
 namespace ist::gpu {
 

@@ -5,8 +5,8 @@
 
 #include <ist/asset_layout.h>
 
+#include "base/host_device.h"
 #include "cuda/query/tree_ref.h"
-#include "numerics/host_device.h"
 
 namespace ist::gpu {
 

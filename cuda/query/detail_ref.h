@@ -4,7 +4,7 @@
 
 #include "cuda/query/part_sums.h"
 #include "cuda/query/tree_ref.h"
-#include "query/detail/detail_pair.h"
+#include "query/lod/level_pair.h"
 
 namespace ist::gpu {
 

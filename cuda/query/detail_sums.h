@@ -3,15 +3,15 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/detail_ref.h"
-#include "numerics/host_device.h"
 #include "query/base/pair_place.h"
-#include "query/detail/coincidence.h"
-#include "query/detail/detail_chain.h"
+#include "query/lod/coincidence.h"
+#include "query/lod/level_chain.h"
 
 // Pairs of trees that are asked at several levels of detail: under a pair budget, and copies of one
-// asset that all but coincide. blend_details() (query/detail/detail_blend.h) by one team, in
+// asset that all but coincide. blend_details() (query/lod/level_blend.h) by one team, in
 // double, of sums in A's unit frame.
 
 namespace ist::gpu {

@@ -3,14 +3,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "numerics/angle.h"
-#include "numerics/host_device.h"
-#include "numerics/plain.h"
-#include "numerics/vec3.h"
+#include "base/angle.h"
+#include "base/host_device.h"
+#include "base/plain.h"
+#include "base/vec3.h"
 #include "query/asset/shared_constants.h"
 
-// What a triangle does to a ball that meets it: add_patch() (query/probe/patch_sums.h) for one of
-// each, in plain numbers.
+// What a triangle does to a ball that meets it: add_patch() (query/ball_triangle/patch_sums.h) for
+// one of each, in plain numbers.
 
 namespace ist::gpu {
 

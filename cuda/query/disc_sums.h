@@ -2,17 +2,17 @@
 
 #include <cstdint>
 
+#include "base/bits.h"
+#include "base/host_device.h"
 #include "cuda/query/disc_part.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
-#include "numerics/bits.h"
-#include "numerics/host_device.h"
 #include "query/asset/shared_constants.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/probe/patch_sums.h, query/shape/probe_sum.h) have them. What
-// edges cut goes to a list, so that the lanes of a warp are full where the work is.
+// add_patch() and total_of() (query/ball_triangle/patch_sums.h, query/shape/probe_sum.h) have them.
+// What edges cut goes to a list, so that the lanes of a warp are full where the work is.
 
 namespace ist::gpu {
 
@@ -169,7 +169,7 @@ class DiscSums {
   }
 
   /// Cones, angle and side of a ball whose centre lies on an edge, from beside it: put_right()
-  /// (query/probe/patch_sums.h).
+  /// (query/ball_triangle/patch_sums.h).
   IST_HD_COLD static void put_right(const Team team, DiscMemory<Id>& m, const Source source,
                                     int ball) {
     const double r = m.r[ball];

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/exact_pair.h"
 

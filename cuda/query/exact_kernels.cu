@@ -1,11 +1,11 @@
 #include <algorithm>
 
-#include "cuda/check.h"
-#include "cuda/launch.h"
+#include "cuda/base/check.h"
+#include "cuda/base/launch.h"
+#include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/exact_steps.h"
 #include "cuda/query/kernels.h"
-#include "cuda/warp_team.h"
 
 namespace ist::gpu {
 namespace {

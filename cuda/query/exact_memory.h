@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/bits.h"
 #include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_pair.h"
-#include "numerics/bits.h"
 #include "query/base/pair_place.h"
 #include "query/exact/block_insides.h"
 #include "query/exact/box_integrals.h"

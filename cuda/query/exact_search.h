@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "base/team.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/exact_memory.h"
-#include "numerics/team.h"
 
 namespace ist::gpu {
 

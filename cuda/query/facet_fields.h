@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/ball_tests.h"
 #include "cuda/query/field_walk.h"
-#include "numerics/host_device.h"
 
 // Boxes and terrains: fields whose triangles are made on the spot (query/shape/patch_shapes.h).
 

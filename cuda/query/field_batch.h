@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/field_ref.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/lens_sums.h"
-#include "numerics/host_device.h"
 
 // A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. What is summed is in
 // double. Whichever is A, the field stands first here: the tree is placed as the field sees it.

@@ -1,5 +1,5 @@
-#include "cuda/check.h"
-#include "cuda/launch.h"
+#include "cuda/base/check.h"
+#include "cuda/base/launch.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/field_steps.h"
 #include "cuda/query/kernels.h"

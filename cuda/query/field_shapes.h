@@ -1,7 +1,7 @@
 #pragma once
 
+#include "base/host_device.h"
 #include "cuda/query/field_ref.h"
-#include "numerics/host_device.h"
 
 // Which of a field's shapes (query/shape/plain_shapes.h) a descent looks at.
 

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
+#include "base/team.h"
 #include "cuda/query/field_batch.h"
-#include "numerics/host_device.h"
-#include "numerics/team.h"
 
 // A batch's pairs of a tree and a field, step by step, as batch_steps.h has those of trees; with
 // triangles: triangle_steps.h.

@@ -2,11 +2,11 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/field_shapes.h"
 #include "cuda/query/node_sums.h"
 #include "cuda/query/pair_descent.h"
 #include "cuda/query/part_sums.h"
-#include "numerics/host_device.h"
 
 // A tree gone down against a field that tells how far its surface is: ShapeDescent
 // (query/shape/shape_descent.h) depth first, by one team, two blocks at a time.

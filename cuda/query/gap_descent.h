@@ -3,10 +3,10 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/cover_ref.h"
 #include "cuda/query/gap_totals.h"
 #include "cuda/query/tree_ref.h"
-#include "numerics/host_device.h"
 #include "query/base/pair_place.h"
 #include "query/base/precision.h"
 

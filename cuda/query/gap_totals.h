@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 namespace ist::gpu {
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "cuda/query/gpu_solids.h"
 #include "cuda/query/kernels.h"
 #include "cuda/query/make_solid_ref.h"

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
+#include "cuda/base/queue.h"
 #include "cuda/query/field_batch.h"
 #include "cuda/query/solid_ref.h"
-#include "cuda/queue.h"
 #include "query/find_solid_box.h"
 
 namespace ist {

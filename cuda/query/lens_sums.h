@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 namespace ist::gpu {
 

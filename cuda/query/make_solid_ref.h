@@ -165,7 +165,7 @@ inline double reach_of(const std::vector<FilledBall>& balls, const double* centr
 }
 
 /// The first of the solids that is an asset with these bytes (are_one_asset(),
-/// query/detail/coincident.h).
+/// query/lod/coincident.h).
 inline std::uint32_t first_alike(std::span<const GpuSolid> solids, const AssetHeader& of) {
   for (std::uint32_t k = 0;; ++k) {
     const auto* const tree = std::get_if<AssetView>(&solids[k]);

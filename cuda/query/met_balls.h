@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/part_sums.h"
-#include "numerics/host_device.h"
 
 // What a walk leaves to be summed: balls that triangles meet, each with those that may.
 

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/tree_ref.h"
-#include "numerics/host_device.h"
 
 // What the spheres below each node of a tree add up to: a node that lies in a field as a whole is
 // one look then.

@@ -3,13 +3,13 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/bits.h"
+#include "base/host_device.h"
 #include "cuda/query/pair_memory.h"
 #include "cuda/query/pair_sums.h"
-#include "numerics/bits.h"
-#include "numerics/host_device.h"
 
-// Two trees met by one team: the sum that Descent (query/descent/descent.h) makes level by level,
-// here depth first, so that what waits fits into a team's own memory.
+// Two trees met by one team: the sum that Descent (query/tree_overlap/descent.h) makes level by
+// level, here depth first, so that what waits fits into a team's own memory.
 
 namespace ist::gpu {
 

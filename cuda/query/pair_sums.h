@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/pair_memory.h"
-#include "numerics/host_device.h"
 
 namespace ist::gpu {
 

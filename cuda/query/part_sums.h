@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
+#include "base/plain.h"
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/node_sums.h"
-#include "numerics/plain.h"
 #include "query/base/pair_place.h"
 
 namespace ist::gpu {

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "base/bits.h"
+#include "base/host_device.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/patch_memory.h"
-#include "numerics/bits.h"
-#include "numerics/host_device.h"
 
 namespace ist::gpu {
 

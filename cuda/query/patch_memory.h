@@ -5,11 +5,11 @@
 
 #include <ist/gpu.h>
 
+#include "base/host_device.h"
 #include "cuda/query/answers.h"
 #include "cuda/query/cuts_ref.h"
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/pair_memory.h"
-#include "numerics/host_device.h"
 #include "query/contact/contact_numbers.h"
 
 // Where a team keeps what it needs for a pair's patches.

@@ -2,10 +2,10 @@
 
 #include <cstdint>
 
+#include "base/host_device.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/patch_division.h"
-#include "numerics/host_device.h"
 
 // A batch of contact patches, step by step, as batch_steps.h has penetrations. A pair is one team's
 // from beginning to end.

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "numerics/host_device.h"
-#include "numerics/plain.h"
-#include "numerics/vec3.h"
+#include "base/host_device.h"
+#include "base/plain.h"
+#include "base/vec3.h"
 
 namespace ist::gpu {
 

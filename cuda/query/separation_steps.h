@@ -2,10 +2,10 @@
 
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "base/host_device.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/separation_arrays.h"
-#include "numerics/host_device.h"
 #include "query/base/precision.h"
 
 // A batch of separations, step by step, as batch_steps.h has penetrations.

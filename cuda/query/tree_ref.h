@@ -46,7 +46,7 @@ struct TreeRef {
 };
 
 /// Which side is opened at each step of a descent, from the roots down to leaf blocks or, of much
-/// larger spheres, to single ones: the order of Descent (query/descent/descent.h).
+/// larger spheres, to single ones: the order of Descent (query/tree_overlap/descent.h).
 struct OpeningSteps {
   static constexpr int kMost = 2 * kMaxLevels;
   signed char level_a[kMost + 1], level_b[kMost + 1];  ///< before the step; the last: of the leaves

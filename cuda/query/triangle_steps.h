@@ -2,12 +2,12 @@
 
 #include <cstdint>
 
-#include "cuda/atomics.h"
+#include "base/host_device.h"
+#include "base/team.h"
+#include "cuda/base/atomics.h"
 #include "cuda/query/disc_sums.h"
 #include "cuda/query/facet_fields.h"
 #include "cuda/query/field_batch.h"
-#include "numerics/host_device.h"
-#include "numerics/team.h"
 
 // Trees against triangles: of boxes and terrains. A round takes pairs of a batch through steps of
 // which each fits the instruction cache: they are placed, walks find what meets, that is summed,

@@ -24,7 +24,7 @@
 #include "library/asset_summary.h"
 #include "library/settings/bake_settings.h"
 #include "library/text.h"
-#include "robot/link_mesh.h"
+#include "robots/description/link_mesh.h"
 
 namespace ist::app {
 namespace {

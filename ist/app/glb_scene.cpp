@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "library/text.h"
-#include "samples/shapes.h"
+#include "mesh/samples/shapes.h"
 
 namespace ist::app {
 namespace {

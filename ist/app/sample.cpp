@@ -1,4 +1,4 @@
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 
 #include <fmt/format.h>
 

@@ -15,7 +15,7 @@
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "library/text.h"
-#include "robot/kinematics.h"
+#include "robots/description/kinematics.h"
 
 namespace ist::app {
 namespace {

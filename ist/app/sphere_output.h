@@ -6,7 +6,7 @@
 
 #include <ist/cover_spheres.h>
 
-#include "robot/self_collision.h"
+#include "robots/description/self_collision.h"
 
 namespace ist::app {
 

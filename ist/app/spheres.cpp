@@ -24,8 +24,8 @@
 #include "library/link_solids.h"
 #include "library/settings/spelling.h"
 #include "mesh/import/text_scanner.h"
-#include "robot/group_states.h"
-#include "robot/link_mesh.h"
+#include "robots/description/group_states.h"
+#include "robots/description/link_mesh.h"
 
 namespace ist::app {
 namespace {

@@ -15,16 +15,16 @@
 
 #include <ist/types.h>
 
-#include "bake/aside.h"
+#include "base/aside.h"
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/tree_builder.h"
+#include "base/stage.h"
+#include "base/thread_arena.h"
 #include "packing/base/packing_settings.h"
 #include "packing/calibrate/calibration.h"
 #include "packing/cover/cover.h"
-#include "stage/stage.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

@@ -12,14 +12,14 @@
 
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
-#include "mesh/message_text.h"
-#include "mesh/polygonise.h"
-#include "numerics/hashing.h"
-#include "numerics/roots.h"
+#include "base/hashing.h"
+#include "base/message_text.h"
+#include "base/roots.h"
+#include "base/thread_arena.h"
+#include "mesh/level_set/polygonise.h"
 #include "packing/backend/solid_backend.h"
 #include "packing/base/packing_settings.h"
 #include "packing/cover/cover.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

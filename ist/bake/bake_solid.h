@@ -4,7 +4,7 @@
 #include <ist/bake.h>
 
 #include "bake/asset/asset_writer.h"
-#include "bake/kept_mesh.h"
+#include "bake/mesh/kept_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"
 

@@ -18,9 +18,9 @@
 #include "bake/count_search.h"
 #include "bake/predict/partner_trials.h"
 #include "bake/predict/trial_poses.h"
+#include "base/stage.h"
+#include "base/thread_arena.h"
 #include "packing/base/packing_settings.h"
-#include "stage/stage.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

@@ -9,8 +9,8 @@
 #include <new>
 #include <utility>
 
+#include "c_api/handles.h"
 #include "query/base/hooked_memory.h"
-#include "query/c_api/handles.h"
 
 using namespace ist;
 

@@ -4,8 +4,8 @@
 #include <string>
 
 #include "bake/backend/make_backend.h"
+#include "base/thread_arena.h"
 #include "packing/base/packing_settings.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 

@@ -12,11 +12,11 @@
 #include <ist/bake.h>
 #include <ist/types.h>
 
+#include "base/thread_arena.h"
 #include "clash/sources.h"
 #include "library/input_mesh.h"
 #include "library/settings/numbers.h"
 #include "mesh/import/source_file.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

@@ -19,9 +19,9 @@
 #include <ist/scene.h>
 #include <ist/types.h>
 
+#include "base/thread_arena.h"
 #include "clash/world_mesh.h"
 #include "mesh/import/source_file.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

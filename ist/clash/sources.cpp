@@ -16,8 +16,8 @@
 #include "library/settings/spelling.h"
 #include "mesh/import/source_file.h"
 #include "mesh/mesh_files.h"
-#include "robot/kinematics.h"
-#include "robot/link_mesh.h"
+#include "robots/description/kinematics.h"
+#include "robots/description/link_mesh.h"
 
 namespace ist {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "library/settings/bake_settings.h"
-#include "robot/robot_model.h"
+#include "robots/description/robot_model.h"
 
 namespace ist {
 

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "robot/link_mesh.h"
+#include "robots/description/link_mesh.h"
 
 namespace ist {
 

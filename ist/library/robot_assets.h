@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "library/job.h"
-#include "robot/package_paths.h"
-#include "robot/robot_model.h"
+#include "robots/description/package_paths.h"
+#include "robots/description/robot_model.h"
 
 // Assets of a robot: one for each mesh of its links, and an index that says where they belong.
 

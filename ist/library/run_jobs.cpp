@@ -24,7 +24,7 @@
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
-#include "robot/link_mesh.h"
+#include "robots/description/link_mesh.h"
 
 namespace ist {
 namespace {

@@ -11,13 +11,13 @@
 #include "query/base/turned_over.h"
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
-#include "query/descent/descent.h"
-#include "query/descent/workspace.h"
-#include "query/detail/detail_blend.h"
-#include "query/detail/unlike_sizes.h"
-#include "query/detail/wanted_error.h"
 #include "query/exact_penetration.h"
+#include "query/lod/level_blend.h"
+#include "query/lod/unlike_sizes.h"
+#include "query/lod/wanted_error.h"
+#include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
+#include "query/tree_overlap/descent.h"
 
 namespace ist {
 namespace {
@@ -121,8 +121,9 @@ ContactPatches find_patches(const PlacedAsset& a, const PlacedAsset& b,
   const bool inner = settings.measure == Measure::inner;
   ChosenPart chosen(a, b, *pose, inner, workspace, patches);
   bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
-  result.penetration = blends ? blend_details(a, b, *pose, settings, workspace, &chosen)
-                              : chosen.level(DetailPair(), limits_of(settings));
+  result.penetration =
+      blends ? blend_details(a, b, *pose, settings, workspace, exact_penetration, &chosen)
+             : chosen.level(DetailPair(), limits_of(settings));
   const ExactWeight weight = exact_weight(method, result.penetration, pose->unit3());
   if (weight.most > 0) {
     blends = true;

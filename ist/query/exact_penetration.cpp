@@ -8,10 +8,10 @@
 #include "query/base/no_answer.h"
 #include "query/base/solid_bounds.h"
 #include "query/contact/write_patches.h"
-#include "query/descent/workspace.h"
 #include "query/exact/exact_in_world.h"
 #include "query/exact/exact_octants.h"
 #include "query/exact/kept_mesh.h"
+#include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 
 namespace ist {

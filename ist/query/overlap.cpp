@@ -10,9 +10,9 @@
 #include "query/base/no_answer.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/descent/open_runs.h"
 #include "query/kernel/gap_kernel.h"
 #include "query/solid_queries.h"
+#include "query/tree_overlap/open_runs.h"
 
 namespace ist {
 namespace {

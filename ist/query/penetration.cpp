@@ -1,11 +1,11 @@
 #include <ist/query.h>
 
 #include "query/base/no_answer.h"
-#include "query/detail/coincident.h"
-#include "query/detail/detail_blend.h"
-#include "query/detail/unlike_sizes.h"
-#include "query/detail/wanted_error.h"
 #include "query/exact_penetration.h"
+#include "query/lod/coincident.h"
+#include "query/lod/level_blend.h"
+#include "query/lod/unlike_sizes.h"
+#include "query/lod/wanted_error.h"
 #include "query/solid_queries.h"
 
 namespace ist {
@@ -18,7 +18,7 @@ Penetration by_spheres(const PlacedAsset& a, const PlacedAsset& b,
   const bool inner = settings.measure == Measure::inner;
   if (!inner &&
       (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b)))
-    return blend_details(a, b, pose, settings, workspace);
+    return blend_details(a, b, pose, settings, workspace, exact_penetration);
   return lens_sum(a, inner ? header_a.inner_tree : header_a.matched_tree, b,
                   inner ? header_b.inner_tree : header_b.matched_tree, pose, limits_of(settings),
                   *workspace.impl());

@@ -7,7 +7,7 @@
 #include "query/base/batch.h"
 #include "query/base/no_answer.h"
 #include "query/base/turned_over.h"
-#include "query/descent/workspace.h"
+#include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 
 // Every query of two solids: as they come, or turned over where the second is the shape.

@@ -11,10 +11,10 @@
 #include "query/base/no_answer.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/descent/workspace.h"
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_distance.h"
 #include "query/kernel/gap_kernel.h"
+#include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 
 namespace ist {

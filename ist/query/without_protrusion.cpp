@@ -8,7 +8,7 @@
 #include <ist/asset_layout.h>
 #include "query/base/relative_pose.h"
 #include "query/base/smooth_step.h"
-#include "query/detail/unlike_sizes.h"
+#include "query/lod/unlike_sizes.h"
 
 namespace ist {
 namespace {

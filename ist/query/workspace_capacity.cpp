@@ -8,10 +8,10 @@
 #include "query/asset/sphere_tree.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/descent/descent.h"
-#include "query/descent/open_runs.h"
-#include "query/detail/coincident.h"
-#include "query/detail/detail_chain.h"
+#include "query/lod/coincident.h"
+#include "query/lod/level_chain.h"
+#include "query/tree_overlap/descent.h"
+#include "query/tree_overlap/open_runs.h"
 
 namespace ist {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "cuda/check.h"
-#include "cuda/queue.h"
+#include "cuda/base/check.h"
+#include "cuda/base/queue.h"
 
 namespace ist::python::cuda {
 namespace {

@@ -10,10 +10,10 @@
 #include <ist/mesh.h>
 
 #include "arrays.h"
+#include "mesh/samples/samples.h"
 #include "meshes.h"
 #include "module.h"
 #include "offline.h"
-#include "samples/samples.h"
 
 namespace ist::python {
 namespace {

@@ -15,9 +15,9 @@
 #include <ist/asset_layout.h>
 #include <ist/types.h>
 
+#include "base/thread_arena.h"
 #include "query/base/batch.h"
 #include "query/base/relative_pose.h"
-#include "stage/thread_arena.h"
 
 namespace ist::python {
 namespace {

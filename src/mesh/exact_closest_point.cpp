@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "mesh/closest_point.h"
-#include "mesh/exact_triangle.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/geometry/exact_triangle.h"
 
 namespace ist {
 

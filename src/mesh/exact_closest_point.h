@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "mesh/geometry/mesh_view.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/mesh_view.h"
 
 namespace ist {
 

@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
+#include "mesh/connectivity/usable_mesh.h"
+#include "mesh/connectivity/weld.h"
+#include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
 #include "mesh/two_meshes.h"
-#include "mesh/usable_mesh.h"
-#include "mesh/weld.h"
-#include "mesh/winding.h"
 
 namespace ist {
 namespace {

@@ -15,10 +15,10 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
+#include "mesh/connectivity/weld.h"
 #include "mesh/import/gltf_document.h"
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/mesh_files.h"
-#include "mesh/weld.h"
 
 namespace ist {
 namespace {

@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "mesh/line_lattice.h"
-#include "mesh/winding.h"
+#include "mesh/hierarchy/line_lattice.h"
+#include "mesh/hierarchy/winding.h"
 
 namespace ist {
 namespace {

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <functional>
 
-#include "mesh/mesh_view.h"
+#include "mesh/geometry/mesh_view.h"
 
 namespace ist {
 

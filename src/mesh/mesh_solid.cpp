@@ -11,7 +11,7 @@
 #include <cmath>
 
 #include "mesh/exact_closest_point.h"
-#include "mesh/winding.h"
+#include "mesh/hierarchy/winding.h"
 
 namespace ist {
 

@@ -11,10 +11,10 @@
 
 #include <ist/solid.h>
 
-#include "mesh/bvh.h"
+#include "base/raw_array.h"
+#include "mesh/hierarchy/bvh.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/resolve/resolve.h"
-#include "stage/raw_array.h"
 
 namespace ist {
 

@@ -12,14 +12,14 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/closest_point.h"
-#include "mesh/disjoint_sets.h"
-#include "mesh/edge_table.h"
-#include "mesh/exact_triangle.h"
-#include "mesh/line_lattice.h"
-#include "mesh/shells.h"
-#include "mesh/surface_reduction.h"
-#include "mesh/usable_mesh.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/shells.h"
+#include "mesh/connectivity/surface_reduction.h"
+#include "mesh/connectivity/usable_mesh.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/geometry/exact_triangle.h"
+#include "mesh/hierarchy/line_lattice.h"
 
 namespace ist {
 namespace {

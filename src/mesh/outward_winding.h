@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/disjoint_sets.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/geometry/mesh_view.h"
+#include "mesh/hierarchy/winding_kernel.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/mesh_view.h"
-#include "mesh/winding_kernel.h"
 
 namespace ist {
 

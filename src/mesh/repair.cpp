@@ -12,17 +12,17 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/border_vertices.h"
-#include "mesh/disjoint_sets.h"
-#include "mesh/edge_table.h"
+#include "base/message_text.h"
+#include "base/thread_arena.h"
+#include "mesh/connectivity/border_vertices.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/shells.h"
+#include "mesh/connectivity/surface_reduction.h"
+#include "mesh/connectivity/usable_mesh.h"
+#include "mesh/connectivity/weld.h"
 #include "mesh/import/polygon_mesh.h"
-#include "mesh/message_text.h"
 #include "mesh/outward_winding.h"
-#include "mesh/shells.h"
-#include "mesh/surface_reduction.h"
-#include "mesh/usable_mesh.h"
-#include "mesh/weld.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 

@@ -6,7 +6,7 @@
 
 #include <ist/mesh.h>
 
-#include "mesh/edge_table.h"
+#include "mesh/connectivity/edge_table.h"
 
 namespace ist {
 

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "mesh/message_text.h"
+#include "base/message_text.h"
 
 namespace ist {
 

@@ -11,8 +11,8 @@
 
 #include <ist/mesh.h>
 
-#include "mesh/edge_table.h"
-#include "mesh/weld.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/weld.h"
 
 namespace ist {
 

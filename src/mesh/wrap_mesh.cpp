@@ -12,13 +12,13 @@
 
 #include <ist/types.h>
 
-#include "mesh/edge_table.h"
+#include "base/message_text.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/usable_mesh.h"
 #include "mesh/judge.h"
-#include "mesh/level_set_surface.h"
+#include "mesh/level_set/level_set_surface.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/message_text.h"
 #include "mesh/outward_winding.h"
-#include "mesh/usable_mesh.h"
 
 namespace ist {
 namespace {

@@ -19,8 +19,8 @@
 #include <vector>
 
 #include "c_api/checks.h"
+#include "mesh/samples/samples.h"
 #include "query/base/members.h"
-#include "samples/samples.h"
 #include "support/oracle_assets.h"
 #include "support/random_assets.h"
 #include "support/temp_file.h"

@@ -10,7 +10,7 @@
 #include <random>
 
 #include "clash/clash.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/exact_pair.h"
 #include "support/mated_rows.h"
 #include "support/random_mates.h"

@@ -1,7 +1,7 @@
 #include <ist/mesh.h>
 
 #include "cli/program.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "cuda/banded/banded_pack.h"
+#include "cuda/packing/banded/banded_pack.h"
 
 #include <ist/bake.h>
 #include <ist/types.h>
@@ -9,10 +9,10 @@
 #include <thread>
 #include <vector>
 
-#include "cuda/device_mesh.h"
+#include "cuda/packing/mesh/device_mesh.h"
 #include "mesh/mesh_solid.h"
+#include "mesh/samples/samples.h"
 #include "packing/base/packing_settings.h"
-#include "samples/samples.h"
 #include "support/gpu_test.h"
 #include "support/same_packing.h"
 #include "support/scarce_memory.h"

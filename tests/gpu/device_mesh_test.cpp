@@ -1,4 +1,4 @@
-#include "cuda/device_mesh.h"
+#include "cuda/packing/mesh/device_mesh.h"
 
 #include <ist/mesh.h>
 #include <ist/types.h>
@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "mesh/closest_point.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/winding.h"
 #include "support/gpu_mesh_queries.h"
 #include "support/gpu_test.h"
 #include "support/host_wide_tree.h"

@@ -10,7 +10,7 @@
 #include <ist/gpu_query.h>
 #include <ist/types.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "support/device_batch.h"
 #include "support/exact_batches.h"
 #include "support/gpu_test.h"

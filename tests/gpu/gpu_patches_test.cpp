@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "support/detailed_pairs.h"
 #include "support/device_patches.h"
 #include "support/gpu_test.h"

@@ -4,7 +4,7 @@
 #include <ist/gpu_query.h>
 #include <ist/types.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "support/detailed_pairs.h"
 #include "support/device_batch.h"
 #include "support/gpu_test.h"

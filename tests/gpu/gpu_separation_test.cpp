@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "support/device_separations.h"
 #include "support/gpu_test.h"
 #include "support/host_separations.h"

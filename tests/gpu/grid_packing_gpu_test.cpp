@@ -2,11 +2,11 @@
 
 #include <thread>
 
-#include "cuda/grids/pack_grids.h"
-#include "cuda/queue.h"
+#include "base/thread_arena.h"
+#include "cuda/base/queue.h"
+#include "cuda/packing/grids/pack_grids.h"
 #include "mesh/mesh_solid.h"
-#include "samples/samples.h"
-#include "stage/thread_arena.h"
+#include "mesh/samples/samples.h"
 #include "support/certified_packing.h"
 #include "support/gpu_test.h"
 #include "support/grid_history.h"

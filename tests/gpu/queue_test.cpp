@@ -1,11 +1,11 @@
-#include "cuda/queue.h"
+#include "cuda/base/queue.h"
 
 #include <ist/types.h>
 
 #include <numeric>
 #include <vector>
 
-#include "cuda/device_array.h"
+#include "cuda/base/device_array.h"
 #include "support/gpu_test.h"
 #include "support/scarce_memory.h"
 

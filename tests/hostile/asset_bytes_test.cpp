@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/asset_bytes.h"
 #include "support/query_settings.h"
 

@@ -2,7 +2,9 @@
 # Reads the table of rooms in docs/design.md (| `room` | what it holds | uses |) and the #include "…"
 # lines of every source file. Fails on an include that crosses rooms where no arrow is drawn, on an
 # arrow that nothing uses, on a room whose arrows lead back to it, on a source file outside all rooms,
-# and on a folder of a room that includes one which its row names later.
+# on more than fifteen rooms, on a folder of a room that its row does not name or that includes one
+# which its row names later (files in the room's own folder come last), and on a call of a public
+# query from a folder inside ist/query.
 cmake_minimum_required(VERSION 3.25)
 
 file(STRINGS ${ROOT}/docs/design.md rows REGEX "^\\| `(src|ist|cuda)[^`]*` \\|" ENCODING UTF-8)
@@ -24,7 +26,24 @@ endforeach()
 list(LENGTH rooms count)
 if(count LESS 10)
   message(FATAL_ERROR "docs/design.md: only ${count} rooms found; has the table moved?")
+elseif(count GREATER 15)
+  message(FATAL_ERROR "docs/design.md: ${count} rooms are more than a reader remembers (15)")
 endif()
+
+# The public queries: functions of placed solids that a header declares.
+set(queries)
+foreach(header contact_law lenses query raycast time_of_impact)
+  file(READ ${ROOT}/include/ist/${header}.h text)
+  string(REGEX MATCHALL "\n[A-Za-z]+ [a-z_]+\\((const Placed|std::span<const Placed)" found "${text}")
+  list(TRANSFORM found REPLACE "\n[A-Za-z]+ ([a-z_]+).*" "\\1")
+  list(APPEND queries ${found})
+endforeach()
+list(REMOVE_DUPLICATES queries)
+list(LENGTH queries query_count)
+if(query_count LESS 10)
+  message(FATAL_ERROR "include/ist: only ${query_count} queries found; has their form changed?")
+endif()
+list(JOIN queries "|" queries)
 
 # The innermost room of a file.
 function(room_of file out)
@@ -40,14 +59,19 @@ function(room_of file out)
   set(${out} "${best}" PARENT_SCOPE)
 endfunction()
 
-# The folder of a room that a file is in; nothing for the room itself.
+# The folder of a room that a file is in, and its place in the room's row: "." for the room itself,
+# which comes last; -1 for a folder that the row does not name.
 function(folder_of file room out)
   string(REPLACE "${room}/" "" rest "${file}")
-  set(folder "")
   if(rest MATCHES "^([^/]+)/")
     set(folder ${CMAKE_MATCH_1})
+    list(FIND folders_${room} ${folder} place)
+  else()
+    set(folder .)
+    list(LENGTH folders_${room} place)
   endif()
   set(${out} "${folder}" PARENT_SCOPE)
+  set(${out}_place ${place} PARENT_SCOPE)
 endfunction()
 
 set(errors)
@@ -59,6 +83,18 @@ foreach(file IN LISTS files)
   if(NOT room)
     list(APPEND errors "${file} stands in no room")
     continue()
+  endif()
+  folder_of("${file}" "${room}" from)
+  if(from_place EQUAL -1)
+    list(APPEND errors "${file}: docs/design.md does not name ${from} in the row of ${room}")
+  endif()
+  if(room STREQUAL "ist/query" AND NOT from STREQUAL ".")
+    file(STRINGS ${ROOT}/${file} calls ENCODING UTF-8
+      REGEX "^([^/]*(ist::|[^A-Za-z0-9_.>:/]))?(${queries})\\([^)]")
+    if(calls)
+      string(REPLACE ";" " " calls "${calls}")
+      list(APPEND errors "${file}: calls a public query: ${calls}")
+    endif()
   endif()
   file(STRINGS ${ROOT}/${file} lines REGEX "^#include \"" ENCODING UTF-8)
   foreach(line IN LISTS lines)
@@ -73,12 +109,8 @@ foreach(file IN LISTS files)
     if(NOT target)
       list(APPEND errors "${file}: \"${header}\" is in no room")
     elseif(target STREQUAL room)
-      # Of the folders of a room: from the file's to the header's.
-      folder_of("${file}" "${room}" from)
       folder_of("${path}" "${room}" to)
-      list(FIND folders_${room} "${from}" from_place)
-      list(FIND folders_${room} "${to}" to_place)
-      if(from AND to_place GREATER from_place)
+      if(to_place GREATER from_place)
         list(APPEND errors "${file}: \"${header}\": docs/design.md names ${to} after ${from}")
       endif()
     else()

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/oracle_assets.h"
 #include "support/shared_data.h"
 

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "query/probe/cap.h"
+#include "query/ball_triangle/cap.h"
 
 // A ball cut by a plane, against arithmetic of 100 digits.
 

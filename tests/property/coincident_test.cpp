@@ -6,8 +6,8 @@
 #include <array>
 #include <cmath>
 
-#include "query/detail/coincident.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
+#include "query/lod/coincident.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/answer_bits.h"
 #include "support/exact_pair.h"
 #include "support/test_meshes.h"

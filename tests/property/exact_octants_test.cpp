@@ -11,7 +11,7 @@
 #include <set>
 #include <vector>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/exact_pair.h"
 #include "support/test_meshes.h"
 

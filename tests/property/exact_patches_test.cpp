@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/exact_pair.h"
 #include "support/test_meshes.h"
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/baked.h"
 #include "support/exact_pair.h"
 #include "support/test_meshes.h"

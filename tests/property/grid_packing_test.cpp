@@ -5,7 +5,7 @@
 
 #include <set>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/certified_packing.h"
 #include "support/same_packing.h"
 #include "support/shared_data.h"

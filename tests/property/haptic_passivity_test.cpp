@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "haptic_loop/proxy.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/baked.h"
 
 // A hand that is held to a proxy by a virtual coupling, examples/haptic_loop: over any way it gets

@@ -11,8 +11,8 @@
 #include <random>
 
 #include "mesh/mesh_solid.h"
+#include "mesh/samples/samples.h"
 #include "packing/base/packing_settings.h"
-#include "samples/samples.h"
 #include "support/float_traps.h"
 #include "support/same_packing.h"
 #include "support/shared_data.h"

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
+#include "query/ball_triangle/cap.h"
+#include "query/ball_triangle/patch_sums.h"
 #include "query/exact/crossing.h"
-#include "query/probe/cap.h"
-#include "query/probe/patch_sums.h"
 #include "query/shape/probe_sum.h"
 #include "support/test_meshes.h"
 #include "support/turns.h"

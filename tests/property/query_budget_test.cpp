@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "query/descent/answer.h"
+#include "query/tree_overlap/answer.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"

@@ -9,7 +9,7 @@
 #include <cstring>
 #include <span>
 
-#include "query/detail/wanted_error.h"
+#include "query/lod/wanted_error.h"
 #include "support/surface_queries.h"
 
 // Answers of a wanted error: levels of detail and the exact measure, blended.

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/answer_bits.h"
 #include "support/random_assets.h"
 

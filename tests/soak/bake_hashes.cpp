@@ -21,7 +21,7 @@
 #include <vector>
 
 #include <ist/asset_layout.h>
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/shared_data.h"
 
 namespace {

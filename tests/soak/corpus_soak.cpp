@@ -17,10 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "mesh/disjoint_sets.h"
-#include "mesh/edge_table.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/shells.h"
 #include "mesh/mesh_files.h"
-#include "mesh/shells.h"
 #include "support/mesh_table.h"
 #include "support/shared_data.h"
 

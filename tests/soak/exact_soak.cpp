@@ -17,8 +17,8 @@
 #include <thread>
 #include <vector>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/answer_bits.h"
 #include "support/exact_pair.h"
 #include "support/integer_meshes.h"

@@ -19,8 +19,8 @@
 #include <thread>
 #include <vector>
 
+#include "mesh/samples/samples.h"
 #include "report.h"
-#include "samples/samples.h"
 #include "support/answer_bits.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"

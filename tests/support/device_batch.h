@@ -8,7 +8,7 @@
 #include <ist/gpu_query.h>
 #include <ist/query.h>
 
-#include "cuda/check.h"
+#include "cuda/base/check.h"
 #include "support/batch_pair.h"
 
 namespace ist::testing {

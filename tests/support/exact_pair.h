@@ -8,8 +8,8 @@
 #include <ist/query.h>
 
 #include "query/base/relative_pose.h"
-#include "query/descent/workspace.h"
 #include "query/exact/exact_overlap.h"
+#include "query/scratch/workspace.h"
 
 // Exact queries as tests ask them.
 

@@ -1,4 +1,4 @@
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/extreme_boxes.h"
 
 // Extremes of where solids are placed.

@@ -10,7 +10,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "numerics/team.h"
+#include "base/team.h"
 
 namespace ist::testing {
 
@@ -84,7 +84,7 @@ class Fibers {
   unsigned round_ = 0;
 };
 
-/// A team (numerics/team.h) whose lanes are Fibers.
+/// A team (base/team.h) whose lanes are Fibers.
 template <int Width>
 class FiberTeam {
  public:

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "cuda/warp_team.h"
-#include "mesh/wide_rays.h"
+#include "cuda/base/warp_team.h"
+#include "mesh/hierarchy/wide_rays.h"
 
 namespace ist::gpu {
 namespace {

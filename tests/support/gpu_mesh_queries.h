@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "cuda/device_array.h"
-#include "mesh/wide_nearest.h"
+#include "cuda/base/device_array.h"
+#include "mesh/hierarchy/wide_nearest.h"
 
 // Many questions to a mesh at once, a warp each. All arrays are in device memory; answers come in
 // the order of the questions.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "cuda/grids/device_rounds.h"
+#include "cuda/packing/grids/device_rounds.h"
 #include "packing/grids/pack_grids.h"
 
 namespace ist::testing {

@@ -6,12 +6,12 @@
 #include <thread>
 #include <vector>
 
-#include "cuda/banded/coop_launch.h"
-#include "numerics/team.h"
+#include "base/team.h"
+#include "cuda/packing/banded/coop_launch.h"
 
 namespace ist::testing {
 
-/// A cooperative launch (cuda/banded/coop_launch.h) of host threads, each a team of one.
+/// A cooperative launch (cuda/packing/banded/coop_launch.h) of host threads, each a team of one.
 template <class Scratch_>
 class HostCoopLaunch {
  public:

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/team.h"
+#include "base/team.h"
 #include "support/fiber_team.h"
 
 namespace ist::testing {

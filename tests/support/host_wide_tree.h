@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "mesh/mesh_view.h"
-#include "mesh/wide_build.h"
-#include "mesh/wide_tree.h"
+#include "mesh/geometry/mesh_view.h"
+#include "mesh/hierarchy/wide_build.h"
+#include "mesh/hierarchy/wide_tree.h"
 
 namespace ist::testing {
 

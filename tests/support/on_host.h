@@ -3,9 +3,9 @@
 #include <ist/bake.h>
 
 #include "bake/backend/make_backend.h"
+#include "base/thread_arena.h"
 #include "packing/calibrate/calibration.h"
 #include "packing/cover/cover.h"
-#include "stage/thread_arena.h"
 
 namespace ist::testing {
 

@@ -8,7 +8,7 @@
 #include <ist/pose_eigen.h>
 #include <ist/query.h>
 
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/nut_on_bolt.h"
 
 // A ring around the tube of a fixed torus knot, drawn by a spring: it bounces along the tube

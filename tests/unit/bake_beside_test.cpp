@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "bake/bake_solid.h"
-#include "stage/thread_arena.h"
+#include "base/thread_arena.h"
 #include "support/on_host.h"
 #include "support/test_meshes.h"
 

@@ -1,4 +1,4 @@
-#include "cuda/banded/banded_loop.h"
+#include "cuda/packing/banded/banded_loop.h"
 
 #include <gtest/gtest.h>
 #include <ist/bake.h>
@@ -6,10 +6,10 @@
 #include <memory>
 #include <vector>
 
-#include "cuda/banded/banded_buffers.h"
+#include "cuda/packing/banded/banded_buffers.h"
+#include "mesh/samples/samples.h"
 #include "packing/banded/mesh_surface.h"
 #include "packing/base/packing_settings.h"
-#include "samples/samples.h"
 #include "support/host_coop_launch.h"
 #include "support/same_packing.h"
 #include "support/test_meshes.h"

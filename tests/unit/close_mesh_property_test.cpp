@@ -8,9 +8,9 @@
 
 #include <ist/mesh.h>
 
-#include "mesh/edge_table.h"
-#include "mesh/shells.h"
-#include "mesh/weld.h"
+#include "mesh/connectivity/edge_table.h"
+#include "mesh/connectivity/shells.h"
+#include "mesh/connectivity/weld.h"
 #include "support/test_meshes.h"
 
 namespace ist {

@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "mesh/closest_point.h"
+#include "mesh/geometry/closest_point.h"
 #include "mesh/mesh_solid.h"
 #include "support/quad.h"
 #include "support/test_meshes.h"

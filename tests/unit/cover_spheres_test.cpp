@@ -13,7 +13,7 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
-#include "spheres/shared_count.h"
+#include "robots/covers/shared_count.h"
 #include "support/test_meshes.h"
 
 namespace ist::testing {

@@ -6,8 +6,8 @@
 #include <random>
 #include <string>
 
+#include "base/team.h"
 #include "cuda/query/detail_sums.h"
-#include "numerics/team.h"
 #include "query/base/relative_pose.h"
 #include "query/kernel/look_kernel.h"
 #include "support/detailed_pairs.h"

@@ -13,11 +13,11 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
+#include "base/angle.h"
 #include "mesh/judge.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
-#include "numerics/angle.h"
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 #include "support/test_meshes.h"
 
 // What a repair is judged by, the judgement itself, and wraps.

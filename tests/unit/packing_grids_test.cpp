@@ -3,13 +3,13 @@
 #include <cmath>
 #include <random>
 
+#include "base/team.h"
 #include "mesh/mesh_solid.h"
-#include "numerics/team.h"
+#include "mesh/samples/samples.h"
 #include "packing/grids/grid_schedule.h"
 #include "packing/grids/host_grid.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
-#include "samples/samples.h"
 #include "support/test_meshes.h"
 
 namespace ist::packing {

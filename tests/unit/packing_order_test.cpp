@@ -6,10 +6,10 @@
 #include <cstring>
 #include <random>
 
+#include "mesh/samples/samples.h"
 #include "packing/banded/banded_packer.h"
 #include "packing/banded/mesh_surface.h"
 #include "packing/banded/wide_mesh_surface.h"
-#include "samples/samples.h"
 #include "support/fiber_team.h"
 #include "support/host_wide_tree.h"
 

@@ -1,4 +1,4 @@
-#include "mesh/polygonise.h"
+#include "mesh/level_set/polygonise.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>

@@ -7,8 +7,8 @@
 
 #include <ist/types.h>
 
-#include "robot/kinematics.h"
-#include "robot/robot_model.h"
+#include "robots/description/kinematics.h"
+#include "robots/description/robot_model.h"
 #include "support/temp_file.h"
 
 // Robots of MuJoCo.

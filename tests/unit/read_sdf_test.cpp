@@ -5,8 +5,8 @@
 
 #include <ist/types.h>
 
-#include "robot/kinematics.h"
-#include "robot/robot_model.h"
+#include "robots/description/kinematics.h"
+#include "robots/description/robot_model.h"
 
 // Robots of SDF.
 

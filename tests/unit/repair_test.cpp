@@ -11,7 +11,7 @@
 #include <ist/mesh.h>
 #include <ist/types.h>
 
-#include "mesh/edge_table.h"
+#include "mesh/connectivity/edge_table.h"
 #include "mesh/repair.h"
 #include "support/test_meshes.h"
 

@@ -8,10 +8,10 @@
 
 #include <ist/types.h>
 
-#include "robot/group_states.h"
-#include "robot/kinematics.h"
-#include "robot/robot_model.h"
-#include "robot/self_collision.h"
+#include "robots/description/group_states.h"
+#include "robots/description/kinematics.h"
+#include "robots/description/robot_model.h"
+#include "robots/description/self_collision.h"
 #include "support/temp_file.h"
 
 // Joints, and what a planner is told about links that touch each other.

@@ -8,9 +8,9 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
-#include "robot/link_mesh.h"
-#include "robot/robot_model.h"
-#include "robot/sphere_files.h"
+#include "robots/description/link_mesh.h"
+#include "robots/description/robot_model.h"
+#include "robots/description/sphere_files.h"
 #include "support/temp_file.h"
 
 namespace ist::testing {

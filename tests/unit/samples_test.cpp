@@ -1,4 +1,4 @@
-#include "samples/samples.h"
+#include "mesh/samples/samples.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
-#include "mesh/winding.h"
+#include "mesh/hierarchy/winding.h"
 
 namespace {
 

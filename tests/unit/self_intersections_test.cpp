@@ -1,4 +1,4 @@
-#include "mesh/self_intersections.h"
+#include "mesh/connectivity/self_intersections.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -10,10 +10,10 @@
 #include <ist/mesh.h>
 #include <ist/types.h>
 
+#include "mesh/connectivity/surface_reduction.h"
+#include "mesh/connectivity/weld.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"
-#include "mesh/surface_reduction.h"
-#include "mesh/weld.h"
 #include "support/test_meshes.h"
 
 namespace ist {

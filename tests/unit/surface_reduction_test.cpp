@@ -1,10 +1,10 @@
-#include "mesh/surface_reduction.h"
+#include "mesh/connectivity/surface_reduction.h"
 
 #include <gtest/gtest.h>
 
 #include <vector>
 
-#include "mesh/edge_table.h"
+#include "mesh/connectivity/edge_table.h"
 
 namespace ist {
 namespace {

@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "mesh/closest_point.h"
+#include "base/team.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/hierarchy/wide_nearest.h"
+#include "mesh/hierarchy/wide_rays.h"
+#include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/wide_nearest.h"
-#include "mesh/wide_rays.h"
-#include "mesh/winding.h"
-#include "numerics/team.h"
 #include "support/host_wide_tree.h"
 #include "support/test_meshes.h"
 

@@ -8,9 +8,9 @@
 #include <random>
 #include <vector>
 
-#include "mesh/exact_sign.h"
-#include "mesh/line_lattice.h"
-#include "mesh/winding.h"
+#include "mesh/geometry/exact_sign.h"
+#include "mesh/hierarchy/line_lattice.h"
+#include "mesh/hierarchy/winding.h"
 #include "support/test_meshes.h"
 
 namespace {

@@ -2,7 +2,7 @@
 
 #include <ist/types.h>
 
-#include "cuda/cuda_backend.h"
+#include "cuda/packing/cuda_backend.h"
 #include "packing/banded/banded_packer.h"
 #include "packing/banded/field_surface.h"
 #include "packing/banded/mesh_surface.h"

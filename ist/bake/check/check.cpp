@@ -12,11 +12,11 @@
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_tally.h"
 #include "bake/check/checked_mesh.h"
+#include "base/thread_arena.h"
+#include "mesh/level_set/polygonise.h"
 #include "mesh/mesh_moments.h"
 #include "mesh/mesh_solid.h"
-#include "mesh/polygonise.h"
 #include "mesh/resolve/resolve.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

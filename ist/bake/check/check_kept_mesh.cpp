@@ -9,7 +9,7 @@
 #include <ist/asset.h>
 
 #include "bake/check/check_tally.h"
-#include "bake/kept_mesh.h"
+#include "bake/mesh/kept_mesh.h"
 
 namespace ist {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "numerics/rounding.h"
+#include "base/rounding.h"
 
 namespace ist {
 namespace {

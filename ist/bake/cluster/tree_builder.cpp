@@ -11,9 +11,9 @@
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/overlap_bound.h"
 #include "bake/cluster/tree_order.h"
-#include "numerics/plain.h"
-#include "numerics/roots.h"
-#include "numerics/rounding.h"
+#include "base/plain.h"
+#include "base/roots.h"
+#include "base/rounding.h"
 
 namespace ist {
 namespace {

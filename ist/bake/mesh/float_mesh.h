@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mesh/mesh_view.h"
+#include "mesh/geometry/mesh_view.h"
 
 namespace ist {
 

@@ -12,7 +12,7 @@
 #include <ist/asset_layout.h>
 
 #include <tbb/parallel_invoke.h>
-#include "mesh/item_groups.h"
+#include "mesh/connectivity/item_groups.h"
 
 namespace ist {
 namespace {

@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "bake/predict/trial_random.h"
-#include "mesh/line_lattice.h"
-#include "query/probe/patch_sums.h"
+#include "mesh/hierarchy/line_lattice.h"
+#include "query/ball_triangle/patch_sums.h"
 
 namespace ist {
 namespace {

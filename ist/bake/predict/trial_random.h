@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "numerics/hashing.h"
+#include "base/hashing.h"
 
 namespace ist {
 

@@ -6,9 +6,9 @@
 
 #include <ist/asset_layout.h>
 #include "query/asset/content_hash.h"
-#include "query/asset/sound_mass.h"
-#include "query/asset/sound_mesh.h"
-#include "query/asset/sound_values.h"
+#include "query/asset/valid_values.h"
+#include "query/asset/validate_mass.h"
+#include "query/asset/validate_mesh.h"
 
 namespace ist {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <ist/asset_layout.h>
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 #include "query/asset/shared_constants.h"
 
 // Balls of an asset's trees in plain numbers, on the CPU and on the GPU; unit frame.

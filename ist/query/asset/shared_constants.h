@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 // Constants of the queries, on the CPU and on the GPU.
 

@@ -7,7 +7,7 @@
 
 #include <ist/asset_layout.h>
 
-#include "numerics/plain.h"
+#include "base/plain.h"
 #include "query/asset/node_ball.h"
 
 namespace ist {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 // The members of answers, listed once: C structs, Python's columns, the GPU's arrays and
 // comparisons go through this list. tests/unit/members_test.cpp fails if an answer has a member

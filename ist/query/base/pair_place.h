@@ -5,7 +5,7 @@
 #include <ist/asset_layout.h>
 #include <ist/types.h>
 
-#include "numerics/vec3.h"
+#include "base/vec3.h"
 #include "query/asset/shared_constants.h"
 
 // Where two placed solids are, in plain numbers: on the CPU and on the GPU.

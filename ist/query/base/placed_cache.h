@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "numerics/bits.h"
+#include "base/bits.h"
 
 namespace ist {
 

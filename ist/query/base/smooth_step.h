@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 namespace ist {
 

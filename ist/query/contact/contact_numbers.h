@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "numerics/vec3.h"
+#include "base/vec3.h"
 
 // Numbers of a contact's division that the CPU and the GPU share.
 

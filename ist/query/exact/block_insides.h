@@ -4,8 +4,8 @@
 
 #include <ist/asset_layout.h>
 
-#include "numerics/bits.h"
-#include "numerics/host_device.h"
+#include "base/bits.h"
+#include "base/host_device.h"
 
 namespace ist {
 

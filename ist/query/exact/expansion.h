@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 // Exact arithmetic with doubles: a number as a sum of doubles that do not overlap, the smallest
 // first (Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997). Plain numbers, no

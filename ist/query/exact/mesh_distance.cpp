@@ -9,7 +9,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/mesh_distance.cpp"
 #include <hwy/foreach_target.h>
 
-#include "numerics/bits.h"
+#include "base/bits.h"
 #include "query/exact/box_gaps-inl.h"
 #include "query/exact/crossing.h"
 #include "query/exact/mesh_queries.h"

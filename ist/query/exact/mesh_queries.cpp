@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "numerics/team.h"
+#include "base/team.h"
 #include "query/exact/crossing.h"
 #include "query/exact/nearest_points.h"
 

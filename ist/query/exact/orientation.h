@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/vec3.h"
+#include "base/vec3.h"
 #include "query/exact/expansion.h"
 
 // Exact signs of determinants of four points, of which some belong to B. Signs are those of B moved

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "numerics/vec3.h"
+#include "base/vec3.h"
 #include "query/exact/expansion.h"
 
 // The formulas of an overlap's sums for single numbers, on the host and on a GPU.

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "query/impact/convex_pair.h"
-#include "query/impact/way_between.h"
+#include "query/impact/gjk.h"
 #include "query/shape/patch_shapes.h"
 #include "query/shape/shapes.h"
 

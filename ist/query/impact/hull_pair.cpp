@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "query/impact/way_between.h"
+#include "query/impact/gjk.h"
 
 namespace ist {
 

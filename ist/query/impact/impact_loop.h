@@ -7,8 +7,8 @@
 #include <ist/time_of_impact.h>
 
 #include "query/base/budget.h"
-#include "query/descent/workspace.h"
 #include "query/impact/moving_frame.h"
+#include "query/scratch/workspace.h"
 
 namespace ist {
 

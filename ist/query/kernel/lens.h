@@ -3,7 +3,7 @@
 #include <limits>
 #include <numbers>
 
-#include "numerics/host_device.h"
+#include "base/host_device.h"
 
 namespace ist {
 

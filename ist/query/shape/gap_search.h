@@ -8,7 +8,7 @@
 #include "query/base/budget.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/descent/workspace.h"
+#include "query/scratch/workspace.h"
 #include "query/shape/shapes.h"
 
 namespace ist {

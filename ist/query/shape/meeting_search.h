@@ -7,8 +7,8 @@
 
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/descent/open_runs.h"
 #include "query/shape/shapes.h"
+#include "query/tree_overlap/open_runs.h"
 
 namespace ist {
 

@@ -4,12 +4,12 @@
 #include <cstdint>
 #include <numbers>
 
-#include "numerics/host_device.h"
-#include "numerics/plain.h"
-#include "numerics/vec3.h"
+#include "base/host_device.h"
+#include "base/plain.h"
+#include "base/vec3.h"
 #include "query/asset/shared_constants.h"
+#include "query/ball_triangle/cap.h"
 #include "query/kernel/lens.h"
-#include "query/probe/cap.h"
 
 // The shapes of ist/shapes.h in plain numbers, the same on CPU and GPU. sample(x) gives the
 // distance, negative inside and never further from 0 than the true one, with its gradient; part(x,

@@ -7,8 +7,8 @@
 #include <cstdint>
 
 #include "query/asset/shared_constants.h"
+#include "query/ball_triangle/patch_sums.h"
 #include "query/kernel/overlap.h"
-#include "query/probe/patch_sums.h"
 
 namespace ist {
 

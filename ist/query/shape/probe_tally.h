@@ -7,9 +7,9 @@
 #include "query/asset/sphere_tree.h"
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
-#include "query/descent/answer.h"
 #include "query/kernel/subtree_kernel.h"
 #include "query/shape/probe_sum.h"
+#include "query/tree_overlap/answer.h"
 
 namespace ist {
 

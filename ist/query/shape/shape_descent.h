@@ -3,7 +3,7 @@
 #include "query/base/budget.h"
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
-#include "query/descent/workspace.h"
+#include "query/scratch/workspace.h"
 #include "query/shape/patch_shapes.h"
 #include "query/shape/probe_tally.h"
 

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "base/message_text.h"
 #include "mesh/import/gltf_document.h"
 #include "mesh/import/polygon_mesh.h"
-#include "mesh/message_text.h"
 
 namespace ist {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <string_view>
 
+#include "base/message_text.h"
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"
-#include "mesh/message_text.h"
 
 namespace ist {
 namespace {

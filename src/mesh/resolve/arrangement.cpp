@@ -7,10 +7,10 @@
 #include <tuple>
 #include <utility>
 
-#include "mesh/disjoint_sets.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/surface_reduction.h"
 #include "mesh/resolve/planar_triangulation.h"
 #include "mesh/resolve/unresolvable.h"
-#include "mesh/surface_reduction.h"
 
 namespace ist {
 namespace {

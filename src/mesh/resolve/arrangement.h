@@ -10,9 +10,9 @@
 #include <span>
 #include <vector>
 
-#include "mesh/edge_table.h"
+#include "base/work_stop.h"
+#include "mesh/connectivity/edge_table.h"
 #include "mesh/resolve/exact_points.h"
-#include "stage/work_stop.h"
 
 namespace ist {
 

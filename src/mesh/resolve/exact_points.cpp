@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mesh/exact_sign.h"
-#include "mesh/weld.h"
+#include "mesh/connectivity/weld.h"
+#include "mesh/geometry/exact_sign.h"
 
 namespace ist {
 namespace {

@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "mesh/edge_table.h"
+#include "mesh/connectivity/edge_table.h"
 
 namespace ist {
 

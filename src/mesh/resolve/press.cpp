@@ -9,13 +9,13 @@
 #include <optional>
 #include <utility>
 
-#include "mesh/disjoint_sets.h"
-#include "mesh/exact_sign.h"
-#include "mesh/item_groups.h"
-#include "mesh/self_intersections.h"
-#include "mesh/surface_reduction.h"
-#include "mesh/usable_mesh.h"
-#include "mesh/weld.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/item_groups.h"
+#include "mesh/connectivity/self_intersections.h"
+#include "mesh/connectivity/surface_reduction.h"
+#include "mesh/connectivity/usable_mesh.h"
+#include "mesh/connectivity/weld.h"
+#include "mesh/geometry/exact_sign.h"
 
 namespace ist {
 namespace {

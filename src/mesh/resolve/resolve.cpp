@@ -13,18 +13,18 @@
 
 #include <ist/types.h>
 
-#include "mesh/disjoint_sets.h"
-#include "mesh/message_text.h"
+#include "base/message_text.h"
+#include "base/stage.h"
+#include "base/thread_arena.h"
+#include "mesh/connectivity/disjoint_sets.h"
+#include "mesh/connectivity/self_intersections.h"
+#include "mesh/connectivity/shells.h"
+#include "mesh/connectivity/triangle_columns.h"
+#include "mesh/connectivity/usable_mesh.h"
+#include "mesh/connectivity/weld.h"
 #include "mesh/resolve/arrangement.h"
 #include "mesh/resolve/press.h"
 #include "mesh/resolve/unresolvable.h"
-#include "mesh/self_intersections.h"
-#include "mesh/shells.h"
-#include "mesh/triangle_columns.h"
-#include "mesh/usable_mesh.h"
-#include "mesh/weld.h"
-#include "stage/stage.h"
-#include "stage/thread_arena.h"
 
 namespace ist {
 namespace {

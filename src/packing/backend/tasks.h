@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/line_lattice.h"
+#include "mesh/hierarchy/line_lattice.h"
 
 // What a backend is asked besides packing, and what it answers: plain data in the solid's unit
 // frame.

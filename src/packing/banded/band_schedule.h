@@ -2,8 +2,8 @@
 
 #include <ist/types.h>
 
-#include "numerics/hashing.h"
-#include "numerics/roots.h"
+#include "base/hashing.h"
+#include "base/roots.h"
 #include "packing/base/certificate.h"
 #include "packing/base/packing_limits.h"
 

@@ -5,13 +5,13 @@
 
 #include <ist/bake.h>
 
+#include "base/stage.h"
+#include "base/thread_arena.h"
 #include "packing/banded/band_schedule.h"
 #include "packing/banded/candidate.h"
 #include "packing/banded/prototype.h"
 #include "packing/base/packing_settings.h"
 #include "packing/base/sphere_grid.h"
-#include "stage/stage.h"
-#include "stage/thread_arena.h"
 
 namespace ist::packing {
 

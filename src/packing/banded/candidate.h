@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "numerics/hashing.h"
+#include "base/hashing.h"
 
 namespace ist::packing {
 

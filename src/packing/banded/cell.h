@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "numerics/float3.h"
+#include "base/float3.h"
 
 namespace ist::packing {
 

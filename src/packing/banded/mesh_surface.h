@@ -1,6 +1,6 @@
 #pragma once
 
-#include "mesh/closest_point.h"
+#include "mesh/geometry/closest_point.h"
 #include "mesh/mesh_solid.h"
 #include "packing/banded/surface_triangle.h"
 

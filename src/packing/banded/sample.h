@@ -4,11 +4,11 @@
 
 #include <cstdint>
 
-#include "numerics/float3.h"
-#include "numerics/hashing.h"
-#include "numerics/team.h"
+#include "base/float3.h"
+#include "base/hashing.h"
+#include "base/team.h"
 
-// What is seen from a point. Written for a team (numerics/team.h) whose lanes share a SampleMemory;
+// What is seen from a point. Written for a team (base/team.h) whose lanes share a SampleMemory;
 // everything here is a function of the *set* of features, in whatever order a team meets them.
 
 namespace ist::packing {

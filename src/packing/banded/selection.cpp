@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "mesh/item_groups.h"
+#include "base/thread_arena.h"
+#include "mesh/connectivity/item_groups.h"
 #include "packing/base/certificate.h"
-#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {

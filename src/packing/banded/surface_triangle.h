@@ -1,7 +1,7 @@
 #pragma once
 
-#include "mesh/mesh_view.h"
-#include "mesh/triangle_frame.h"
+#include "mesh/geometry/mesh_view.h"
+#include "mesh/geometry/triangle_frame.h"
 #include "packing/banded/sample.h"
 
 namespace ist::packing {

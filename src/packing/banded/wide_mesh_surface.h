@@ -1,7 +1,7 @@
 #pragma once
 
-#include "mesh/wide_nearest.h"
-#include "mesh/wide_rays.h"
+#include "mesh/hierarchy/wide_nearest.h"
+#include "mesh/hierarchy/wide_rays.h"
 #include "packing/banded/surface_triangle.h"
 
 namespace ist::packing {

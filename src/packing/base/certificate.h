@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "numerics/float3.h"
-#include "numerics/rounding.h"
+#include "base/float3.h"
+#include "base/rounding.h"
 
 namespace ist::packing {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "numerics/team.h"
+#include "base/team.h"
 #include "packing/base/sphere_grid_layout.h"
 
 namespace ist::packing {

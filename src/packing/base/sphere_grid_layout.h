@@ -4,7 +4,7 @@
 
 #include <ist/types.h>
 
-#include "numerics/float3.h"
+#include "base/float3.h"
 
 namespace ist::packing {
 

@@ -10,10 +10,10 @@
 #include <numeric>
 #include <utility>
 
-#include "mesh/exact_triangle.h"
+#include "base/stage.h"
+#include "mesh/geometry/exact_triangle.h"
 #include "packing/calibrate/column_lattice.h"
 #include "packing/calibrate/power_relaxation.h"
-#include "stage/stage.h"
 
 namespace ist {
 namespace {

@@ -7,7 +7,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "mesh/exact_triangle.h"
+#include "mesh/geometry/exact_triangle.h"
 
 namespace ist {
 namespace {

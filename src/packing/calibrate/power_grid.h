@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "mesh/line_lattice.h"
-#include "numerics/host_device.h"
-#include "numerics/team.h"
+#include "base/host_device.h"
+#include "base/team.h"
+#include "mesh/hierarchy/line_lattice.h"
 #include "packing/backend/tasks.h"
 
 // The subdivision that cuts a solid's columns at the power cells of sites, for host and device. Its

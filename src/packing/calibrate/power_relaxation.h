@@ -4,7 +4,7 @@
 #include <numbers>
 #include <vector>
 
-#include "numerics/roots.h"
+#include "base/roots.h"
 #include "packing/backend/tasks.h"
 #include "packing/calibrate/power_grid.h"
 

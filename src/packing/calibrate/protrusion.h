@@ -1,6 +1,6 @@
 #pragma once
 
-#include "numerics/rounding.h"
+#include "base/rounding.h"
 
 namespace ist {
 

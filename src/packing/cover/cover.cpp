@@ -10,13 +10,13 @@
 #include <numbers>
 #include <numeric>
 
-#include "mesh/closest_point.h"
-#include "mesh/exact_triangle.h"
-#include "numerics/roots.h"
-#include "numerics/rounding.h"
+#include "base/roots.h"
+#include "base/rounding.h"
+#include "base/stage.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/geometry/exact_triangle.h"
 #include "packing/base/unit_field.h"
 #include "packing/cover/cover_cells.h"
-#include "stage/stage.h"
 
 namespace ist {
 namespace {

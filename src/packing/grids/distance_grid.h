@@ -4,7 +4,7 @@
 
 #include <ist/types.h>
 
-#include "mesh/triangle_frame.h"
+#include "mesh/geometry/triangle_frame.h"
 #include "packing/grids/grid_layout.h"
 
 namespace ist::packing {

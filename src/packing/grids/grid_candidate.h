@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "numerics/float3.h"
-#include "numerics/hashing.h"
-#include "numerics/host_device.h"
+#include "base/float3.h"
+#include "base/hashing.h"
+#include "base/host_device.h"
 
 namespace ist::packing {
 

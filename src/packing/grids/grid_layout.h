@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "numerics/float3.h"
-#include "numerics/host_device.h"
+#include "base/float3.h"
+#include "base/host_device.h"
 
 namespace ist::packing {
 

@@ -18,7 +18,7 @@ struct GridWinner {
 using GoOn = std::function<bool()>;
 
 // The work of a grid packing's rounds is done by host threads (host_rounds.h) or a device
-// (cuda/grids/device_rounds.h). Both give the same winners and offer the same calls:
+// (cuda/packing/grids/device_rounds.h). Both give the same winners and offer the same calls:
 //
 //   build(layout)             the distance grid of that layout, with all spheres so far
 //   place_prototypes(layout)  the prototype grid of that layout

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <atomic>
 
+#include "base/thread_arena.h"
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/local_winding.h"
-#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "mesh/mesh_view.h"
+#include "mesh/geometry/mesh_view.h"
 #include "packing/grids/distance_grid.h"
 
 namespace ist::packing {

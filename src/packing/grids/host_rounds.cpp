@@ -5,11 +5,11 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "numerics/team.h"
+#include "base/team.h"
+#include "base/thread_arena.h"
 #include "packing/grids/discrete_distance.h"
 #include "packing/grids/grid_certificate.h"
 #include "packing/grids/prototype_cells.h"
-#include "stage/thread_arena.h"
 
 namespace ist::packing {
 namespace {

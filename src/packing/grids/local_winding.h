@@ -1,11 +1,11 @@
 #pragma once
 
-#include "mesh/ray_crossing.h"
+#include "mesh/geometry/ray_crossing.h"
 #include "packing/grids/cell_listing.h"
 
 // Winding numbers from the distance grid alone, exact. They are constant in a cell that no triangle
 // meets, and a walk along x from such a cell to the point passes every triangle between them in
-// the cells of its row. Lines and their crossings as in mesh/winding.h.
+// the cells of its row. Lines and their crossings as in mesh/hierarchy/winding.h.
 
 namespace ist::packing {
 

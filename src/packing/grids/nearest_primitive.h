@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "numerics/team.h"
+#include "base/team.h"
 #include "packing/grids/cell_listing.h"
 
 // The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete

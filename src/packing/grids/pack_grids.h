@@ -4,12 +4,12 @@
 
 #include <algorithm>
 
+#include "base/stage.h"
 #include "mesh/mesh_solid.h"
 #include "packing/base/certificate.h"
 #include "packing/base/packing_settings.h"
 #include "packing/grids/grid_rounds.h"
 #include "packing/grids/grid_schedule.h"
-#include "stage/stage.h"
 
 namespace ist::packing {
 

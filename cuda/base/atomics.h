@@ -1,0 +1,136 @@
+#pragma once
+
+#include <cstdint>
+
+#include "base/host_device.h"
+
+// Relaxed atomics for host and device. Each returns the value before. What they build is a sum, a
+// maximum or a set, so that the order in which threads come to them does not show.
+
+namespace ist::gpu {
+
+IST_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicAdd(at, value);
+#else
+  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint64_t atomic_add(std::uint64_t* at, std::uint64_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicAdd(reinterpret_cast<unsigned long long*>(at), value);
+#else
+  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_or(std::uint32_t* at, std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return atomicOr(at, bits);
+#else
+  return __atomic_fetch_or(at, bits, __ATOMIC_ACQ_REL);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_and(std::uint32_t* at, std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return atomicAnd(at, bits);
+#else
+  return __atomic_fetch_and(at, bits, __ATOMIC_RELAXED);
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicExch(at, value);
+#else
+  return __atomic_exchange_n(at, value, __ATOMIC_RELEASE);
+#endif
+}
+
+/// Adds the first lane's `count` to what a team's lanes share with others; the value before.
+template <class Team>
+IST_HD std::uint32_t take(const Team& team, std::uint32_t* at, std::uint32_t count) {
+  std::uint32_t first = 0;
+  if (team.lane() == 0) first = atomic_add(at, count);
+  return team.broadcast(first, 0);
+}
+
+/// Place of this lane's item in a list to which the lanes with `adds` append one each.
+template <class Team>
+IST_HD std::uint32_t append(const Team& team, bool adds, std::uint32_t* size) {
+  int total = 0;
+  const auto before = static_cast<std::uint32_t>(team.exclusive_count(adds, total));
+  return total == 0 ? 0 : take(team, size, static_cast<std::uint32_t>(total)) + before;
+}
+
+/// Writes `value` if `expected` is there.
+IST_HD inline std::uint32_t atomic_replace(std::uint32_t* at, std::uint32_t expected,
+                                           std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicCAS(at, expected, value);
+#else
+  __atomic_compare_exchange_n(at, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+  return expected;
+#endif
+}
+
+IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicMax(at, value);
+#else
+  std::uint32_t old = __atomic_load_n(at, __ATOMIC_RELAXED);
+  while (old < value &&
+         !__atomic_compare_exchange_n(at, &old, value, true, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+  }
+  return old;
+#endif
+}
+
+/// Makes what this thread's team wrote before its last sync visible to who then reads what this
+/// thread stores atomically; and, after an atomic load, what was made visible so to this one.
+IST_HD inline void publish() {
+#ifdef __CUDA_ARCH__
+  __threadfence();
+#endif  // the host's atomic_exchange() and atomic_or() do it themselves
+}
+
+struct alignas(16) Words4 {
+  std::uint32_t word[4];
+};
+
+/// A load that does not look into the multiprocessor's own cache.
+IST_HD inline std::uint32_t load_fresh(const std::uint32_t* at) {
+#ifdef __CUDA_ARCH__
+  return __ldcg(at);
+#else
+  return *at;
+#endif
+}
+IST_HD inline float load_fresh(const float* at) {
+#ifdef __CUDA_ARCH__
+  return __ldcg(at);
+#else
+  return *at;
+#endif
+}
+IST_HD inline Words4 load_fresh(const Words4* at) {
+#ifdef __CUDA_ARCH__
+  const uint4 words = __ldcg(reinterpret_cast<const uint4*>(at));
+  return {{words.x, words.y, words.z, words.w}};
+#else
+  return *at;
+#endif
+}
+
+/// A value that others may be changing.
+IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
+#ifdef __CUDA_ARCH__
+  return *static_cast<const volatile std::uint32_t*>(at);
+#else
+  return __atomic_load_n(at, __ATOMIC_ACQUIRE);
+#endif
+}
+
+}  // namespace ist::gpu

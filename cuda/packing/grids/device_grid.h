@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "cuda/base/device_array.h"
+#include "mesh/geometry/mesh_view.h"
+#include "packing/grids/distance_grid.h"
+
+namespace ist::gpu {
+
+/// The distance grid (packing/grids/host_grid.h) in device memory. Its arrays belong to the queue.
+class DeviceGrid {
+ public:
+  /// Uploads the mesh's exact arrays, which are in use until Queue::wait().
+  DeviceGrid(Queue& queue, const MeshView& mesh);
+
+  /// A new grid of that layout. Throws Error if more cells are active than a word can address.
+  void build(const packing::GridLayout& layout);
+  /// Appends spheres; they count after the next build() or update().
+  void append(const Sphere* spheres, std::size_t count);
+  void update();
+
+  /// For kernels; valid until the next change.
+  packing::GridScene scene() const;
+  const packing::GridLayout& layout() const { return layout_; }
+
+  std::size_t active_cells() const { return active_; }
+  std::size_t list_bytes() const { return triangle_lists_.bytes() + sphere_lists_.bytes(); }
+  std::size_t bytes() const {
+    return words_.bytes() + keys_.bytes() + records_.bytes() + list_bytes();
+  }
+  bool hashed() const { return keys_.size() > 0; }
+
+ private:
+  void cover(std::size_t first_new);
+  void drop_inactive();
+  void hash_words();
+  void list_spheres();
+  void measure_distances();
+
+  Queue* queue_;
+  std::uint32_t triangle_count_;
+  DeviceArray<double> vertices_;
+  DeviceArray<std::uint32_t> corners_;
+  DeviceArray<packing::GridTriangle> triangles_;
+  DeviceArray<Sphere> spheres_;
+  std::size_t sphere_count_ = 0, listed_ = 0;  ///< of them, the first so many are in the lists
+
+  packing::GridLayout layout_;
+  DeviceArray<std::uint32_t> words_, keys_;
+  DeviceArray<packing::CellRecord> records_;
+  DeviceArray<std::uint32_t> triangle_lists_, sphere_lists_;
+  DeviceArray<std::uint32_t> counter_;
+  std::size_t active_ = 0;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+
+#include "cuda/base/device_array.h"
+#include "mesh/geometry/mesh_view.h"
+#include "mesh/hierarchy/wide_tree.h"
+
+namespace ist::gpu {
+
+/// A mesh and its hierarchy in device memory. The arrays belong to the queue they were made on.
+class DeviceMesh {
+ public:
+  /// Uploads the vertices and the 1 … 2^30 triangles, from pageable or pinned memory, and builds,
+  /// in the queue's order. The host arrays are in use until Queue::wait().
+  DeviceMesh(Queue& queue, const MeshView& mesh);
+
+  /// The view for kernels; its pointers are to device memory.
+  const WideTree& tree() const { return tree_; }
+  std::size_t bytes() const {
+    return vertices_.bytes() + blocks_.bytes() + nodes_.bytes() + oriented_.bytes();
+  }
+
+ private:
+  DeviceArray<double> vertices_;
+  DeviceArray<WideBlock> blocks_;
+  DeviceArray<WideNode> nodes_;
+  DeviceArray<WideOriented> oriented_;
+  WideTree tree_;
+};
+
+}  // namespace ist::gpu

@@ -1,0 +1,142 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
+
+#include <ist/c.h>
+#include <ist/query.h>
+#include <ist/raycast.h>
+#include <ist/shapes.h>
+#include <ist/time_of_impact.h>
+
+#include "c_api/handles.h"
+#include "query/base/members.h"
+
+// C structs to and from those of C++: checked, then copied number by number.
+
+namespace ist::c_api {
+
+/// Whether a struct is there and of a size that this library knows.
+template <class T>
+ist_status_t check_size(const T* given) noexcept {
+  if (given == nullptr) return IST_NULL_POINTER;
+  return given->size == sizeof(T) ? IST_OK : IST_WRONG_SIZE;
+}
+
+/// Makes room for an answer: all zero but its size.
+template <class T>
+ist_status_t clear(T* answer) noexcept {
+  const ist_status_t status = check_size(answer);
+  if (status == IST_OK) {
+    *answer = T{};
+    answer->size = sizeof(T);
+  }
+  return status;
+}
+
+inline Eigen::Vector3d vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
+inline void write(const Eigen::Vector3d& v, double (&out)[3]) noexcept {
+  for (int k = 0; k < 3; ++k) out[k] = v[k];
+}
+
+inline Pose pose(const ist_pose_t& given) noexcept {
+  const auto& [q, t] = given;
+  return {{q[0], q[1], q[2], q[3]}, {t[0], t[1], t[2]}};
+}
+inline void write(const Pose& found, ist_pose_t& out) noexcept {
+  std::copy_n(found.q, 4, out.q);
+  std::copy_n(found.t, 3, out.t);
+}
+
+inline ist_status_t status_of(QueryStatus status) noexcept {
+  return status == QueryStatus::ok                 ? IST_OK
+         : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
+         : status == QueryStatus::error_exceeded   ? IST_ERROR_EXCEEDED
+         : status == QueryStatus::missing_data     ? IST_MISSING_DATA
+                                                   : IST_INVALID_INPUT;
+}
+inline QueryStatus query_status(ist_status_t status) noexcept {
+  return status == IST_OK                 ? QueryStatus::ok
+         : status == IST_BUDGET_EXHAUSTED ? QueryStatus::budget_exhausted
+         : status == IST_ERROR_EXCEEDED   ? QueryStatus::error_exceeded
+         : status == IST_MISSING_DATA     ? QueryStatus::missing_data
+                                          : QueryStatus::invalid_input;
+}
+
+/// Copies an answer from C++ to C or back. What lies between a struct's numbers is 0, so that its
+/// bytes can be compared.
+template <class From, class To>
+requires requires(From from, To to) { from.status, to.status; }
+void write(const From& from, To& to) noexcept {
+  if constexpr (requires { to.size; }) {
+    std::memset(&to, 0, sizeof to);
+    to.size = sizeof to;
+  }
+  static_assert(IST_IMPACT_OVERLAPPING == static_cast<int>(ImpactKind::overlapping));
+  for_each_member(
+      []<class X, class Y>(const X& x, Y& y) {
+        if constexpr (std::is_same_v<Y, QueryStatus>)
+          y = query_status(x);
+        else if constexpr (std::is_same_v<X, ImpactKind>)
+          y = static_cast<ist_impact_kind_t>(x);
+        else if constexpr (std::is_enum_v<X>)
+          y = status_of(x);
+        else if constexpr (std::is_same_v<Y, Eigen::Vector3d>)
+          y = vector(x);
+        else if constexpr (std::is_array_v<Y>)
+          write(x, y);
+        else
+          y = x;
+      },
+      from, to);
+}
+
+/// The shape of a function points to the caller's struct and reads it for every sample.
+ist_status_t read(const ist_placed_t* given, PlacedSolid& placed) noexcept;
+/// An asset: IST_MISSING_DATA for a shape.
+ist_status_t read(const ist_placed_t* given, PlacedAsset& placed) noexcept;
+
+ist_status_t read(const ist_penetration_settings_t* given, PenetrationSettings& settings) noexcept;
+ist_status_t read(const ist_separation_settings_t* given, SeparationSettings& settings) noexcept;
+ist_status_t read(const ist_impact_settings_t* given, ImpactSettings& settings) noexcept;
+
+inline Ray read(const ist_ray_t& given) noexcept {
+  Ray ray{vector(given.origin), vector(given.direction)};
+  if (given.max_distance != 0) ray.max_distance = given.max_distance;
+  return ray;
+}
+/// Null: at rest.
+inline Motion read(const ist_motion_t* given) noexcept {
+  if (given == nullptr) return {};
+  return {vector(given->velocity), vector(given->angular_velocity), vector(given->about)};
+}
+inline Penetration read(const ist_penetration_t& given) noexcept {
+  Penetration result;
+  write(given, result);
+  return result;
+}
+
+// Patches are written where the caller has room for them.
+static_assert(std::is_standard_layout_v<ContactPatch>);
+static_assert(sizeof(ist_contact_patch_t) == sizeof(ContactPatch));
+static_assert(offsetof(ist_contact_patch_t, id) == offsetof(ContactPatch, id));
+static_assert(offsetof(ist_contact_patch_t, centroid) == offsetof(ContactPatch, centroid));
+static_assert(offsetof(ist_contact_patch_t, normal) == offsetof(ContactPatch, normal));
+static_assert(offsetof(ist_contact_patch_t, area) == offsetof(ContactPatch, area));
+static_assert(offsetof(ist_contact_patch_t, depth) == offsetof(ContactPatch, depth));
+static_assert(offsetof(ist_contact_patch_t, volume) == offsetof(ContactPatch, volume));
+static_assert(offsetof(ist_contact_patch_t, force) == offsetof(ContactPatch, force));
+static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, torque));
+static_assert(offsetof(ist_contact_patch_t, point) == offsetof(ContactPatch, point));
+static_assert(offsetof(ist_contact_patch_t, torsion) == offsetof(ContactPatch, torsion));
+
+// So are segments of outlines.
+static_assert(std::is_standard_layout_v<OutlineSegment>);
+static_assert(sizeof(ist_outline_segment_t) == sizeof(OutlineSegment));
+static_assert(offsetof(ist_outline_segment_t, from) == offsetof(OutlineSegment, from));
+static_assert(offsetof(ist_outline_segment_t, to) == offsetof(OutlineSegment, to));
+static_assert(offsetof(ist_outline_segment_t, patch) == offsetof(OutlineSegment, patch));
+
+}  // namespace ist::c_api

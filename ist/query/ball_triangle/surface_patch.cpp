@@ -1,0 +1,124 @@
+#include "query/ball_triangle/surface_patch.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "query/ball_triangle/surface_patch.cpp"
+#include <hwy/foreach_target.h>
+
+#include "query/ball_triangle/feet-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace ist::HWY_NAMESPACE {
+
+std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], double radius) {
+  return feet_of<false>(patch, centre, radius, nullptr, nullptr, nullptr);
+}
+
+void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
+                     const Similarity& map, ProbeBalls& balls) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const NodeBall ball = probes.ball(level, block);
+  const BallBlock& from = probes.level[level].blocks[block];
+  const Origin& o = probes.level[level].origins[block];
+  map.apply(ball.centre, balls.origin);
+  balls.reach = ball.r * map.scale * (1 + 1e-12);
+  V m[9];
+  for (int k = 0; k < 9; ++k) m[k] = hn::Set(d, map.m[k]);
+  const V ox = hn::Set(d, o.x - ball.centre[0]);
+  const V oy = hn::Set(d, o.y - ball.centre[1]);
+  const V oz = hn::Set(d, o.z - ball.centre[2]);
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V x = ox + load_as<double>(d, from.x + lane);
+    const V y = oy + load_as<double>(d, from.y + lane);
+    const V z = oz + load_as<double>(d, from.z + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, balls.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, balls.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, balls.z + lane);
+    hn::Store(hn::Max(load_as<double>(d, from.r + lane), hn::Zero(d)) * scale, d, balls.r + lane);
+  }
+}
+
+void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V zero = hn::Zero(d);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    V e[3], f[3];
+    const auto take = [&](int k, const double(&of)[3][kWidth]) {
+      const V a = hn::Load(d, of[0] + lane);
+      const V b = hn::Load(d, of[1] + lane);
+      const V c = hn::Load(d, of[2] + lane);
+      e[k] = b - a;
+      f[k] = c - a;
+      hn::Store(a, d, patch.corner[0][k] + lane);
+      hn::Store(b, d, patch.corner[1][k] + lane);
+      hn::Store(c, d, patch.corner[2][k] + lane);
+    };
+    take(0, corners.x), take(1, corners.y), take(2, corners.z);
+    const V cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
+                        e[0] * f[1] - e[1] * f[0]};
+    const V area = hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
+    const V base = hn::Sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
+    const auto flat = hn::Not(area > zero);
+    const V one = hn::Set(d, 1.0);
+    const V per_area = one / hn::IfThenElse(flat, one, area);
+    const V per_base = one / hn::IfThenElse(flat, one, base);
+    V u[3], n[3];
+    for (int k = 0; k < 3; ++k) {
+      u[k] = e[k] * per_base;
+      n[k] = cross[k] * per_area;
+      hn::Store(u[k], d, patch.u[k] + lane);
+      hn::Store(n[k], d, patch.n[k] + lane);
+    }
+    for (int k = 0; k < 3; ++k) {
+      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
+      hn::Store(n[k1] * u[k2] - n[k2] * u[k1], d, patch.v[k] + lane);
+    }
+    const V apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2];
+    const V apex_y = area * per_base;
+    hn::Store(hn::Set(d, 1.0), d, patch.edge_x[0] + lane);
+    hn::Store(zero, d, patch.edge_y[0] + lane);
+    hn::Store(base, d, patch.length[0] + lane);
+    const auto set_edge = [&](int k, V x, V y) {
+      const V length = hn::Sqrt(x * x + y * y);
+      const V per_length = one / hn::IfThenElse(flat, one, length);
+      hn::Store(length, d, patch.length[k] + lane);
+      hn::Store(x * per_length, d, patch.edge_x[k] + lane);
+      hn::Store(y * per_length, d, patch.edge_y[k] + lane);
+    };
+    set_edge(1, apex_x - base, apex_y);
+    set_edge(2, zero - apex_x, zero - apex_y);
+    const V never = hn::Set(d, -1e300);
+    hn::Store(hn::Min(zero, apex_x), d, patch.left + lane);
+    hn::Store(hn::IfThenElse(flat, never, hn::Max(base, apex_x)), d, patch.right + lane);
+    hn::Store(hn::IfThenElse(flat, never, apex_y), d, patch.top + lane);
+  }
+}
+
+}  // namespace ist::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace ist {
+
+HWY_EXPORT(make_patch_of);
+HWY_EXPORT(near_of);
+HWY_EXPORT(place_probes_of);
+
+void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
+                  ProbeBalls& balls) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_probes_of)(probes, level, block, map, balls);
+}
+
+std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
+                             double radius) noexcept {
+  return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
+}
+
+void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
+  HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
+}
+
+}  // namespace ist
+#endif

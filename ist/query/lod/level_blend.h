@@ -1,0 +1,37 @@
+#pragma once
+
+#include <ist/query.h>
+
+#include "query/base/budget.h"
+#include "query/base/relative_pose.h"
+#include "query/lod/level_chain.h"
+
+namespace ist {
+
+/// Sums the part of a blend with the largest weight, once: contact patches sort it into bins.
+class LargestPart {
+ public:
+  /// A pair of levels, in place of lens_sum().
+  virtual Penetration level(const DetailPair& pair, const DescentLimits& limits) noexcept = 0;
+  /// The exact measure, in place of ExactMeasure.
+  virtual Penetration exact(const PenetrationSettings& settings) noexcept = 0;
+
+ protected:
+  ~LargestPart() = default;
+};
+
+/// penetration() by Measure::exact, which stands above this folder.
+using ExactMeasure = Penetration (*)(const PlacedAsset& a, const PlacedAsset& b,
+                                     const PenetrationSettings& settings, const RelativePose& pose,
+                                     Workspace& workspace) noexcept;
+
+/// The penetration from levels of detail. Under a wanted error they and the exact measure are
+/// blended by what they err (WantedError), under a pair budget by what they need (DetailChain), and
+/// without either the finest answers; copies of one asset that all but coincide are asked as unlike
+/// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null
+/// where that part is summed as the others. No allocation, lock or exception.
+Penetration blend_details(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
+                          const PenetrationSettings& settings, Workspace& workspace,
+                          ExactMeasure exact, LargestPart* largest = nullptr) noexcept;
+
+}  // namespace ist

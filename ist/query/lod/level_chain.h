@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <ist/asset_layout.h>
+
+#include "query/lod/level_pair.h"
+
+namespace ist {
+
+/// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
+/// (docs/design.md 5). Each step takes a coarser level on the side of the smaller spheres, which
+/// cost most and tell least, or on both sides where spheres are about as large.
+///
+/// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
+/// *coarse estimate*: a smooth function of the pose, so that an answer may be blended by it.
+class DetailChain {
+ public:
+  static constexpr std::size_t kMost = 2 * kMaxDetails + 1;
+  using Weights = std::array<DetailWeight, kMost>;
+
+  DetailChain() = default;  ///< not planned
+  /// `scale`: of B in A's unit frame.
+  DetailChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept;
+
+  /// `level_…(i)`: level i of an asset, which has `coarser_…` levels after the finest.
+  template <class LevelA, class LevelB>
+  IST_HD void plan(std::uint32_t coarser_a, const LevelA& level_a, std::uint32_t coarser_b,
+                   const LevelB& level_b, double scale) noexcept {
+    std::uint32_t at_a = 0, at_b = 0;
+    for (size_ = 0;;) {
+      const LevelCost of_a = level_a(at_a), of_b = level_b(at_b);
+      pairs_[size_++] = detail_pair(at_a, of_a, at_b, of_b, scale);
+      const bool more_a = at_a < coarser_a, more_b = at_b < coarser_b;
+      if (!more_a && !more_b) return;
+      step_coarser(more_a, more_b, of_a.mean_radius, of_b.mean_radius * scale, at_a, at_b);
+    }
+  }
+
+  IST_HD std::size_t size() const noexcept { return size_; }
+  IST_HD const DetailPair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
+  IST_HD const DetailPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
+
+  /// Part of the answer that the finest pair gives whatever a coarse estimate would say, by what a
+  /// quick look sees (docs/design.md 5), with the slope: 1 while that needs no more than 0.35 of
+  /// `budget`, 0 from a half on.
+  IST_HD DetailWeight quick_weight(double look, double budget) const noexcept {
+    return affordable(pairs_[0], look, budget, kLookAlone, kLookNone);
+  }
+
+  /// visit(i, weight) for every pair. The weights sum to 1: all of it is the finest pair's while
+  /// that needs no more than 0.7 of `budget` sphere pairs, none where it needs the whole; what is
+  /// left goes to the next pair by the same rule, and what none can afford to the coarsest.
+  /// Continuous in `coarse`, with the slope. An estimate of 0: the finest.
+  ///
+  /// `wanted(i)`: what each pair would give without a budget.
+  template <class Wanted, class Visit>
+  IST_HD void share(double coarse, double budget, const Wanted& wanted,
+                    const Visit& visit) const noexcept {
+    DetailWeight rest = {};
+    for (std::uint32_t i = 0; i + 1 < size_; ++i) {
+      const DetailWeight part = affordable(pairs_[i], coarse, budget, kLevelAlone, kLevelNone);
+      rest = rest + wanted(i);
+      visit(i, rest * part);
+      rest = rest * complement(part);
+    }
+    visit(size_ - 1, rest + wanted(size_ - 1));
+  }
+
+  Weights weights(double coarse, double budget,
+                  const Weights& wanted = {DetailWeight{1, 0}}) const noexcept;
+
+ private:
+  DetailPair pairs_[kMost];
+  std::uint32_t size_;
+};
+
+}  // namespace ist

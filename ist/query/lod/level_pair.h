@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include <ist/asset_layout.h>
+
+#include "base/plain.h"
+#include "query/asset/shared_constants.h"
+#include "query/base/smooth_step.h"
+
+// What levels of detail cost and which part of an answer each gives, on the CPU and on the GPU.
+
+namespace ist {
+
+/// A matched tree at a level of detail; lengths in its unit frame.
+struct LevelCost {
+  double reach;  ///< radius of the root ball
+  double mean_radius, volume_sum, sphere_count;
+
+  static LevelCost of(const TreeHeader& tree) noexcept {
+    return {tree.root[3], tree.mean_radius, tree.volume_sum,
+            static_cast<double>(tree.sphere_count)};
+  }
+};
+
+/// Levels of detail of two assets that are asked together.
+struct DetailPair {
+  std::uint32_t a, b;  ///< 0: the finest
+
+  // What the expected number of sphere pairs is made of, A's unit frame.
+  double density;  ///< pairs over volume of overlap
+  double skin;     ///< √volume: makes up for the rim of a shallow contact
+};
+
+/// Part of an answer that one pair of levels gives.
+struct DetailWeight {
+  double weight;  ///< [0, 1]
+  double slope;   ///< d weight / d estimate of the overlap
+
+  IST_HD friend DetailWeight operator*(const DetailWeight& x, const DetailWeight& y) noexcept {
+    return {x.weight * y.weight, x.slope * y.weight + x.weight * y.slope};
+  }
+  IST_HD friend DetailWeight operator+(const DetailWeight& x, const DetailWeight& y) noexcept {
+    return {x.weight + y.weight, x.slope + y.slope};
+  }
+};
+IST_HD inline DetailWeight complement(const DetailWeight& x) noexcept {
+  return {1 - x.weight, -x.slope};
+}
+
+/// The levels a and b of two assets. `scale`: of B in A's unit frame.
+IST_HD inline DetailPair detail_pair(std::uint32_t a, const LevelCost& of_a, std::uint32_t b,
+                                     const LevelCost& of_b, double scale) noexcept {
+  const double volume_b = of_b.volume_sum * (scale * scale * scale);
+  const double reach = of_a.mean_radius + of_b.mean_radius * scale;
+  const double size = of_b.reach * scale < of_a.reach ? of_b.reach * scale : of_a.reach;
+  return {a, b,
+          kPairShare * (of_a.sphere_count / of_a.volume_sum) * (of_b.sphere_count / volume_b) *
+              ball_volume(reach),
+          kPairRim * reach * std::sqrt(size)};
+}
+
+/// Goes on to the next coarser level of A, of B, or of both (DetailChain), as far as there are
+/// `more`. Radii are the levels' mean ones, A's unit frame.
+IST_HD inline void step_coarser(bool more_a, bool more_b, double radius_a, double radius_b,
+                                std::uint32_t& a, std::uint32_t& b) noexcept {
+  const double cube_a = radius_a * radius_a * radius_a;
+  const double cube_b = radius_b * radius_b * radius_b;
+  a += more_a && (!more_b || !(kAlikeVolume * cube_a > cube_b)) ? 1 : 0;
+  b += more_b && (!more_a || !(kAlikeVolume * cube_b > cube_a)) ? 1 : 0;
+}
+
+/// About how many sphere pairs a pair of levels needs for an overlap, A's unit frame.
+IST_HD inline double expected_pairs(const DetailPair& pair, double overlap) noexcept {
+  return pair.density * (overlap + pair.skin * std::sqrt(overlap));
+}
+
+/// 1 where a pair of levels needs no more than the part `alone` of the budget by an estimate of the
+/// overlap, 0 from `none` on, with its slope by the estimate.
+IST_HD inline DetailWeight affordable(const DetailPair& pair, double estimate, double budget,
+                                      double alone, double none) noexcept {
+  const double expected = expected_pairs(pair, estimate);
+  // (written so that a damaged asset's NaN takes the coarsest level)
+  const double t = expected < none * budget ? (none - expected / budget) / (none - alone) : 0;
+  if (!(t > 0 && t < 1)) return {smooth_step(t), 0};
+  return {smooth_step(t), -smooth_slope(t) / ((none - alone) * budget) * pair.density *
+                              (1 + pair.skin / (2 * std::sqrt(estimate)))};
+}
+
+}  // namespace ist

@@ -1,0 +1,188 @@
+#include "query/lod/unlike_sizes.h"
+
+#include <ist/mass_properties.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "query/asset/sphere_tree.h"
+#include "query/base/no_answer.h"
+#include "query/base/smooth_step.h"
+#include "query/base/solid_bounds.h"
+#include "query/lod/wanted_error.h"
+#include "query/tree_overlap/descent.h"
+
+namespace ist {
+namespace {
+
+// Ratio of grains up to which trees are summed by lenses alone, however light the contact; from
+// which on the meshes answer light contacts; and from which on all.
+constexpr double kAlike = 1.25, kOther = 2, kUnlike = 4;
+// A contact is light up to an overlap of so many spheres of the coarser grain: there lenses are 2 %
+// and more in error, and few triangles cross …
+constexpr double kFewSpheres = 2;
+// … if a sphere meets no more triangles than the one; never if it meets more than the other.
+constexpr double kFewTriangles = 10, kManyTriangles = 20;
+// The lenses answer alone from so many times that on.
+constexpr double kHandover = 4;
+
+/// How coarse an asset's spheres are for its solid, its unit frame: the mean radius, and more where
+/// inner spheres cover little of it, the solid being thinner than its matched spheres.
+double grain(const AssetHeader& asset) {
+  return asset.matched_tree.mean_radius / covered_part(asset);
+}
+
+/// About how many triangles of a mesh a ball on it meets: those that a disc covers, and those at
+/// its rim.
+double triangles_met(const AssetHeader& asset, double radius) {
+  const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
+  double area = 0;
+  for (const double part : at<BoxSums>(asset, mesh.level[mesh.level_count - 1].nodes)->area)
+    area += part;
+  const double covered = std::numbers::pi * (radius * radius) * mesh.triangle_count / area;
+  const double root = 1 + 1.6 * std::sqrt(covered);
+  return root * root;
+}
+
+/// `scale`: of B in A's unit frame.
+PairMethod method_by_grains(const AssetHeader& header_a, const AssetHeader& header_b,
+                            double scale) {
+  PairMethod method;
+  const double feature_size_a = grain(header_a), feature_size_b = grain(header_b) * scale;
+  const double coarse = std::max(feature_size_a, feature_size_b);
+  const double ratio = coarse / std::min(feature_size_a, feature_size_b);
+  if (ratio >= kUnlike) return {false, true};
+  if (!(ratio > kAlike)) return method;
+  // Grows without bound as the ratio does towards kUnlike.
+  const double unlike = smooth_step((ratio - kAlike) / (kUnlike - kAlike));
+  const double triangles = feature_size_b <= feature_size_a
+                               ? triangles_met(header_a, header_b.matched_tree.mean_radius * scale)
+                               : triangles_met(header_b, header_a.matched_tree.mean_radius / scale);
+  const double worth =
+      1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
+  method.exact = worth > 0;
+  method.share = smooth_step((ratio - kAlike) / (kOther - kAlike));
+  method.full = worth * kFewSpheres * kBallVolume * (coarse * coarse * coarse) / (1 - unlike);
+  method.none = kHandover * method.full;
+  return method;
+}
+
+}  // namespace
+
+PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
+                       const PenetrationSettings& settings,
+                       const std::optional<RelativePose>& pose) noexcept {
+  const bool mesh_alone = lack_spheres(a, b);
+  // Meshes alone have no other measure.
+  if (settings.measure == Measure::exact || (by_error(settings) && mesh_alone))
+    return {false, true};
+  if (settings.measure != Measure::matched || settings.spheres_only || mesh_alone || !pose ||
+      !a.asset.has_mesh() || !b.asset.has_mesh())
+    return {};
+  const PairMethod method =
+      method_by_grains(a.asset.header(), b.asset.header(), pose->a_from_b.scale);
+  // Under a wanted error blend_details() has the exact measure for what spheres cannot do.
+  const bool has_own = by_error(settings) && settings.pair_budget == 0;
+  return method.spheres && has_own ? PairMethod() : method;
+}
+
+SizeMatch size_match(const PlacedAsset& a, const PlacedAsset& b) noexcept {
+  SizeMatch fit;
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return fit;
+  if (!(a.scale > 0) || !(b.scale > 0)) return fit;
+  const auto placed_grain = [](const PlacedAsset& placed) {
+    const AssetHeader& header = placed.asset.header();
+    return std::ldexp(placed.scale * grain(header), header.exponent);
+  };
+  fit.feature_size_a = placed_grain(a);
+  fit.feature_size_b = placed_grain(b);
+  fit.a_is_coarser = fit.feature_size_b <= fit.feature_size_a;
+  fit.ratio = std::max(fit.feature_size_a, fit.feature_size_b) /
+              std::min(fit.feature_size_a, fit.feature_size_b);
+  fit.has_mesh = a.asset.has_mesh() && b.asset.has_mesh();
+  fit.needs_mesh = fit.ratio >= kUnlike;
+  return fit;
+}
+
+namespace {
+
+/// Weight and slope where spheres say `volume`, A's unit frame.
+std::pair<double, double> weight_at(const PairMethod& method, double volume) noexcept {
+  if (!method.exact) return {0, 0};
+  if (!(volume > method.full)) return {method.share, 0};
+  const double width = method.none - method.full;
+  const double t = (volume - method.full) / width;
+  if (!(t < 1)) return {0, 0};
+  return {method.share * (1 - smooth_step(t)), method.share * (-smooth_slope(t) / width)};
+}
+
+}  // namespace
+
+ExactWeight exact_weight(const PairMethod& method, const Penetration& spheres,
+                         double unit3) noexcept {
+  const auto [weight, slope] = weight_at(method, spheres.volume / unit3);
+  // It falls with the volume.
+  return {weight, slope, weight_at(method, spheres.volume_max / unit3).first,
+          weight_at(method, spheres.volume_min / unit3).first};
+}
+
+std::optional<PenetrationSettings> left_for_exact(PenetrationSettings settings,
+                                                  std::uint32_t spent) noexcept {
+  DescentLimits limits = limits_of(settings);
+  limits.spend(spent);
+  if (limits.max_visits == 0) return std::nullopt;
+  settings.measure = Measure::exact;
+  settings.max_visits = limits.max_visits == DescentLimits::kNoLimit ? 0 : limits.max_visits;
+  return settings;
+}
+
+Penetration without_exact(const PlacedAsset& a, const PlacedAsset& b,
+                          Penetration spheres) noexcept {
+  bound_by_solids(a, b, spheres);
+  spheres.status = QueryStatus::budget_exhausted;
+  return spheres;
+}
+
+Penetration blended(const Penetration& spheres, Penetration sum, const ExactWeight& weight,
+                    double unit3) noexcept {
+  sum.node_visits += spheres.node_visits;
+  sum.sphere_pairs += spheres.sphere_pairs;
+  sum.status = std::max(sum.status, spheres.status);
+  if (weight.least == 1) return sum;
+  const double w = weight.weight;
+  const double slope = weight.slope / unit3 * (sum.volume - spheres.volume);
+  const double volume = w * sum.volume + (1 - w) * spheres.volume;
+  // The weight is as sure as the spheres' volume; a blend is largest and least at its ends.
+  const auto at = [](double part, double x, double y) { return part * x + (1 - part) * y; };
+  const double lowest = std::min(at(weight.least, sum.volume_min, spheres.volume_min),
+                                 at(weight.most, sum.volume_min, spheres.volume_min));
+  const double highest = std::max(at(weight.least, sum.volume_max, spheres.volume_max),
+                                  at(weight.most, sum.volume_max, spheres.volume_max));
+  if (volume > 0) {
+    sum.centroid = (w * sum.volume / volume) * sum.centroid +
+                   ((1 - w) * spheres.volume / volume) * spheres.centroid;
+    sum.touching = false;
+    sum.contact_area = 0;
+    sum.contact_normal.setZero();
+  }
+  sum.volume_min = std::max(0.0, lowest);
+  sum.volume_max = highest;
+  sum.volume = std::clamp(volume, sum.volume_min, sum.volume_max);
+  sum.force = w * sum.force + (1 - w + slope) * spheres.force;
+  sum.torque = w * sum.torque + (1 - w + slope) * spheres.torque;
+  return sum;
+}
+
+Penetration lens_sum(const PlacedAsset& a, const TreeHeader& tree_a, const PlacedAsset& b,
+                     const TreeHeader& tree_b, const RelativePose& pose,
+                     const DescentLimits& limits, Workspace::Impl& scratch) noexcept {
+  const SphereTree of_a(a.asset.header(), tree_a), of_b(b.asset.header(), tree_b);
+  Descent descent(of_a, of_b, pose, limits, scratch);
+  descent.run();
+  return descent.penetration();
+}
+
+}  // namespace ist

@@ -1,0 +1,347 @@
+#include "robots/covers/cover_descent.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+#include <unordered_set>
+
+#include "robots/covers/cover_proof.h"
+#include "robots/covers/open_corners.h"
+#include "robots/covers/point_grid.h"
+#include "robots/covers/protrusion.h"
+
+namespace ist {
+namespace {
+
+/// A ball's centre, and by how much its farthest point is further than its nearest wall.
+struct Recentred {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double excess = 0;
+};
+
+using Eigen::Vector3d;
+
+struct Look {
+  double farthest = 0, nearest = 0;
+  double excess() const { return farthest - nearest; }
+};
+
+Look look(const Vector3d& c, std::span<const Vector3d> points, std::span<const Vector3d> walls) {
+  double far2 = 0, near2 = std::numeric_limits<double>::infinity();
+  for (const Vector3d& p : points) far2 = std::max(far2, (p - c).squaredNorm());
+  for (const Vector3d& w : walls) near2 = std::min(near2, (w - c).squaredNorm());
+  return {std::sqrt(far2), walls.empty() ? 0 : std::sqrt(near2)};
+}
+
+/// Directions from what nearly counts to the centre.
+struct Slopes {
+  std::vector<Vector3d> up, down;
+
+  void collect(const Vector3d& c, const Look& at, std::span<const Vector3d> points,
+               std::span<const Vector3d> walls, double slack) {
+    up.clear();
+    down.clear();
+    const double from = std::max(0.0, at.farthest - slack), to = at.nearest + slack;
+    for (const Vector3d& p : points)
+      if (const double d2 = (p - c).squaredNorm(); d2 >= from * from && d2 > 0)
+        up.push_back((c - p) / std::sqrt(d2));
+    for (const Vector3d& w : walls)
+      if (const double d2 = (w - c).squaredNorm(); d2 <= to * to && d2 > 0)
+        down.push_back((c - w) / std::sqrt(d2));
+    if (up.empty()) up.push_back(Vector3d::Zero());
+    if (down.empty()) down.push_back(Vector3d::Zero());
+  }
+
+  /// The shortest vector of hull(up) − hull(down), by Frank and Wolfe's steps.
+  Vector3d shortest() const {
+    Vector3d g = up.front() - down.front();
+    for (int step = 0; step < 24; ++step) {
+      const Vector3d* u = &up.front();
+      const Vector3d* v = &down.front();
+      double least = std::numeric_limits<double>::infinity(), most = -least;
+      for (const Vector3d& one : up)
+        if (const double x = g.dot(one); x < least) least = x, u = &one;
+      for (const Vector3d& one : down)
+        if (const double x = g.dot(one); x > most) most = x, v = &one;
+      const Vector3d way = (*u - *v) - g;
+      const double slope = -g.dot(way);
+      if (slope <= 1e-3 * g.squaredNorm()) break;
+      g += std::min(1.0, slope / way.squaredNorm()) * way;
+    }
+    return g;
+  }
+};
+
+/// Moves a centre, by at most `trust`, so that the farthest of `points` is as little beyond the
+/// nearest of `walls` as can be: steepest descent of max |p − c| − min |w − c|, along the shortest
+/// vector of the hull of all slopes that nearly count. `points` must not be empty; walls missing
+/// from the list must be no nearer than any of it, wherever the centre may go.
+Recentred recentre(const Vector3d& start, std::span<const Vector3d> points,
+                   std::span<const Vector3d> walls, double trust) {
+  Vector3d c = start;
+  Look at = look(c, points, walls);
+  double slack = 0.3 * trust, step = 0.5 * trust;
+  Slopes slopes;
+  for (int round = 0; round < 14 && slack > 1e-3 * trust; ++round) {
+    slopes.collect(c, at, points, walls, slack);
+    const Vector3d g = slopes.shortest();
+    const double slope = std::sqrt(g.squaredNorm());
+    if (slope < 0.02) {
+      slack *= 0.2;
+      continue;
+    }
+    bool moved = false;
+    for (double t = step; t > 0.02 * slack; t *= 0.4) {
+      const Vector3d next = c - (t / slope) * g;
+      if ((next - start).squaredNorm() > trust * trust) continue;
+      const Look there = look(next, points, walls);
+      if (there.excess() < at.excess() - 0.1 * t * slope) {
+        c = next;
+        at = there;
+        step = std::min(2 * t, trust);
+        moved = true;
+        break;
+      }
+    }
+    if (!moved) slack *= 0.3;
+  }
+  return {c, at.excess()};
+}
+
+constexpr double kFirstStep = 0.08;  ///< by which the level is lowered at a time
+constexpr double kLastStep = 0.003;
+constexpr double kHeld = 0.002;       ///< of the level: a gap so small is none
+constexpr double kBeyond = 1.005;     ///< of the level: what reaches no further needs no ray
+constexpr double kWorthwhile = 0.01;  ///< by which a level has to fall before rays are looked at
+constexpr int kPatience = 3;          ///< looks at a level without gain
+constexpr double kVouched = 0.9;  ///< of a level: further down what was seen there is not believed
+constexpr int kRoundsALook = 3;
+constexpr double kApart = 0.05;  ///< levels between targets that a look adds
+
+/// A ball of radius 0 has its centre too far out to be one, and stays none.
+std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
+  for (CoverSphere& ball : balls)
+    if (ball.radius > 0) ball.radius += by;
+  return balls;
+}
+
+}  // namespace
+
+/// Where the balls are, and how far each may go at a time.
+struct CoverDescent::Balls {
+  Balls(const OffsetSurface& surface, std::vector<Vector3d> at)
+      : centres(std::move(at)), trust(centres.size(), 0.5 * surface.level()) {
+    measure(surface);
+  }
+
+  void measure(const OffsetSurface& surface) {
+    radii.clear();
+    for (const Vector3d& c : centres) radii.push_back(surface.radius(c));
+  }
+
+  std::vector<CoverSphere> spheres() const {
+    std::vector<CoverSphere> spheres;
+    for (std::size_t i = 0; i < centres.size(); ++i) spheres.push_back({centres[i], radii[i]});
+    return spheres;
+  }
+
+  std::vector<Vector3d> centres;
+  std::vector<double> radii, trust;
+};
+
+/// All balls at the level of the surface.
+class CoverDescent::Round {
+ public:
+  Round(const PointGrid& targets, const OffsetSurface& surface, Balls& balls)
+      : targets_(targets),
+        surface_(surface),
+        reach_(kReach * surface.level()),
+        balls_(balls),
+        holders_(targets.size(), 0) {
+    for (std::size_t i = 0; i < balls.centres.size(); ++i)
+      targets_.within(balls_.centres[i], balls_.radii[i],
+                      [&](std::uint32_t x, float) { ++holders_[x]; });
+    for (std::uint32_t x = 0; x < targets_.size(); ++x)
+      if (holders_[x] == 0) open_.push_back(x);
+  }
+
+  /// Returns whether a ball moved.
+  bool move_all() {
+    bool moved = false;
+    for (std::size_t i = 0; i < balls_.centres.size(); ++i) moved |= may_help(i) && move(i);
+    return moved;
+  }
+
+ private:
+  /// Whether an open target is within reach of the ball.
+  bool may_help(std::size_t i) {
+    std::erase_if(open_, [&](std::uint32_t x) { return holders_[x] != 0; });
+    const double reach = balls_.radii[i] + reach_;
+    return std::any_of(open_.begin(), open_.end(), [&](std::uint32_t x) {
+      return (targets_.point(x) - balls_.centres[i]).squaredNorm() <= reach * reach;
+    });
+  }
+
+  bool move(std::size_t i) {
+    Vector3d& centre = balls_.centres[i];
+    double& radius = balls_.radii[i];
+    if (!(radius > 0)) return false;
+    const auto within = static_cast<float>(radius);
+    const float within2 = within * within;
+    needed_.clear();
+    targets_.within(centre, radius + reach_, [&](std::uint32_t x, float d2) {
+      if (holders_[x] == (d2 <= within2 ? 1 : 0)) needed_.push_back(targets_.point(x));
+    });
+    double& trust = balls_.trust[i];
+    walls_.clear();
+    surface_.walls(centre, radius + 2 * trust, walls_);
+    const Recentred moved = recentre(centre, needed_, walls_, trust);
+    const double next = surface_.radius(moved.centre);
+    const double way = std::sqrt((moved.centre - centre).squaredNorm());
+    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * surface_.level(),
+                       0.7 * surface_.level());
+    if (!(next > 0) || !(way > 0)) return false;
+    targets_.within(centre, radius, [&](std::uint32_t x, float) {
+      if (--holders_[x] == 0) open_.push_back(x);
+    });
+    centre = moved.centre;
+    radius = next;
+    targets_.within(centre, radius, [&](std::uint32_t x, float) { ++holders_[x]; });
+    return true;
+  }
+
+  /// Levels beyond its surface a ball looks at. Where it looks further, it lets go of what it
+  /// holds, for a target that it will not reach, and gaps grow.
+  static constexpr double kReach = 0.3;
+
+  const PointGrid& targets_;
+  const OffsetSurface& surface_;
+  const double reach_;
+  Balls& balls_;
+  std::vector<int> holders_;         ///< balls that hold a target
+  std::vector<std::uint32_t> open_;  ///< targets that none holds, and some that one does by now
+  std::vector<Vector3d> needed_, walls_;
+};
+
+/// Returns how far the worst place that was found is outside.
+double CoverDescent::add_targets(const std::vector<CoverSphere>& balls, double level) {
+  std::vector<OpenCorner> open = open_corners(solid_.arrays(), balls, holders_);
+  if (sampled_.share)
+    for (OpenCorner& corner : open) corner.gap /= sampled_.share(corner.place, Vector3d::Zero());
+  std::stable_sort(open.begin(), open.end(),
+                   [](const OpenCorner& a, const OpenCorner& b) { return a.gap > b.gap; });
+  std::unordered_set<std::uint64_t> seen;
+  for (const OpenCorner& corner : open) {
+    if (corner.gap <= kHeld * level) break;
+    if (seen.insert(cell_key(corner.place, kApart * level)).second)
+      sampled_.targets.push_back(corner.place);
+  }
+  return open.empty() ? 0 : open.front().gap;
+}
+
+/// Returns by how much the worst ball reaches too far.
+double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<CoverSphere>& balls) {
+  const double level = surface.level();
+  std::vector<std::vector<Vector3d>> beyond(balls.size());
+  std::vector<double> further(balls.size(), 0);
+  vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
+  tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
+    // What was seen there before needs no look.
+    CoverSphere& vouched = vouched_[i];
+    if (vouched.centre == balls[i].centre && level <= vouched.radius &&
+        level > kVouched * vouched.radius)
+      return;
+    // Nor does what the distance alone vouches for.
+    if (balls[i].radius <= surface.sure_radius(balls[i].centre) * (1 + 1e-9)) return;
+    further[i] =
+        guessed_protrusion(solid_, balls[i], 0.05, kBeyond * level, beyond[i]).least - level;
+    if (further[i] <= (kBeyond - 1) * level) {
+      further[i] = 0;
+      vouched = {balls[i].centre, level};
+    }
+  });
+  std::unordered_set<std::uint64_t> seen;
+  for (const auto& points : beyond) {
+    for (const Vector3d& p : points) {
+      if (!seen.insert(cell_key(p, 0.2 * level)).second) continue;
+      const ClosestPoint foot = solid_.closest_point(p);
+      const Vector3d out = (p - foot.point) / foot.distance;
+      sampled_.rays.push_back(
+          {foot.point, out, foot.distance, sampled_.share ? sampled_.share(foot.point, out) : 1});
+    }
+  }
+  return std::max(0.0, *std::max_element(further.begin(), further.end()));
+}
+
+/// Returns how deep the place lies that was found, 0 if none was.
+double CoverDescent::add_void(const std::vector<CoverSphere>& balls, double level) {
+  const OpenPlace open = open_void(solid_, balls);
+  if (!open.found || open.gap <= kHeld * level) return 0;
+  sampled_.targets.push_back(open.place);
+  return open.gap;
+}
+
+LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::function<void()>& look) {
+  LookedCover looked = {std::move(start), {}};
+  LevelCover& cover = looked.cover;
+  // What the samples hold at is no level yet: the first look says what it is.
+  for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
+    const bool first = step == 0;
+    const double aim = cover.level * (1 - step);
+    // At the aim, not at the level that was reached: rays that end between the two are walls here.
+    OffsetSurface surface(solid_, sampled_, aim);
+    Balls balls(surface, cover.centres);
+    double best_here = std::numeric_limits<double>::infinity();
+    bool gained = false;
+    for (int idle = 0; idle < kPatience && rounds > 0;) {
+      if (!first) {
+        const PointGrid targets(sampled_.targets);
+        Round round(targets, surface, balls);
+        for (int k = 0; k < kRoundsALook; ++k, --rounds)
+          if (!round.move_all()) break;
+      }
+      look();
+      const std::vector<CoverSphere> spheres = balls.spheres();
+      double level = aim + add_targets(spheres, aim);
+      const auto grown_to = [&](double to) {
+        return sampled_.share ? Balls({solid_, sampled_, to}, balls.centres).spheres()
+                              : grown(spheres, to - aim);
+      };
+      const auto is_better = [&] {
+        return first || level < (1 - kWorthwhile) * cover.level ||
+               (level < cover.level && level <= aim * (1 + kHeld));
+      };
+      if (is_better()) {
+        level += add_void(grown_to(level + kHeld * aim), aim);
+        const std::size_t rays = sampled_.rays.size();
+        if (is_better()) level = std::max(level, aim + add_rays(surface, spheres));
+        if (is_better()) {
+          cover = {balls.centres, level};
+          looked.balls = grown_to(level);
+          gained = true;
+        }
+        if (sampled_.rays.size() != rays) {
+          surface = OffsetSurface(solid_, sampled_, aim);
+          balls.measure(surface);
+        }
+      }
+      if (first || level <= aim * (1 + kHeld)) break;
+      if (level < best_here * (1 - 1e-3)) {
+        best_here = level;
+        idle = 0;
+      } else {
+        ++idle;
+      }
+    }
+    if (first)
+      step = kFirstStep;
+    else if (!gained)
+      step *= 0.5;
+  }
+  return looked;
+}
+
+}  // namespace ist

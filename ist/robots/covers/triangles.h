@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "base/rounding.h"
+#include "mesh/mesh_solid.h"
+
+namespace ist {
+
+/// The corners of a triangle that is cut into ever smaller ones.
+using HalvableTriangle = std::array<Eigen::Vector3d, 3>;
+
+struct LongestSide {
+  std::size_t from = 0;  ///< the side from this corner to the next
+  double length2 = 0;
+};
+
+/// The first of several that are as long.
+inline LongestSide longest_side(const HalvableTriangle& t) {
+  LongestSide longest{0, -1};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double length2 = (t[(k + 1) % 3] - t[k]).squaredNorm();
+    if (length2 > longest.length2) longest = {k, length2};
+  }
+  return longest;
+}
+
+/// A triangle cut from the middle of a side to the corner opposite, turned as it was.
+inline std::array<HalvableTriangle, 2> halves(const HalvableTriangle& t, std::size_t side) {
+  const Eigen::Vector3d &a = t[side], &b = t[(side + 1) % 3], &c = t[(side + 2) % 3];
+  const Eigen::Vector3d middle = (a + b) / 2;
+  return {HalvableTriangle{middle, c, a}, HalvableTriangle{b, c, middle}};
+}
+
+}  // namespace ist

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "robots/description/robot_model.h"
+
+namespace ist {
+
+/// A position of each joint; those that are fixed or mimic another are not looked at.
+using Positions = std::vector<double>;
+
+/// 0 where the joint's limits allow it, else the middle between them.
+Positions default_positions(const RobotModel& robot);
+
+/// The middle of all limits.
+Positions middle_positions(const RobotModel& robot);
+
+/// Of the joint's child in its parent's frame.
+Eigen::Isometry3d joint_frame(const RobotModel& robot, std::size_t joint,
+                              const Positions& positions);
+
+/// Frames of all links in the root's frame.
+std::vector<Eigen::Isometry3d> link_frames(const RobotModel& robot, const Positions& positions);
+
+/// Links that carry tools, the first one first: the last fixed link behind the joints of each limb.
+/// A limb ends before a hand: where it forks into limbs of fewer moving joints than lead there.
+std::vector<std::size_t> tool_links(const RobotModel& robot);
+
+/// Joints from the root to a link.
+std::vector<std::size_t> path_to(const RobotModel& robot, std::size_t link);
+
+/// Free joints of grippers: hands of at most two.
+std::vector<std::size_t> gripper_joints(const RobotModel& robot);
+
+}  // namespace ist

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "robots/description/kinematics.h"
+#include "robots/description/robot_model.h"
+#include "robots/description/sphere_files.h"
+
+namespace ist {
+
+/// Whether the solids of two links overlap: indices of the links that are compared, and the pose of
+/// b's frame in a's. Called from many threads at once.
+using LinksOverlap =
+    std::function<bool(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a)>;
+
+/// Two links, and what is known of them.
+struct LinkPair {
+  std::string a, b;  ///< in the order of the file
+  /// Why a planner is not to compare their spheres; empty: it is to.
+  ///
+  /// Adjacent: a joint connects them, or links without spheres alone stand between. Always: the
+  /// solids overlapped in all positions tried. Never: in none, though the spheres did in 1 % or
+  /// more. Excluded: the robot's file says so.
+  std::string ignored;
+  std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
+  // Of SelfCollision::samples other positions:
+  std::size_t colliding = 0;  ///< the solids overlap
+  std::size_t missed = 0;     ///< the solids overlap, and no compared spheres of this pair do
+  std::size_t falsely = 0;    ///< compared spheres overlap, and the solids do not
+};
+
+/// A pose that a planner may begin with.
+struct DefaultPose {
+  Positions positions;
+  std::string from;         ///< "zero", "given", "middle", "search", or the name of a state
+  bool solids_free = true;  ///< no solids of two links overlap, other than Adjacent and Always
+  /// Pairs whose solids overlap; or, if none do, pairs whose compared spheres do.
+  std::vector<std::pair<std::string, std::string>> overlapping;
+};
+
+/// Compared spheres of two links that overlap in a position in which no solids do.
+struct FalseMeeting {
+  std::size_t a, b;    ///< of the links compared
+  std::size_t sample;  ///< of the positions that decide
+  Eigen::Isometry3d b_in_a;
+};
+
+struct SelfCollision {
+  std::vector<LinkPair> pairs;
+  std::vector<FalseMeeting> meetings;  ///< in the positions that decide, not in `samples`
+  std::size_t free = 0;                ///< of the positions that decide: no solids overlap
+  DefaultPose pose;
+  std::map<std::size_t, double> locked;  ///< joints of grippers: open, in the pose and the samples
+  /// Positions of all joints, drawn within their limits after all was decided, and how many of them
+  /// are truly colliding (of pairs that are neither Adjacent nor Always), of these how many the
+  /// spheres call free, and how many free ones they call colliding.
+  std::size_t samples = 0, colliding = 0, missed = 0, falsely = 0;
+
+  double false_share() const {
+    return samples == colliding
+               ? 0
+               : static_cast<double>(falsely) / static_cast<double>(samples - colliding);
+  }
+};
+
+/// What is asked of the default pose.
+struct WantedPose {
+  std::map<std::size_t, double> positions;                     ///< by joint; these are not searched
+  std::vector<std::pair<std::string, Positions>> states = {};  ///< tried first, by name
+};
+
+/// Finds out which links a planner must compare, by solids in sampled positions.
+///
+/// The default pose is the first of these in which neither solids nor spheres overlap: the states
+/// given, joints at 0 (or the middle of limits that exclude it), the middle of all limits, poses
+/// that differ from the first in few joints. Else it is the first in which no solids do; else the
+/// first. The same input gives the same answer.
+class SelfCollisionStudy {
+ public:
+  /// `names`: of the links to compare. Keeps a reference to the robot.
+  SelfCollisionStudy(const RobotModel& robot, std::vector<std::string> names, LinksOverlap overlap,
+                     WantedPose wanted);
+  ~SelfCollisionStudy();
+
+  /// `links`: spheres of each of the links, in their order. `cover`: each contains its link. What
+  /// is known of solids is kept from call to call.
+  SelfCollision of(std::span<const LinkSpheres> links, bool cover);
+
+ private:
+  struct Pair;
+  using Apart = std::function<bool(const Eigen::Isometry3d& b_in_a)>;
+
+  void open_grippers(const std::vector<struct SphereBody>& bodies);
+  void draw_samples(std::span<const LinkSpheres> links);
+  bool solids_overlap(Pair& pair, std::size_t sample, const Eigen::Isometry3d& b_in_a) const;
+  bool holds(const Pair& pair, bool always, const Apart& apart, std::size_t& tried) const;
+  void choose_pose(std::span<const struct SphereBody> bodies, bool cover, SelfCollision& out) const;
+
+  const RobotModel& robot_;
+  const std::vector<std::string> names_;
+  const LinksOverlap overlap_;
+  const WantedPose wanted_;
+  std::vector<Pair> pairs_;
+  std::map<std::size_t, double> locked_;  ///< joints of grippers, at which position
+  std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to begin with, in order
+  std::size_t half_ = 0;                                    ///< of samples_: those that decide
+  std::vector<Positions> samples_;
+};
+
+}  // namespace ist

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+#include <future>
+#include <utility>
+
+#include "base/thread_arena.h"
+#include "base/work_stop.h"
+
+namespace ist {
+
+/// A part of a bake that is done once, on threads of its own. Where the scope is left before its
+/// end, it is stopped and waited for.
+template <class Result>
+class Aside {
+ public:
+  /// `threads`: 0 = all cores. `time_limit` [s] from now, after which it is stopped; 0: none.
+  Aside(unsigned threads, std::function<Result(const WorkStop&)> work, double time_limit = 0)
+      : threads_(threads), work_(std::move(work)), stop_(time_limit) {}
+  ~Aside() { stop_.stop(); }
+  Aside(const Aside&) = delete;
+  Aside& operator=(const Aside&) = delete;
+
+  void start() {
+    if (!made_.valid()) made_ = do_aside(threads_, [this] { return work_(stop_); }).share();
+  }
+
+  /// Starts it if nobody has, and asks `meanwhile` twenty times a second until it is there. Throws
+  /// what the work throws.
+  Result wait(const std::function<void()>& meanwhile) {
+    start();
+    wait_for(made_, meanwhile);
+    return made_.get();
+  }
+
+ private:
+  const unsigned threads_;
+  const std::function<Result(const WorkStop&)> work_;
+  WorkStop stop_;
+  std::shared_future<Result> made_;  ///< last: waits for the thread
+};
+
+}  // namespace ist

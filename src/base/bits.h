@@ -1,0 +1,83 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+#include <cstring>
+
+#include "base/host_device.h"
+
+namespace ist {
+
+inline constexpr std::uint32_t kNoIndex = 0xFFFFFFFFu;  ///< the number of nothing
+
+IST_HD inline std::uint32_t bits_of(float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits;
+}
+
+IST_HD inline float float_of(std::uint32_t bits) {
+  float x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+/// The bits of a float as an integer of the same order.
+IST_HD inline std::uint32_t ordered_bits(float x) {
+  const std::uint32_t bits = bits_of(x);
+  return bits ^ ((bits >> 31) != 0 ? 0xFFFFFFFFu : 0x80000000u);
+}
+
+IST_HD inline float from_ordered_bits(std::uint32_t ordered) {
+  return float_of(ordered ^ ((ordered >> 31) != 0 ? 0x80000000u : 0xFFFFFFFFu));
+}
+
+/// The bits of a double as an integer of the same order.
+IST_HD inline std::uint64_t ordered_bits(double x) {
+  std::uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  return bits ^ ((bits >> 63) != 0 ? 0xFFFFFFFFFFFFFFFFull : 0x8000000000000000ull);
+}
+
+IST_HD inline double from_ordered_bits(std::uint64_t ordered) {
+  const std::uint64_t bits =
+      ordered ^ ((ordered >> 63) != 0 ? 0x8000000000000000ull : 0xFFFFFFFFFFFFFFFFull);
+  double x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+IST_HD inline int count_bits(std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return __popc(bits);
+#else
+  return std::popcount(bits);
+#endif
+}
+
+IST_HD inline int count_bits(std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  return __popcll(bits);
+#else
+  return std::popcount(bits);
+#endif
+}
+
+/// The number of the lowest bit that is set. `bits` must not be 0.
+IST_HD inline int lowest_bit(std::uint32_t bits) {
+#ifdef __CUDA_ARCH__
+  return __ffs(static_cast<int>(bits)) - 1;
+#else
+  return std::countr_zero(bits);
+#endif
+}
+
+IST_HD inline int lowest_bit(std::uint64_t bits) {
+#ifdef __CUDA_ARCH__
+  return __ffsll(static_cast<long long>(bits)) - 1;
+#else
+  return std::countr_zero(bits);
+#endif
+}
+
+}  // namespace ist

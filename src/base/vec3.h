@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cmath>
+
+#include "base/host_device.h"
+
+namespace ist {
+
+/// Three doubles, for host and device code. Sums go from the left to the right.
+struct Vec3 {
+  double x, y, z;
+
+  IST_HD double& operator[](int k) { return k == 0 ? x : k == 1 ? y : z; }
+  IST_HD double operator[](int k) const { return k == 0 ? x : k == 1 ? y : z; }
+};
+
+IST_HD inline Vec3 vec3(const double (&x)[3]) { return {x[0], x[1], x[2]}; }
+
+IST_HD inline Vec3 operator+(const Vec3& a, const Vec3& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+IST_HD inline Vec3 operator-(const Vec3& a, const Vec3& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+IST_HD inline Vec3 operator-(const Vec3& a) { return {-a.x, -a.y, -a.z}; }
+IST_HD inline Vec3 operator*(double s, const Vec3& a) { return {s * a.x, s * a.y, s * a.z}; }
+IST_HD inline Vec3 operator/(const Vec3& a, double s) { return {a.x / s, a.y / s, a.z / s}; }
+IST_HD inline double dot(const Vec3& a, const Vec3& b) {
+  return (a.x * b.x + a.y * b.y) + a.z * b.z;
+}
+IST_HD inline double norm(const Vec3& a) { return std::sqrt(dot(a, a)); }
+IST_HD inline Vec3 cross(const Vec3& a, const Vec3& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+// The same of arrays.
+IST_HD inline double dot(const double (&a)[3], const double (&b)[3]) {
+  return dot(vec3(a), vec3(b));
+}
+IST_HD inline double norm(const double (&a)[3]) { return norm(vec3(a)); }
+IST_HD inline void cross(const double (&a)[3], const double (&b)[3], double (&out)[3]) {
+  const Vec3 c = cross(vec3(a), vec3(b));
+  out[0] = c.x, out[1] = c.y, out[2] = c.z;
+}
+
+}  // namespace ist

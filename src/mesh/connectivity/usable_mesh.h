@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <ist/mesh.h>
+
+#include "mesh/connectivity/edge_table.h"
+
+namespace ist {
+
+/// One vertex for equal coordinates, as weld() has it, of a mesh of which nothing is known.
+/// Throws Error for no triangles, indices that lead nowhere, coordinates that are not finite, and
+/// sizes and offsets that double cannot compute with.
+void weld_usable(TriangleMesh& mesh, const std::string& name);
+
+Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
+
+/// The box around one triangle.
+inline Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& vertices,
+                                     const Triangle& t) {
+  Eigen::AlignedBox3d box(vertices[t[0]]);
+  box.extend(vertices[t[1]]);
+  return box.extend(vertices[t[2]]);
+}
+
+/// The box around some triangles; vertices that none of them has do not count.
+inline Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& vertices,
+                                     const std::vector<Triangle>& triangles) {
+  Eigen::AlignedBox3d box;
+  for (const Triangle& t : triangles) box.extend(bounds_of(vertices, t));
+  return box;
+}
+
+inline double area_of(const std::vector<Eigen::Vector3d>& vertices, const Triangle& t) {
+  return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
+}
+
+/// The largest magnitude of a coordinate.
+double largest_coordinate(const Eigen::AlignedBox3d& bounds);
+
+/// The spacing of doubles at `size`.
+inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
+
+/// As close_mesh(), of a closed surface whose triangles face outward already: none is turned.
+/// Shells that face inward count as cavities. How its triangles meet is not looked for.
+ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
+
+}  // namespace ist

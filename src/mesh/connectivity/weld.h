@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+#include <ist/mesh.h>
+
+#include "base/hashing.h"
+
+namespace ist {
+
+/// Of a point by its coordinates' bits, −0 = 0.
+inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
+  std::uint64_t hash = 0;
+  for (const double x : p)
+    hash = mixed(hash ^ std::bit_cast<std::uint64_t>(x + 0.0));  // −0 + 0 = 0
+  return hash;
+}
+
+/// [point] the smallest index among those that are used and have equal coordinates (−0 = 0);
+/// anything for points that are not used. `used` [point]: 0 or 1. Used coordinates must be finite.
+/// On the caller's TBB threads.
+std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
+                                       const std::vector<std::uint8_t>& used);
+
+/// One vertex for all that lie within `tolerance` [u] of the first of them in file order (0: equal
+/// coordinates, −0 = 0); triangles follow. Unreferenced vertices are dropped, the rest keep their
+/// order. Every referenced coordinate must be finite.
+TriangleMesh weld(TriangleMesh mesh, double tolerance);
+
+/// Of these the last step alone: unreferenced vertices are dropped.
+void drop_unused(TriangleMesh& mesh);
+
+/// As weld() with a tolerance above 0, but vertices that are not in `among` (by index) stay apart.
+TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
+
+}  // namespace ist

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+
+#include "base/host_device.h"
+#include "mesh/connectivity/item_groups.h"
+#include "mesh/geometry/mesh_view.h"
+#include "mesh/geometry/ray_crossing.h"
+#include "mesh/geometry/triangle_strip.h"
+
+namespace ist {
+
+constexpr double kGoldenRatio = 0.6180339887498949;  ///< the most irrational part of a step
+
+/// Lines along x, evenly spaced: line (i, j) at y(i, j), z(j). All of them together are cut with a
+/// mesh by drawing its triangles onto the lattice, which needs no hierarchy.
+struct LineLattice {
+  double y0 = 0, z0 = 0;          ///< lower corner of the lattice, unit frame
+  double step_y = 0, step_z = 0;  ///< unit frame, > 0
+  double offset = 0;              ///< of the first line from the lower corner, over the step
+  double shift = 0;               ///< of every row against the one before, over the step
+  std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
+
+  /// Of the first line of row j from the lower corner, over the step.
+  IST_HD double turned(std::uint32_t j) const {
+    const double all = offset + j * shift;
+    return shift == 0 ? all : all - static_cast<double>(static_cast<std::int64_t>(all));
+  }
+  IST_HD double y(std::uint32_t i, std::uint32_t j) const { return y0 + (i + turned(j)) * step_y; }
+  IST_HD double z(std::uint32_t j) const { return z0 + (j + offset) * step_z; }
+  IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
+};
+
+/// The places among 0 … count − 1 in [low, high], with room for rounding.
+struct LatticeRange {
+  std::uint32_t first, last;  ///< [first, last)
+
+  IST_HD LatticeRange(double low, double high, std::uint32_t count) {
+    constexpr double kRoom = 1e-6;
+    const auto clamped = [count](double x) {
+      return static_cast<std::uint32_t>(x > 0 ? (x < count ? x : count) : 0);
+    };
+    first = clamped(std::ceil(low - kRoom));
+    last = clamped(std::floor(high + kRoom) + 1);
+  }
+};
+
+/// Rows that may meet a triangle.
+IST_HD inline LatticeRange rows_of(const LineLattice& lattice, const Corners& t) {
+  const Extent z(t, 2);
+  return {(z.low - lattice.z0) / lattice.step_z - lattice.offset,
+          (z.high - lattice.z0) / lattice.step_z - lattice.offset, lattice.nz};
+}
+
+/// Lines of row j that may pierce a triangle.
+IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t, std::uint32_t j) {
+  constexpr double kRoom = 1e-12;  // above the rounding of what follows
+  const double z = lattice.z(j);
+  double low = 1e300, high = -1e300;
+  for (int k = 0; k < 3; ++k) {
+    const double* p = t.p[k];
+    const double* q = t.p[(k + 1) % 3];
+    if ((p[2] > z) == (q[2] > z)) continue;
+    const double y = p[1] + (z - p[2]) / (q[2] - p[2]) * (q[1] - p[1]);
+    low = y - kRoom < low ? y - kRoom : low;
+    high = y + kRoom > high ? y + kRoom : high;
+  }
+  if (low > high) return {0, -3, lattice.ny};
+  const double first = lattice.y(0, j);
+  return {(low - first) / lattice.step_y, (high - first) / lattice.step_y, lattice.ny};
+}
+
+/// A triangle in the (y, z) plane in steps of a lattice, seen from row 0 of its line 0.
+inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
+  std::array<double, 3> y, z;
+  for (std::size_t k = 0; k < 3; ++k) {
+    y[k] = (t.p[k][1] - lattice.y0) / lattice.step_y;
+    z[k] = (t.p[k][2] - lattice.z0) / lattice.step_z - lattice.offset;
+  }
+  return {y, z};
+}
+
+/// Whether a line of row j may lie within. Most rows of a needle have none, which this tells for
+/// less than lines_of() does.
+inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
+  constexpr double kRoom = 2e-6;  // more than a LatticeRange's
+  const double at = strip.at(j) - lattice.turned(j);
+  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kRoom)) >=
+         at + strip.left - kRoom;
+}
+
+/// Order of crossings along a line: by x, equal x: +1 first.
+IST_HD inline bool comes_before(const Crossing& a, const Crossing& b) {
+  return a.x != b.x ? a.x < b.x : a.sign > b.sign;
+}
+
+/// Where a triangle crosses line (i, j), as line_crossings() has it; sign 0: nowhere.
+IST_HD inline Crossing crossing_of(const LineLattice& lattice, const Corners& t, std::uint32_t i,
+                                   std::uint32_t j) {
+  const double yz[2] = {lattice.y(i, j), lattice.z(j)};
+  const int facing = pierced(t, yz);
+  if (facing == 0) return {};
+  return {crossing_x(t, yz), -facing};
+}
+
+/// The crossings of some rows' lines, in order, a group a line.
+using LatticeCrossings = ItemGroups<std::uint64_t, Crossing>;
+
+/// All crossings of a mesh (its arrays suffice) with a lattice: calls visit(j, crossings) for rows
+/// j and on, line (i, j + k) is group k ny + i, until all rows were visited. There are some 16
+/// million crossings at once, or those of a row; the lines of needles have billions. Runs on the
+/// caller's TBB threads.
+void cross_lattice(const MeshView& mesh, const LineLattice& lattice,
+                   const std::function<void(std::uint32_t, const LatticeCrossings&)>& visit);
+
+/// Calls visit(line, crossing) for every crossing of a triangle with row j.
+template <class Visit>
+void for_row(const LineLattice& lattice, const Corners& t, std::uint32_t j, const Visit& visit) {
+  const LatticeRange lines = lines_of(lattice, t, j);
+  for (std::uint32_t i = lines.first; i < lines.last; ++i) {
+    const Crossing crossing = crossing_of(lattice, t, i, j);
+    if (crossing.sign != 0) visit(std::size_t{j} * lattice.ny + i, crossing);
+  }
+}
+
+}  // namespace ist
