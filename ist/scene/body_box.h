@@ -17,10 +17,6 @@ enum class Place : std::uint8_t {
   endless,  ///< it has no box
   refused,  ///< its pose or scale is not usable
 };
-struct PlacedBox {
-  Place place = Place::refused;
-  SceneBox box = {};
-};
 
 /// By how much boxes are wider than solids.
 struct BoxWidths {
@@ -36,10 +32,25 @@ class BodyBox {
   BodyBox() = default;
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
-  /// In the world.
-  PlacedBox placed(const Pose& pose, const BoxWidths& widths, const Motion& motion) const noexcept;
+  /// In the world: `to`, if it has one.
+  [[gnu::always_inline]] Place place(const Pose& pose, const BoxWidths& widths,
+                                     const Motion& motion, SceneBox& to) const noexcept {
+    const Rotation rotation = Rotation::of(pose.q);
+    if (!usable(rotation, pose.t, scale_) || box_.empty) return Place::refused;
+    if (box_.endless) return Place::endless;
+    const double wider = widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
+                         (widths.by_size ? tolerance_ : 0);
+    WorldBox box = box_.placed(rotation, pose.t, wider);
+    if (widths.duration > 0 && !sweep(box, widths.duration, motion)) return Place::refused;
+    if (!box.fits()) return Place::refused;
+    box.write(to.low, to.high);
+    return Place::tree;
+  }
 
  private:
+  /// Widens a box by a motion; false if that is none.
+  bool sweep(WorldBox& box, double duration, const Motion& motion) const noexcept;
+
   SolidBox box_;  ///< scaled
   double scale_ = 1;
   double tolerance_ = 0;  ///< [u] at least this body's share of an impact's

@@ -56,6 +56,10 @@ class BoxTree {
     const std::uint32_t lane = lane_of_[body];
     nodes_[lane / kLanes].set(lane % kLanes, box);
   }
+  SceneBox box_of(std::uint32_t body) const noexcept {
+    const std::uint32_t lane = lane_of_[body];
+    return nodes_[lane / kLanes].box(lane % kLanes);
+  }
   /// Sets all boxes above those of bodies, and builds anew where they have grown too much.
   void refit() noexcept;
   /// Builds anew where many were added.

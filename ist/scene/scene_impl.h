@@ -31,7 +31,6 @@ struct Scene::Impl {
   struct Body {
     SceneBody given;
     BodyBox kept;
-    SceneBox box;
     Place place = Place::free;
   };
   /// What is asked of a body for every box that its own meets.
@@ -116,8 +115,8 @@ struct Scene::Impl {
     note_moved(body);
     const Pose& pose = std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
                                   body.given.solid.placed);
-    const auto [place, box] = body.kept.placed(pose, widths, body.given.motion);
-    body.box = box;
+    SceneBox box;
+    const Place place = body.kept.place(pose, widths, body.given.motion, box);
     if (place == Place::tree && body.place == Place::tree) {
       if (at_once)
         tree_of(body).put(index(body), box);
@@ -195,8 +194,9 @@ struct Scene::Impl {
           // Two that moved find each other.
           if (j != i && (!filtered[j].moved || i < j)) note(i, j);
         };
-        moving.each_meeting(body.box, visit);
-        if (body.given.moves) still.each_meeting(body.box, visit);
+        const SceneBox box = tree_of(body).box_of(i);
+        moving.each_meeting(box, visit);
+        if (body.given.moves) still.each_meeting(box, visit);
       }
     }
     for (const std::uint32_t i : endless) {

@@ -9,7 +9,7 @@ namespace ist {
 /// A float that is lower, by more than what doubles round.
 IST_HD inline float float_below(double x) noexcept {
   const auto nearest = static_cast<float>(x);
-  return nearest - (nearest < 0 ? -nearest : nearest) * 1.2e-7f - 1e-37f;
+  return nearest - ::fabsf(nearest) * 1.2e-7f - 1e-37f;
 }
 
 /// A box along the world's axes [u].
@@ -20,8 +20,7 @@ struct WorldBox {
   IST_HD bool fits() const noexcept {
     constexpr double kMost = 1e37;
     for (int k = 0; k < 3; ++k)
-      if (!(low[k] >= -kMost) || !(low[k] <= kMost) || !(high[k] >= -kMost) || !(high[k] <= kMost))
-        return false;
+      if (!(low[k] >= -kMost) || !(high[k] <= kMost)) return false;
     return true;
   }
   /// Rounded outward.
@@ -55,7 +54,7 @@ struct SolidBox {
     double m[9];
     rotation.matrix(m);
     const Vec3 at = turned(m, middle) + vec3(t);
-    for (double& x : m) x = x < 0 ? -x : x;
+    for (double& x : m) x = std::fabs(x);
     const Vec3 reach = turned(m, half) + Vec3{wider, wider, wider};
     return {at - reach, at + reach};
   }
