@@ -187,17 +187,26 @@ struct Scene::Impl {
       moving.pairs_within(both);
       moving.pairs_with(still, both);
     } else {
-      for (const std::uint32_t i : moved) {
-        const Body& body = bodies[i];
-        if (body.place != Place::tree) continue;
-        const auto visit = [&](std::uint32_t j) {
-          // Two that moved find each other.
-          if (j != i && (!filtered[j].moved || i < j)) note(i, j);
+      constexpr std::size_t kTogether = 64;
+      std::uint32_t of[kTogether];
+      SceneBox boxes[kTogether];
+      std::size_t count = 0;
+      const auto ask = [&] {
+        const auto visit = [&](std::uint32_t k, std::uint32_t j) {
+          // Two that moved find each other; two that cannot move are no pair.
+          if (j != of[k] && (!filtered[j].moved || of[k] < j)) note(of[k], j);
         };
-        const SceneBox box = tree_of(body).box_of(i);
-        moving.each_meeting(box, visit);
-        if (body.given.moves) still.each_meeting(box, visit);
+        moving.each_meeting(std::span(boxes, count), visit);
+        still.each_meeting(std::span(boxes, count), visit);
+        count = 0;
+      };
+      for (const std::uint32_t i : moved) {
+        if (bodies[i].place != Place::tree) continue;
+        of[count] = i;
+        boxes[count++] = tree_of(bodies[i]).box_of(i);
+        if (count == kTogether) ask();
       }
+      ask();
     }
     for (const std::uint32_t i : endless) {
       if (filtered[i].moved) {
