@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -54,6 +55,7 @@ struct Scene::Impl {
     std::uint32_t patches = 0;
     YesNo overlapping = YesNo::unknown;
     bool meet = false;
+    bool stays = false;  ///< no body moved since the step before
   };
 
   explicit Impl(const SceneSettings& given)
@@ -172,7 +174,8 @@ struct Scene::Impl {
 
   void note(std::uint32_t i, std::uint32_t j) noexcept {
     if ((!filtered[i].moved && !filtered[j].moved) || !may_meet(i, j)) return;
-    if (found.size() + kept == settings.max_pairs) {
+    if (found.size() + now.size() >= settings.max_pairs &&
+        found.size() + count_kept() == settings.max_pairs) {
       exceeded = true;
       return;
     }
@@ -226,6 +229,14 @@ struct Scene::Impl {
 
   bool is_kept(const Candidate& two) const noexcept {
     return !filtered[two.body[0]].moved && !filtered[two.body[1]].moved;
+  }
+
+  /// Pairs of the step before of which no body moved: their answers stay.
+  std::size_t count_kept() noexcept {
+    if (!kept)
+      kept = static_cast<std::size_t>(std::count_if(
+          now.begin(), now.end(), [&](const Candidate& two) { return is_kept(two); }));
+    return *kept;
   }
 
   /// A place for an answer; those of before are used again.
@@ -311,30 +322,8 @@ struct Scene::Impl {
     }
   }
 
-  SceneStep step(const ParallelFor& parallel) noexcept {
-    still.settle();
-    moving.settle();
-    SceneStep out;
-    refused.clear();
-    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
-    std::sort(refused.begin(), refused.end());
-    out.refused = refused;
-    // Of bodies that stand still the answers stay.
-    kept = static_cast<std::size_t>(
-        std::count_if(now.begin(), now.end(), [&](const Candidate& two) { return is_kept(two); }));
-    found.clear();
-    exceeded = false;
-    find_candidates();
-    out.boxes_met = kept + found.size();
-    if (exceeded) {
-      // What moved is asked in the next step.
-      out.pairs_exceeded = true;
-      return out;
-    }
-    std::swap(now, before);
-    now.clear();
-    for (Candidate& two : before)
-      if (!is_kept(two)) give_back(two);
+  /// Answers the pairs of which a body moved.
+  void ask_found(const ParallelFor& parallel) noexcept {
     sort_found();
     fresh.clear();
     bool asks = false;
@@ -348,7 +337,40 @@ struct Scene::Impl {
     if (asks)
       answer_all(fresh.size(), workspaces.size(), parallel,
                  [&](std::size_t i, std::size_t worker) { answer(fresh[i], workspaces[worker]); });
-    merge();
+  }
+
+  SceneStep step(const ParallelFor& parallel) noexcept {
+    still.settle();
+    moving.settle();
+    SceneStep out;
+    refused.clear();
+    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
+    std::sort(refused.begin(), refused.end());
+    out.refused = refused;
+    kept.reset();
+    found.clear();
+    exceeded = false;
+    find_candidates();
+    if (exceeded) {
+      out.boxes_met = count_kept() + found.size();
+      // What moved is asked in the next step.
+      out.pairs_exceeded = true;
+      return out;
+    }
+    std::size_t gone = 0;
+    for (Candidate& two : now)
+      if (!(two.stays = is_kept(two))) {
+        give_back(two);
+        ++gone;
+      }
+    out.boxes_met = now.size() - gone + found.size();
+    if (gone > 0 || !found.empty()) {
+      ask_found(parallel);
+      merge();
+    } else {
+      for (ScenePair& pair : pairs) pair.event = SceneEvent::stays;
+      ended.clear();
+    }
     for (const std::uint32_t i : moved) {
       filtered[i].moved = false;
       if (bodies[i].place == Place::free) free_bodies.push_back(i);
@@ -362,6 +384,8 @@ struct Scene::Impl {
   /// Of those of before that stay and those that were asked: all, the pairs that meet, and those
   /// that no longer do.
   void merge() noexcept {
+    std::swap(now, before);
+    now.clear();
     pairs.clear();
     ended.clear();
     const auto go_on = [&](const Candidate& two, bool met) {
@@ -376,7 +400,7 @@ struct Scene::Impl {
     auto old = before.begin();
     const auto pass = [&](std::uint64_t key) {
       for (; old != before.end() && old->key < key; ++old) {
-        if (is_kept(*old))
+        if (old->stays)
           go_on(*old, old->meet);
         else if (old->meet)
           ended.push_back(name_of(old->key));
@@ -413,7 +437,7 @@ struct Scene::Impl {
   const void* context = nullptr;
   std::vector<Found> found, sorted;
   std::vector<Candidate> now, before, fresh;
-  std::size_t kept = 0;
+  std::optional<std::size_t> kept;  ///< count_kept(), once it is asked in a step
   std::vector<ScenePair> pairs;
   std::vector<Penetration> penetrations;  ///< by slot, as the three below
   std::vector<Separation> separations;
