@@ -123,7 +123,7 @@ int run(int argc, char** argv) {
   Report report("gpu_scene", argc, argv);
   report.page("Broad phases on a GPU");
   report.remark(
-      "Spiky balls of 320 triangles and size 1, each moved by up to 0.1 along each axis in a step; "
+      "Balls of size 1, each moved by up to 0.1 along each axis in a step; "
       "one body in ten has a box that meets another's. Poses are on the device; a graph is "
       "launched, its work timed by events, median of 20 steps. With answers: the exact penetration "
       "of each pair follows in the same graph. Scene is ist::Scene's broad phase on one core of "

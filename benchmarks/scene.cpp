@@ -1,14 +1,20 @@
-// The broad phase of ist::Scene beside FCL's DynamicAABBTreeCollisionManager and Bullet's
-// btDbvtBroadphase: bodies that move a little in every step, and what their boxes meet. One thread,
-// thread CPU time, the median of the steps.
+// The broad phase of ist::Scene beside FCL's and Coal's DynamicAABBTreeCollisionManager and
+// Bullet's btDbvtBroadphase: bodies that move a little in every step, and what their boxes meet.
+// One thread, thread CPU time, the median of the steps.
 //
 // Floor of a step of 10,000 moving bodies, one in ten of which meets another: 560 kB of boxes are
 // written and read, and a descent of the hierarchy with itself compares some 30 boxes a body, 3 ns
 // each: 1 ms. Of the boxes themselves (a rotation of a half-extent) 40 ns each are 0.4 ms.
 
 #include <btBulletDynamicsCommon.h>
+#ifdef IST_HAVE_COAL
+#include <coal/broadphase/broadphase_dynamic_AABB_tree.h>
+#include <coal/collision_object.h>
+#include <coal/shape/geometric_shapes.h>
+#endif
 #include <fcl/fcl.h>
 #include <ist/bake.h>
+#include <ist/pose_eigen.h>
 #include <ist/scene.h>
 
 #include <algorithm>
@@ -150,7 +156,7 @@ Course simulated(std::size_t count, bool gravity_turns, int steps) {
   return course;
 }
 
-/// One of the three: bodies are added once, and told where they stand.
+/// One of the peers: bodies are added once, and told where they stand.
 struct Peer {
   virtual ~Peer() = default;
   virtual void add(const Course& course) = 0;
@@ -188,12 +194,54 @@ struct OfIst final : Peer {
   std::vector<std::uint32_t> numbers;
 };
 
-struct OfFcl final : Peer {
+/// What FCL and Coal, which comes from it, call differently.
+struct Fcl {
+  using Object = fcl::CollisionObjectd;
+  using Manager = fcl::DynamicAABBTreeCollisionManagerd;
+  using Box = fcl::Boxd;
+  static Eigen::Isometry3d transform(const Eigen::Isometry3d& at) { return at; }
+  template <class... Others>
+  static std::size_t pairs(Manager& manager, Others*... others) {
+    std::size_t pairs = 0;
+    manager.collide(others..., &pairs, [](Object* a, Object* b, void* data) {
+      *static_cast<std::size_t*>(data) += a->getAABB().overlap(b->getAABB());
+      return false;
+    });
+    return pairs;
+  }
+};
+
+#ifdef IST_HAVE_COAL
+struct Coal {
+  using Object = coal::CollisionObject;
+  using Manager = coal::DynamicAABBTreeCollisionManager;
+  using Box = coal::Box;
+  static coal::Transform3s transform(const Eigen::Isometry3d& at) {
+    return coal::Transform3s(at.linear(), at.translation());
+  }
+  struct Count final : coal::CollisionCallBackBase {
+    bool collide(Object* a, Object* b) override {
+      pairs += a->getAABB().overlap(b->getAABB());
+      return false;
+    }
+    std::size_t pairs = 0;
+  };
+  template <class... Others>
+  static std::size_t pairs(Manager& manager, Others*... others) {
+    Count count;
+    manager.collide(others..., &count);
+    return count.pairs;
+  }
+};
+#endif
+
+template <class Library>
+struct OfManager final : Peer {
   void add(const Course& course) override {
     for (std::size_t i = 0; i < course.size(); ++i) {
       const double edge = course.edge[i];
-      objects.push_back(
-          std::make_unique<fcl::CollisionObjectd>(std::make_shared<fcl::Boxd>(edge, edge, edge)));
+      objects.push_back(std::make_unique<typename Library::Object>(
+          std::make_shared<typename Library::Box>(edge, edge, edge)));
       place(i, course.start[i]);
       (i < course.still ? still : moving).registerObject(objects[i].get());
     }
@@ -201,8 +249,7 @@ struct OfFcl final : Peer {
     moving.setup();
   }
   void place(std::size_t i, const Pose& pose) {
-    objects[i]->setTransform(Eigen::Quaterniond(pose.q[0], pose.q[1], pose.q[2], pose.q[3]),
-                             Eigen::Vector3d(pose.t[0], pose.t[1], pose.t[2]));
+    objects[i]->setTransform(Library::transform(ist::to_isometry(pose)));
     objects[i]->computeAABB();
   }
   std::size_t step(std::span<const Pose> poses) override {
@@ -213,17 +260,12 @@ struct OfFcl final : Peer {
     } else {
       moving.update(objects[first].get());
     }
-    std::size_t pairs = 0;
-    const auto count = [](fcl::CollisionObjectd* a, fcl::CollisionObjectd* b, void* data) {
-      if (a->getAABB().overlap(b->getAABB())) ++*static_cast<std::size_t*>(data);
-      return false;
-    };
-    moving.collide(&pairs, count);
-    if (!still.empty()) moving.collide(&still, &pairs, count);
+    std::size_t pairs = Library::pairs(moving);
+    if (!still.empty()) pairs += Library::pairs(moving, &still);
     return pairs;
   }
-  std::vector<std::unique_ptr<fcl::CollisionObjectd>> objects;
-  fcl::DynamicAABBTreeCollisionManagerd still, moving;
+  std::vector<std::unique_ptr<typename Library::Object>> objects;
+  typename Library::Manager still, moving;
 };
 
 struct OfBullet final : Peer {
@@ -301,19 +343,27 @@ int main(int argc, char** argv) {
   for (const auto& [name, make] : cases) {
     const Course course = make();
     OfIst ist_scene(cube);
-    OfFcl fcl_manager;
+    OfManager<Fcl> fcl_manager;
     OfBullet bullet;
     Report::Json line = {{"case", name}, {"bodies", course.size()}};
     const auto [ist_us, ist_pairs] = median_step(ist_scene, course);
     const auto [fcl_us, fcl_pairs] = median_step(fcl_manager, course);
     const auto [bullet_us, bullet_pairs] = median_step(bullet, course);
+    double best = std::min(fcl_us, bullet_us);
     line["pairs"] = ist_pairs;
     line["pairs, FCL"] = fcl_pairs;
     line["pairs, Bullet"] = bullet_pairs;
     line["ist us"] = ist_us;
     line["FCL us"] = fcl_us;
     line["Bullet us"] = bullet_us;
-    line["best peer / ist"] = std::min(fcl_us, bullet_us) / ist_us;
+#ifdef IST_HAVE_COAL
+    OfManager<Coal> coal_manager;
+    const auto [coal_us, coal_pairs] = median_step(coal_manager, course);
+    line["pairs, Coal"] = coal_pairs;
+    line["Coal us"] = coal_us;
+    best = std::min(best, coal_us);
+#endif
+    line["best peer / ist"] = best / ist_us;
     report.row("Steps", line);
   }
   return report.write();
