@@ -6,6 +6,7 @@
 #include <ist/time_of_impact.h>
 
 #include "query/find_solid_box.h"
+#include "scene/box_kernel.h"
 #include "scene/box_tree.h"
 
 namespace ist {
@@ -33,21 +34,39 @@ class BodyBox {
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
   /// In the world: `to`, if it has one.
-  [[gnu::always_inline]] Place place(const Pose& pose, const BoxWidths& widths,
-                                     const Motion& motion, SceneBox& to) const noexcept {
+  Place place(const Pose& pose, const BoxWidths& widths, const Motion& motion,
+              SceneBox& to) const noexcept {
     const Rotation rotation = Rotation::of(pose.q);
     if (!usable(rotation, pose.t, scale_) || box_.empty) return Place::refused;
     if (box_.endless) return Place::endless;
-    const double wider = widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
-                         (widths.by_size ? tolerance_ : 0);
-    WorldBox box = box_.placed(rotation, pose.t, wider);
+    WorldBox box = box_.placed(rotation, pose.t, wider(widths));
     if (widths.duration > 0 && !sweep(box, widths.duration, motion)) return Place::refused;
     if (!box.fits()) return Place::refused;
     box.write(to.low, to.high);
     return Place::tree;
   }
 
+  /// Puts this body in a block; false if it cannot be in one.
+  bool put(BodyBlock& block, std::size_t k, const Pose& pose,
+           const BoxWidths& widths) const noexcept {
+    if (box_.empty || box_.endless || widths.duration > 0 || !(scale_ > 0) ||
+        !std::isfinite(scale_))
+      return false;
+    for (int c = 0; c < 3; ++c) {
+      block.middle[c][k] = box_.middle[c];
+      block.half[c][k] = box_.half[c];
+      block.t[c][k] = pose.t[c];
+    }
+    for (int c = 0; c < 4; ++c) block.q[c][k] = pose.q[c];
+    block.wider[k] = wider(widths);
+    return true;
+  }
+
  private:
+  double wider(const BoxWidths& widths) const noexcept {
+    return widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
+           (widths.by_size ? tolerance_ : 0);
+  }
   /// Widens a box by a motion; false if that is none.
   bool sweep(WorldBox& box, double duration, const Motion& motion) const noexcept;
 

@@ -112,13 +112,19 @@ struct Scene::Impl {
     body.place = Place::free;
   }
 
+  static const Pose& pose_of(const Body& body) noexcept {
+    return std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
+                      body.given.solid.placed);
+  }
+
   /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
   void place(Body& body, bool at_once) noexcept {
-    note_moved(body);
-    const Pose& pose = std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
-                                  body.given.solid.placed);
     SceneBox box;
-    const Place place = body.kept.place(pose, widths, body.given.motion, box);
+    const Place place = body.kept.place(pose_of(body), widths, body.given.motion, box);
+    put_down(body, at_once, place, box);
+  }
+  void put_down(Body& body, bool at_once, Place place, const SceneBox& box) noexcept {
+    note_moved(body);
     if (place == Place::tree && body.place == Place::tree) {
       if (at_once)
         tree_of(body).put(index(body), box);
@@ -145,14 +151,28 @@ struct Scene::Impl {
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
     const bool at_once = 8 * count > index_of.size();
-    std::size_t done = 0;
+    std::size_t done = 0, waiting = 0;
+    Body* of[BodyBlock::kCount];
+    BodyBlock block;
     for (std::size_t i = 0; i < count; ++i) {
       Body* const body = find(numbers[i]);
       if (body == nullptr) continue;
       set(body->given, values[i]);
-      place(*body, at_once);
       ++done;
+      if (!body->kept.put(block, waiting, pose_of(*body), widths)) {
+        place(*body, at_once);
+        continue;
+      }
+      of[waiting++] = body;
+      if (waiting < BodyBlock::kCount) continue;
+      place_boxes(block);
+      for (std::size_t k = 0; k < waiting; ++k)
+        put_down(*of[k], at_once, block.placed >> k & 1 ? Place::tree : Place::refused,
+                 {{block.low[0][k], block.low[1][k], block.low[2][k]},
+                  {block.high[0][k], block.high[1][k], block.high[2][k]}});
+      waiting = 0;
     }
+    for (std::size_t k = 0; k < waiting; ++k) place(*of[k], at_once);
     if (at_once) {
       still.refit();
       moving.refit();

@@ -16,9 +16,10 @@ IST_HD inline float float_below(double x) noexcept {
 struct WorldBox {
   Vec3 low, high;
 
+  static constexpr double kMost = 1e37;
+
   /// Whether floats can hold it.
   IST_HD bool fits() const noexcept {
-    constexpr double kMost = 1e37;
     for (int k = 0; k < 3; ++k)
       if (!(low[k] >= -kMost) || !(high[k] <= kMost)) return false;
     return true;
@@ -51,12 +52,9 @@ struct SolidBox {
   /// Wider by so much [u] on each side.
   IST_HD WorldBox placed(const Rotation& rotation, const double (&t)[3],
                          double wider) const noexcept {
-    double m[9];
-    rotation.matrix(m);
-    const Vec3 at = turned(m, middle) + vec3(t);
-    for (double& x : m) x = std::fabs(x);
-    const Vec3 reach = turned(m, half) + Vec3{wider, wider, wider};
-    return {at - reach, at + reach};
+    WorldBox box;
+    formulas::box_around(rotation.w, rotation.v, vec3(t), middle, half, wider, box.low, box.high);
+    return box;
   }
 };
 
