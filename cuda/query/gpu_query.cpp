@@ -10,82 +10,12 @@
 #include <vector>
 
 #include "cuda/base/check.h"
-#include "cuda/base/queue.h"
+#include "cuda/query/gpu_solids.h"
 #include "cuda/query/kernels.h"
 #include "cuda/query/make_solid_ref.h"
+#include "cuda/query/parts.h"
 
 namespace ist {
-
-namespace gpu {
-
-/// Device memory that outlives the queue it comes from.
-class DeviceBytes {
- public:
-  DeviceBytes() = default;
-  DeviceBytes(Queue& queue, const GpuSettings& settings, std::size_t bytes)
-      : settings_(settings), data_(queue.allocate(bytes)), bytes_(bytes) {}
-  ~DeviceBytes() {
-    if (data_ == nullptr) return;
-    try {
-      Queue(settings_).deallocate(data_, bytes_);
-    } catch (const Error&) {  // a device that is gone has no memory to give back
-    }
-  }
-  DeviceBytes(DeviceBytes&& other) noexcept { *this = std::move(other); }
-  DeviceBytes& operator=(DeviceBytes&& other) noexcept {
-    std::swap(settings_, other.settings_);
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
-    return *this;
-  }
-
-  std::byte* data() const { return static_cast<std::byte*>(data_); }
-  std::size_t bytes() const { return bytes_; }
-
- private:
-  GpuSettings settings_;
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
-};
-
-/// Parts of a block of memory, one after another.
-class Parts {
- public:
-  explicit Parts(std::byte* from) : from_(from) {}
-
-  template <class T>
-  T* take(std::size_t count) {
-    T* const part = reinterpret_cast<T*>(from_ + used_);
-    used_ += (count * sizeof(T) + 255) / 256 * 256;
-    return part;
-  }
-  std::size_t used() const { return used_; }
-
- private:
-  std::byte* from_;
-  std::size_t used_ = 0;
-};
-
-template <class T>
-void copy_to_device(T* to, std::span<const T> from, Queue& queue) {
-  if (from.empty()) return;
-  check(cudaMemcpyAsync(to, from.data(), from.size_bytes(), cudaMemcpyHostToDevice, queue.stream()),
-        "copying to the GPU");
-}
-
-}  // namespace gpu
-
-struct GpuSolids::Impl {
-  int device = 0;
-  gpu::DeviceBytes memory;
-  const gpu::SolidRef* refs = nullptr;
-  std::size_t size = 0;
-  bool has_fields = false;
-  bool has_group[gpu::kFieldGroups] = {};
-  bool has_details = false;       ///< some asset has coarser levels
-  std::uint32_t most_bins = 0;    ///< of a tree's contacts
-  std::uint32_t most_blocks = 0;  ///< of a mesh
-};
 
 struct GpuWorkspace::Impl {
   int device = 0;
@@ -141,6 +71,8 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
   place(impl_->memory.data());
   gpu::copy_to_device<gpu::SolidRef>(at, refs, queue);
   impl_->refs = at;
+  for (const GpuSolid& solid : solids)
+    impl_->boxes.push_back(std::visit([](const auto& s) { return solid_box(s); }, solid));
   for (const gpu::SolidRef& solid : refs) {
     if (solid.is_field()) impl_->has_group[gpu::group_of(solid.field.kind)] = true;
     impl_->has_fields = impl_->has_fields || solid.is_field();

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
+#include "query/find_solid_box.h"
+#include "scene/box_kernel.h"
 #include "scene/box_tree.h"
 
 namespace ist {
@@ -17,10 +18,6 @@ enum class Place : std::uint8_t {
   endless,  ///< it has no box
   refused,  ///< its pose or scale is not usable
 };
-struct PlacedBox {
-  Place place = Place::refused;
-  SceneBox box = {};
-};
 
 /// By how much boxes are wider than solids.
 struct BoxWidths {
@@ -30,28 +27,52 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-SceneBox box_around(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper) noexcept;
-
-/// What of a solid's box does not change with its pose.
+/// What of a body's box does not change with its pose.
 class BodyBox {
  public:
   BodyBox() = default;
   explicit BodyBox(const PlacedSolid& solid) noexcept;
 
-  /// In the world.
-  PlacedBox placed(const Pose& pose, const BoxWidths& widths, const Motion& motion) const noexcept;
+  /// In the world: `to`, if it has one.
+  Place place(const Pose& pose, const BoxWidths& widths, const Motion& motion,
+              SceneBox& to) const noexcept {
+    const Rotation rotation = Rotation::of(pose.q);
+    if (!usable(rotation, pose.t, scale_) || box_.empty) return Place::refused;
+    if (box_.endless) return Place::endless;
+    WorldBox box = box_.placed(rotation, pose.t, wider(widths));
+    if (widths.duration > 0 && !sweep(box, widths.duration, motion)) return Place::refused;
+    if (!box.fits()) return Place::refused;
+    box.write(to.low, to.high);
+    return Place::tree;
+  }
+
+  /// Puts this body in a block; false if it cannot be in one.
+  bool put(BodyBlock& block, std::size_t k, const Pose& pose,
+           const BoxWidths& widths) const noexcept {
+    if (box_.empty || box_.endless || widths.duration > 0 || !(scale_ > 0) ||
+        !std::isfinite(scale_))
+      return false;
+    for (int c = 0; c < 3; ++c) {
+      block.middle[c][k] = box_.middle[c];
+      block.half[c][k] = box_.half[c];
+      block.t[c][k] = pose.t[c];
+    }
+    for (int c = 0; c < 4; ++c) block.q[c][k] = pose.q[c];
+    block.wider[k] = wider(widths);
+    return true;
+  }
 
  private:
-  struct Turned {
-    Eigen::Vector3d middle, half;
-  };
-  static std::optional<Turned> of(const Shape& field) noexcept;
+  double wider(const BoxWidths& widths) const noexcept {
+    return widths.margin + (widths.by_spheres ? box_.protrusion : 0) +
+           (widths.by_size ? tolerance_ : 0);
+  }
+  /// Widens a box by a motion; false if that is none.
+  bool sweep(WorldBox& box, double duration, const Motion& motion) const noexcept;
 
-  std::optional<Turned> box_;  ///< in the solid's own frame, scaled; none: it has no end
+  SolidBox box_;  ///< scaled
   double scale_ = 1;
-  double sticks_out_ = 0;  ///< [u]
-  double tolerance_ = 0;   ///< [u] at least this body's share of an impact's
-  bool empty_ = false;
+  double tolerance_ = 0;  ///< [u] at least this body's share of an impact's
 };
 
 }  // namespace ist

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace ist {
@@ -56,6 +57,10 @@ class BoxTree {
     const std::uint32_t lane = lane_of_[body];
     nodes_[lane / kLanes].set(lane % kLanes, box);
   }
+  SceneBox box_of(std::uint32_t body) const noexcept {
+    const std::uint32_t lane = lane_of_[body];
+    return nodes_[lane / kLanes].box(lane % kLanes);
+  }
   /// Sets all boxes above those of bodies, and builds anew where they have grown too much.
   void refit() noexcept;
   /// Builds anew where many were added.
@@ -80,6 +85,36 @@ class BoxTree {
   template <class Visit>
   void each_meeting(const SceneBox& box, const Visit& visit) const noexcept {
     visit_lanes([&](const Node& node) { return node.meeting(box); }, visit);
+  }
+  /// visit(k, body) of the leaves whose boxes meet the k-th. Nodes of one box are fetched while
+  /// those of others are looked at: a large hierarchy is not in the cache.
+  template <class Visit>
+  void each_meeting(std::span<const SceneBox> boxes, const Visit& visit) const noexcept {
+    if (root_ == kNone) return;
+    constexpr std::uint32_t kRoom = 256;
+    struct Waiting {
+      std::uint32_t node, box;
+    } waiting[kRoom];
+    std::uint32_t first = 0, end = 0, begun = 0;
+    while (first != end || begun < boxes.size()) {
+      while (begun < boxes.size() && end - first < kRoom / 8)
+        waiting[end++ % kRoom] = {root_, begun++};
+      const auto [at, k] = waiting[first++ % kRoom];
+      const SceneBox& box = boxes[k];
+      for (std::uint32_t lanes = nodes_[at].meeting(box); lanes != 0; lanes &= lanes - 1) {
+        const std::uint32_t child = nodes_[at].child[std::countr_zero(lanes)];
+        if (is_leaf(child)) {
+          visit(k, child & ~kLeaf);
+        } else if (end - first < kRoom) {
+          __builtin_prefetch(&nodes_[child]);
+          __builtin_prefetch(reinterpret_cast<const char*>(&nodes_[child]) + 64);
+          waiting[end++ % kRoom] = {child, k};
+        } else {
+          visit_lanes([&](const Node& node) { return node.meeting(box); },
+                      [&](std::uint32_t body) { visit(k, body); }, child);
+        }
+      }
+    }
   }
 
   /// visit(body, body) of all pairs of leaves whose boxes meet, once each.
@@ -148,13 +183,16 @@ class BoxTree {
 
   template <class LanesOf, class Visit>
   void visit_lanes(const LanesOf& lanes_of, const Visit& visit) const noexcept {
-    if (root_ == kNone) return;
-    std::uint32_t at = root_, lanes = lanes_of(nodes_[at]);
+    if (root_ != kNone) visit_lanes(lanes_of, visit, root_);
+  }
+  template <class LanesOf, class Visit>
+  void visit_lanes(const LanesOf& lanes_of, const Visit& visit, std::uint32_t from) const noexcept {
+    std::uint32_t at = from, lanes = lanes_of(nodes_[at]);
     // Depth first without a stack, by the parents' links.
     for (;;) {
       if (lanes == 0) {
+        if (at == from) return;
         const Node& done = nodes_[at];
-        if (done.parent == kNone) return;
         at = done.parent;
         lanes = lanes_of(nodes_[at]) & ~((2u << done.place) - 1);
         continue;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -31,7 +32,6 @@ struct Scene::Impl {
   struct Body {
     SceneBody given;
     BodyBox kept;
-    SceneBox box;
     Place place = Place::free;
   };
   /// What is asked of a body for every box that its own meets.
@@ -55,6 +55,7 @@ struct Scene::Impl {
     std::uint32_t patches = 0;
     YesNo overlapping = YesNo::unknown;
     bool meet = false;
+    bool stays = false;  ///< no body moved since the step before
   };
 
   explicit Impl(const SceneSettings& given)
@@ -111,13 +112,19 @@ struct Scene::Impl {
     body.place = Place::free;
   }
 
+  static const Pose& pose_of(const Body& body) noexcept {
+    return std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
+                      body.given.solid.placed);
+  }
+
   /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
   void place(Body& body, bool at_once) noexcept {
+    SceneBox box;
+    const Place place = body.kept.place(pose_of(body), widths, body.given.motion, box);
+    put_down(body, at_once, place, box);
+  }
+  void put_down(Body& body, bool at_once, Place place, const SceneBox& box) noexcept {
     note_moved(body);
-    const Pose& pose = std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
-                                  body.given.solid.placed);
-    const auto [place, box] = body.kept.placed(pose, widths, body.given.motion);
-    body.box = box;
     if (place == Place::tree && body.place == Place::tree) {
       if (at_once)
         tree_of(body).put(index(body), box);
@@ -144,14 +151,28 @@ struct Scene::Impl {
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
     const bool at_once = 8 * count > index_of.size();
-    std::size_t done = 0;
+    std::size_t done = 0, waiting = 0;
+    Body* of[BodyBlock::kCount];
+    BodyBlock block;
     for (std::size_t i = 0; i < count; ++i) {
       Body* const body = find(numbers[i]);
       if (body == nullptr) continue;
       set(body->given, values[i]);
-      place(*body, at_once);
       ++done;
+      if (!body->kept.put(block, waiting, pose_of(*body), widths)) {
+        place(*body, at_once);
+        continue;
+      }
+      of[waiting++] = body;
+      if (waiting < BodyBlock::kCount) continue;
+      place_boxes(block);
+      for (std::size_t k = 0; k < waiting; ++k)
+        put_down(*of[k], at_once, block.placed >> k & 1 ? Place::tree : Place::refused,
+                 {{block.low[0][k], block.low[1][k], block.low[2][k]},
+                  {block.high[0][k], block.high[1][k], block.high[2][k]}});
+      waiting = 0;
     }
+    for (std::size_t k = 0; k < waiting; ++k) place(*of[k], at_once);
     if (at_once) {
       still.refit();
       moving.refit();
@@ -173,7 +194,8 @@ struct Scene::Impl {
 
   void note(std::uint32_t i, std::uint32_t j) noexcept {
     if ((!filtered[i].moved && !filtered[j].moved) || !may_meet(i, j)) return;
-    if (found.size() + kept == settings.max_pairs) {
+    if (found.size() + now.size() >= settings.max_pairs &&
+        found.size() + count_kept() == settings.max_pairs) {
       exceeded = true;
       return;
     }
@@ -188,16 +210,26 @@ struct Scene::Impl {
       moving.pairs_within(both);
       moving.pairs_with(still, both);
     } else {
-      for (const std::uint32_t i : moved) {
-        const Body& body = bodies[i];
-        if (body.place != Place::tree) continue;
-        const auto visit = [&](std::uint32_t j) {
-          // Two that moved find each other.
-          if (j != i && (!filtered[j].moved || i < j)) note(i, j);
+      constexpr std::size_t kTogether = 64;
+      std::uint32_t of[kTogether];
+      SceneBox boxes[kTogether];
+      std::size_t count = 0;
+      const auto ask = [&] {
+        const auto visit = [&](std::uint32_t k, std::uint32_t j) {
+          // Two that moved find each other; two that cannot move are no pair.
+          if (j != of[k] && (!filtered[j].moved || of[k] < j)) note(of[k], j);
         };
-        moving.each_meeting(body.box, visit);
-        if (body.given.moves) still.each_meeting(body.box, visit);
+        moving.each_meeting(std::span(boxes, count), visit);
+        still.each_meeting(std::span(boxes, count), visit);
+        count = 0;
+      };
+      for (const std::uint32_t i : moved) {
+        if (bodies[i].place != Place::tree) continue;
+        of[count] = i;
+        boxes[count++] = tree_of(bodies[i]).box_of(i);
+        if (count == kTogether) ask();
       }
+      ask();
     }
     for (const std::uint32_t i : endless) {
       if (filtered[i].moved) {
@@ -217,6 +249,14 @@ struct Scene::Impl {
 
   bool is_kept(const Candidate& two) const noexcept {
     return !filtered[two.body[0]].moved && !filtered[two.body[1]].moved;
+  }
+
+  /// Pairs of the step before of which no body moved: their answers stay.
+  std::size_t count_kept() noexcept {
+    if (!kept)
+      kept = static_cast<std::size_t>(std::count_if(
+          now.begin(), now.end(), [&](const Candidate& two) { return is_kept(two); }));
+    return *kept;
   }
 
   /// A place for an answer; those of before are used again.
@@ -302,30 +342,8 @@ struct Scene::Impl {
     }
   }
 
-  SceneStep step(const ParallelFor& parallel) noexcept {
-    still.settle();
-    moving.settle();
-    SceneStep out;
-    refused.clear();
-    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
-    std::sort(refused.begin(), refused.end());
-    out.refused = refused;
-    // Of bodies that stand still the answers stay.
-    kept = static_cast<std::size_t>(
-        std::count_if(now.begin(), now.end(), [&](const Candidate& two) { return is_kept(two); }));
-    found.clear();
-    exceeded = false;
-    find_candidates();
-    out.boxes_met = kept + found.size();
-    if (exceeded) {
-      // What moved is asked in the next step.
-      out.pairs_exceeded = true;
-      return out;
-    }
-    std::swap(now, before);
-    now.clear();
-    for (Candidate& two : before)
-      if (!is_kept(two)) give_back(two);
+  /// Answers the pairs of which a body moved.
+  void ask_found(const ParallelFor& parallel) noexcept {
     sort_found();
     fresh.clear();
     bool asks = false;
@@ -339,7 +357,40 @@ struct Scene::Impl {
     if (asks)
       answer_all(fresh.size(), workspaces.size(), parallel,
                  [&](std::size_t i, std::size_t worker) { answer(fresh[i], workspaces[worker]); });
-    merge();
+  }
+
+  SceneStep step(const ParallelFor& parallel) noexcept {
+    still.settle();
+    moving.settle();
+    SceneStep out;
+    refused.clear();
+    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
+    std::sort(refused.begin(), refused.end());
+    out.refused = refused;
+    kept.reset();
+    found.clear();
+    exceeded = false;
+    find_candidates();
+    if (exceeded) {
+      out.boxes_met = count_kept() + found.size();
+      // What moved is asked in the next step.
+      out.pairs_exceeded = true;
+      return out;
+    }
+    std::size_t gone = 0;
+    for (Candidate& two : now)
+      if (!(two.stays = is_kept(two))) {
+        give_back(two);
+        ++gone;
+      }
+    out.boxes_met = now.size() - gone + found.size();
+    if (gone > 0 || !found.empty()) {
+      ask_found(parallel);
+      merge();
+    } else {
+      for (ScenePair& pair : pairs) pair.event = SceneEvent::stays;
+      ended.clear();
+    }
     for (const std::uint32_t i : moved) {
       filtered[i].moved = false;
       if (bodies[i].place == Place::free) free_bodies.push_back(i);
@@ -353,6 +404,8 @@ struct Scene::Impl {
   /// Of those of before that stay and those that were asked: all, the pairs that meet, and those
   /// that no longer do.
   void merge() noexcept {
+    std::swap(now, before);
+    now.clear();
     pairs.clear();
     ended.clear();
     const auto go_on = [&](const Candidate& two, bool met) {
@@ -367,7 +420,7 @@ struct Scene::Impl {
     auto old = before.begin();
     const auto pass = [&](std::uint64_t key) {
       for (; old != before.end() && old->key < key; ++old) {
-        if (is_kept(*old))
+        if (old->stays)
           go_on(*old, old->meet);
         else if (old->meet)
           ended.push_back(name_of(old->key));
@@ -404,7 +457,7 @@ struct Scene::Impl {
   const void* context = nullptr;
   std::vector<Found> found, sorted;
   std::vector<Candidate> now, before, fresh;
-  std::size_t kept = 0;
+  std::optional<std::size_t> kept;  ///< count_kept(), once it is asked in a step
   std::vector<ScenePair> pairs;
   std::vector<Penetration> penetrations;  ///< by slot, as the three below
   std::vector<Separation> separations;

@@ -69,7 +69,8 @@ SceneNearest Scene::nearest(const Eigen::Vector3d& point,
 
 std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                           std::span<std::uint32_t> numbers) const noexcept {
-  const SceneBox box = box_around(lower, upper);
+  SceneBox box;
+  WorldBox{plain(lower), plain(upper)}.write(box.low, box.high);
   std::size_t count = 0;
   const auto visit = [&](std::uint32_t i) {
     if (count < numbers.size()) numbers[count] = impl_->bodies[i].given.number;

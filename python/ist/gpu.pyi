@@ -62,3 +62,28 @@ class ContactPatches:
     point: Final[_DeviceArray | None]  # (n, m, 3) [u] on the central axis of the wrench
     torsion: Final[_DeviceArray | None]  # (n, m) [u³] about the normal
     status: Final[_DeviceArray | None]  # (n,) QueryStatus
+
+@final
+class ScenePairs:
+    count: Final[Array]  # (1,) pairs; 0 if they are more than max_pairs
+    boxes_met: Final[Array]  # (1,)
+    a: Final[Array]  # (max_pairs,) body
+    b: Final[Array]  # (max_pairs,) body, above a's
+    solid_a: Final[Array]  # (max_pairs,)
+    solid_b: Final[Array]  # (max_pairs,)
+    poses_a: Final[Array]  # (max_pairs, 7)
+    poses: Final[Array]  # (max_pairs, 7) of b
+    scales_a: Final[Array]  # (max_pairs,)
+    scales: Final[Array]  # (max_pairs,) of b
+    status: Final[Array]  # (n,) QueryStatus of each body
+
+@final
+class Scene:
+    bytes: Final[int]
+    def __init__(
+        self, solids: Any, solid: Any, *, scales: Any = None, worlds: Any = None, moves: Any = None,
+        layers: Any = None, meets: Any = None, excluded: Any = None, margin: float = 0.0,
+        max_pairs: int = 8192, measure: str = "matched",
+    ) -> None: ...
+    def __len__(self) -> int: ...
+    def find_pairs(self, poses: _DeviceArray, *, stream: Any = None) -> ScenePairs: ...

@@ -127,7 +127,9 @@ void Moment::hold(Stream stream) const {
   check(cudaStreamWaitEvent(stream, event_, 0), "making a stream wait for a batch");
 }
 
-Block::~Block() { Dropped::of(device_).add(data_); }
+Block::~Block() {
+  if (data_ != nullptr) Dropped::of(device_).add(data_);
+}
 
 std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream stream) {
   const DeviceGuard guard(device);

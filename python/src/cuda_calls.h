@@ -35,7 +35,7 @@ class Moment {
   CUevent_st* event_ = nullptr;
 };
 
-/// Device memory for answers.
+/// Device memory for answers. Without `data`: memory that something else owns.
 ///
 /// Whoever drops the last of its owners need not have waited for anything: it is free for others
 /// when all that the device had been given by the next allocate() is done.

@@ -30,6 +30,7 @@ void add_gpu(py::module_& package) {
       py::arg("device") = 0, "What is missing where available() is False; None where it is True.");
   add_gpu_penetration(module);
   add_gpu_separation(module);
+  add_gpu_scene(module);
   // So that arguments can be tried where there is no device.
   module.def(
       "_lend",

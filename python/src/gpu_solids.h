@@ -55,12 +55,20 @@ class DeviceSolids {
                     "capturing first");
       make_room(room, pairs.count);
     }
+    if (captured) room.captured = true;
+    return in_order(stream, std::move(lent), [&] { batch(*solids_, *room.workspace); });
+  }
+
+  /// Likewise what works in no workspace.
+  template <class Launch>
+  std::shared_ptr<const cuda::Moment> in_order(cuda::Stream stream,
+                                               std::vector<std::shared_ptr<void>> lent,
+                                               const Launch& launch) {
+    const int device = solids_->device();
+    const bool captured = cuda::captures(device, stream);
     if (!captured && !in_flight_.empty()) in_flight_.back().done->hold(stream);
-    batch(*solids_, *room.workspace);
-    if (captured) {
-      room.captured = true;
-      return nullptr;
-    }
+    launch();
+    if (captured) return nullptr;
     while (!in_flight_.empty() && in_flight_.front().done->passed()) in_flight_.pop_front();
     in_flight_.push_back({std::make_shared<cuda::Moment>(device, stream), std::move(lent)});
     return in_flight_.back().done;

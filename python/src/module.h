@@ -15,6 +15,7 @@ void add_fields(py::module_& module);
 void add_gpu(py::module_& package);
 void add_gpu_penetration(py::module_& module);
 void add_gpu_separation(py::module_& module);
+void add_gpu_scene(py::module_& module);
 void add_pictures(py::module_& module);
 void add_penetration(py::module_& module);
 void add_scenes(py::module_& module);

@@ -108,7 +108,7 @@ are Shapes. For one pose ValueError or ist.Error is raised instead.
 Ctrl-C raises KeyboardInterrupt.
 
 Solids on a GPU, ist.Solids(…, device='cuda'): the same call gives the same answers there;
-unsupported arguments raise. A GPU takes the measures 'matched' and 'inner', and pair_budget.
+unsupported arguments raise. A GPU takes every measure, and pair_budget.
 Two Assets are summed as with spheres_only=True. Volumes are within 1e-6 of the sum in double, and of an Asset and a Shape within
 1e-9 of the CPU's. The bits are the same in every run, whatever else is in the batch.
 Arrays are of any framework, in that device's memory and in C order: poses (n, 7) and scales (n,)

@@ -2,6 +2,7 @@
 
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>
+#include <ist/gpu_scene.h>
 
 #include <cstdlib>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include "query/base/members.h"
 #include "support/host_batch.h"
 #include "support/host_patches.h"
+#include "support/host_scene.h"
 #include "support/host_separations.h"
 
 namespace ist {
@@ -75,12 +77,14 @@ bool gpu_available(int device, std::string*) { return device == 0; }
 GpuInfo gpu_info(int) { return {"emulated", 90, 0, 0}; }
 
 struct GpuSolids::Impl {
+  std::vector<GpuSolid> given;
   testing::HostSolids solids;
   Alive alive;
 };
 
-GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings&)
-    : impl_(std::make_unique<Impl>(Impl{std::vector<GpuSolid>(solids.begin(), solids.end()), {}})) {
+GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings&) {
+  const std::vector<GpuSolid> given(solids.begin(), solids.end());
+  impl_ = std::make_unique<Impl>(Impl{given, given, {}});
 }
 GpuSolids::~GpuSolids() = default;
 std::size_t GpuSolids::size() const noexcept { return impl_->solids.refs().size(); }
@@ -155,6 +159,29 @@ void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measu
         }
         write(wholes, whole);
       });
+}
+
+struct GpuScene::Impl {
+  testing::HostScene scene;
+  std::size_t bodies;
+  GpuScenePairs pairs;
+  Alive alive;
+};
+GpuScene::GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
+                   const GpuSceneSettings& settings, const GpuSettings&)
+    : impl_(std::make_unique<Impl>(
+          Impl{testing::HostScene(solids.impl().given, bodies, settings), bodies.size(), {}, {}})) {
+  impl_->pairs = impl_->scene.pairs();
+}
+GpuScene::~GpuScene() = default;
+std::size_t GpuScene::size() const noexcept { return impl_->bodies; }
+std::size_t GpuScene::bytes() const noexcept { return 0; }
+const GpuScenePairs& GpuScene::pairs() const noexcept { return impl_->pairs; }
+void GpuScene::find_pairs(const Pose* poses, CUstream_st* stream) {
+  testing::do_later(stream, [&impl = *impl_, poses, there = impl_->alive.shown()] {
+    need(there);
+    impl.scene.find_pairs(std::vector<Pose>(poses, poses + impl.bodies), 5);
+  });
 }
 
 }  // namespace ist

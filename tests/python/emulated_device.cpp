@@ -81,7 +81,9 @@ bool Moment::passed() const { return event_->event->passed; }
 void Moment::wait() const { finish(*event_->event); }
 void Moment::hold(Stream stream) const { add(stream, {{}, event_->event, nullptr}); }
 
-Block::~Block() { dropped()[data_] = sizes()[data_]; }
+Block::~Block() {
+  if (data_ != nullptr) dropped()[data_] = sizes()[data_];
+}
 
 std::shared_ptr<Block> allocate(int device, std::size_t bytes, Stream) {
   if (!dropped().empty()) finish_all();

@@ -407,3 +407,71 @@ def test_a_captured_stream_needs_memory_for_answers(solids, arguments):
     waits = Interface(shape=(40, 7), data=(poses.ctypes.data, False), stream=captured)
     batch(assets, a=0, b=1, poses=waits).volume.numpy()
     assert np.array_equal(out["volume"].array, expected)
+
+
+def scene_pairs(solids, kinds, poses, scales, moves, worlds, excluded):
+    """Pairs whose boxes meet, as ist.Scene has them."""
+    pairs = []
+    for world in np.unique(worlds):
+        scene = ist.Scene(max_bodies=len(poses), max_pairs=8192)
+        scene.set_rule(answer="boxes")
+        for i in np.flatnonzero((worlds == world) & np.isfinite(poses).all(1)):
+            scene.add(solids[kinds[i]], poses[i], scale=scales[i], number=int(i), moves=bool(moves[i]))
+        for a, b in excluded:
+            scene.exclude(int(a), int(b))
+        found = scene.step()
+        pairs.append(found.pairs)
+    pairs = np.concatenate(pairs)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def test_a_scene_finds_pairs_and_their_arguments(solids, random_poses):
+    random = np.random.default_rng(7)
+    n = 120
+    kinds, poses = random.integers(0, 3, n), random_poses(n, 2.5)
+    poses[:40, 4:] = np.round(poses[:40, 4:])  # flush, or in one place
+    poses[:20, :4] = [1, 0, 0, 0]
+    scales, moves, worlds = random.uniform(0.3, 1, n), random.uniform(size=n) < 0.7, random.integers(0, 2, n)
+    excluded = random.integers(0, n, (300, 2))
+    assets = ist.Solids(solids, device="cuda")
+    scene = ist.gpu.Scene(assets, kinds, scales=scales, moves=moves, worlds=worlds, excluded=excluded,
+                          max_pairs=4000)
+    assert len(scene) == n
+    poses[5, 4] = np.nan
+    found = scene.find_pairs(OnDevice(poses.copy()))
+    expected = scene_pairs(solids, kinds, poses, scales, moves, worlds, excluded)
+    count = found.count.numpy()[0]
+    assert count == len(expected) > 100 and found.boxes_met.numpy()[0] == count
+    a, b = found.a.numpy()[:count], found.b.numpy()[:count]
+    assert (np.stack([a, b], 1) == expected).all()
+    assert np.flatnonzero(found.status.numpy()).tolist() == [5]
+    answers = ist.penetration(assets[found.solid_a], assets[found.solid_b], found.poses,
+                              poses_a=found.poses_a, scales=found.scales, scales_a=found.scales_a,
+                              wanted=["volume", "status"])
+    volume, status = answers.volume.numpy(), answers.status.numpy()
+    assert (status[:count] == 0).all() and (status[count:] == 2).all() and np.isnan(volume[count:]).all()
+    rows = ist.Solids(solids)
+    here = ist.penetration(rows[kinds[a]], rows[kinds[b]], poses[b], poses_a=poses[a], scales=scales[b],
+                           scales_a=scales[a], spheres_only=True)
+    assert (volume[:count] > 0).sum() > 20
+    assert np.abs(volume[:count] - here.volume).max() <= 1e-5 * here.volume.max()
+    # Arrays are the scene's, which they keep; the next step writes them again.
+    poses[:, 4:] += 1e6 * np.arange(n)[:, None]
+    again = scene.find_pairs(OnDevice(poses.copy()))
+    del scene
+    gc.collect()
+    assert again.count.numpy()[0] == 0 and found.count.numpy()[0] == 0
+
+
+def test_a_scene_refuses_what_it_cannot_hold(solids):
+    assets = ist.Solids(solids, device="cuda")
+    with pytest.raises(TypeError, match="solids: on the CPU; wanted ist.Solids on a GPU"):
+        ist.gpu.Scene(ist.Solids(solids), [0])
+    with pytest.raises(ist.Error, match="body 1 is of solid 3; there are 3"):
+        ist.gpu.Scene(assets, [0, 3])
+    with pytest.raises(ValueError, match=r"worlds: shape \(3,\); wanted \(2,\)"):
+        ist.gpu.Scene(assets, [0, 1], worlds=[0, 1, 2])
+    with pytest.raises(ValueError, match="layers: -1; wanted a whole number from 0"):
+        ist.gpu.Scene(assets, [0, 1], layers=[0, -1])
+    with pytest.raises(ValueError, match="poses: 3 rows; there are 2 bodies"):
+        ist.gpu.Scene(assets, [0, 1]).find_pairs(OnDevice(np.zeros((3, 7))))

@@ -1,6 +1,7 @@
 // What a build without CUDA says.
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>
+#include <ist/gpu_scene.h>
 #include <ist/types.h>
 
 #include "cuda/packing/cuda_backend.h"
@@ -47,6 +48,22 @@ void contact_patches_batch(const GpuSolids&, const GpuPairs&, Measure, GpuWorksp
                            const GpuPenetrations&, const GpuContactPatches&, CUstream_st*) {
   gpu_info(0);
 }
+
+struct GpuScene::Impl {};
+GpuScene::GpuScene(const GpuSolids&, std::span<const GpuSceneBody>, const GpuSceneSettings&,
+                   const GpuSettings& settings) {
+  gpu_info(settings.device);
+}
+GpuScene::~GpuScene() = default;
+GpuScene::GpuScene(GpuScene&&) noexcept = default;
+GpuScene& GpuScene::operator=(GpuScene&&) noexcept = default;
+std::size_t GpuScene::size() const noexcept { return 0; }
+std::size_t GpuScene::bytes() const noexcept { return 0; }
+const GpuScenePairs& GpuScene::pairs() const noexcept {
+  static const GpuScenePairs none;
+  return none;
+}
+void GpuScene::find_pairs(const Pose*, CUstream_st*) { gpu_info(0); }
 
 namespace gpu {
 

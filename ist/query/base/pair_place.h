@@ -24,11 +24,18 @@ IST_HD inline bool ratio_in_range(double ratio) noexcept {
   return ratio <= kFarthestPose && ratio >= 1 / kFarthestPose;
 }
 
-/// M x of a matrix that is stored row by row. Sums are in Eigen's order.
-IST_HD inline Vec3 turned(const double (&m)[9], const Vec3& x) noexcept {
-  return {(m[0] * x.x + m[1] * x.y) + m[2] * x.z, (m[3] * x.x + m[4] * x.y) + m[5] * x.z,
-          m[6] * x.x + (m[7] * x.y + m[8] * x.z)};
-}
+namespace formulas {
+
+using Real = double;
+IST_HD inline double constant(double x) { return x; }
+IST_HD inline double magnitude(double x) { return std::fabs(x); }
+#define IST_FORMULA IST_HD inline
+#include "query/base/rotation_formulas-inl.h"
+#undef IST_FORMULA
+
+}  // namespace formulas
+using formulas::turned;
+
 /// (s M) x.
 IST_HD inline Vec3 turned(double s, const double (&m)[9], const Vec3& x) noexcept {
   double scaled[9];
@@ -106,14 +113,7 @@ struct Rotation {
              (w * b.v.y + a.y * b.w) + (a.z * b.v.x - a.x * b.v.z),
              (w * b.v.z - a.y * b.v.x) + (a.z * b.w + a.x * b.v.y)}};
   }
-  IST_HD void matrix(double (&m)[9]) const {
-    const Vec3 twice = v + v, by_w = w * twice;
-    const double xx = twice.x * v.x, yy = twice.y * v.y, zz = twice.z * v.z;
-    const double xy = twice.y * v.x, xz = twice.z * v.x, yz = twice.z * v.y;
-    m[0] = 1 - (yy + zz), m[1] = xy - by_w.z, m[2] = xz + by_w.y;
-    m[3] = xy + by_w.z, m[4] = 1 - (xx + zz), m[5] = yz - by_w.x;
-    m[6] = xz - by_w.y, m[7] = yz + by_w.x, m[8] = 1 - (xx + yy);
-  }
+  IST_HD void matrix(double (&m)[9]) const { formulas::rotation_matrix(w, v, m); }
 };
 
 /// Whether a pose and a scale are valid, apart from the range above.

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <ist/gpu_query.h>
+
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "cuda/base/check.h"
+#include "cuda/base/queue.h"
+#include "cuda/query/field_batch.h"
+#include "cuda/query/solid_ref.h"
+#include "query/find_solid_box.h"
+
+namespace ist {
+
+namespace gpu {
+
+/// Device memory that outlives the queue it comes from.
+class DeviceBytes {
+ public:
+  DeviceBytes() = default;
+  DeviceBytes(Queue& queue, const GpuSettings& settings, std::size_t bytes)
+      : settings_(settings), data_(queue.allocate(bytes)), bytes_(bytes) {}
+  ~DeviceBytes() {
+    if (data_ == nullptr) return;
+    try {
+      Queue(settings_).deallocate(data_, bytes_);
+    } catch (const Error&) {  // a device that is gone has no memory to give back
+    }
+  }
+  DeviceBytes(DeviceBytes&& other) noexcept { *this = std::move(other); }
+  DeviceBytes& operator=(DeviceBytes&& other) noexcept {
+    std::swap(settings_, other.settings_);
+    std::swap(data_, other.data_);
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+
+  std::byte* data() const { return static_cast<std::byte*>(data_); }
+  std::size_t bytes() const { return bytes_; }
+
+ private:
+  GpuSettings settings_;
+  void* data_ = nullptr;
+  std::size_t bytes_ = 0;
+};
+
+template <class T>
+void copy_to_device(T* to, std::span<const T> from, Queue& queue) {
+  if (from.empty()) return;
+  check(cudaMemcpyAsync(to, from.data(), from.size_bytes(), cudaMemcpyHostToDevice, queue.stream()),
+        "copying to the GPU");
+}
+
+}  // namespace gpu
+
+struct GpuSolids::Impl {
+  int device = 0;
+  gpu::DeviceBytes memory;
+  const gpu::SolidRef* refs = nullptr;
+  std::size_t size = 0;
+  bool has_fields = false;
+  bool has_group[gpu::kFieldGroups] = {};
+  bool has_details = false;       ///< some asset has coarser levels
+  std::uint32_t most_bins = 0;    ///< of a tree's contacts
+  std::uint32_t most_blocks = 0;  ///< of a mesh
+  std::vector<SolidBox> boxes;    ///< on the host
+};
+
+}  // namespace ist
