@@ -28,7 +28,8 @@ struct BroadScene {
 inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
                                    std::span<const GpuSceneBody> bodies,
                                    const GpuSceneSettings& settings) {
-  if (!(settings.margin >= 0)) throw Error("GPU scene: a margin that is negative or NaN");
+  if (!(settings.margin >= 0 && std::isfinite(settings.margin)))
+    throw Error("GPU scene: a margin that is negative, infinite or NaN");
   if (bodies.size() > 1u << 31) throw Error("GPU scene: more than 2^31 bodies");
   if (settings.max_pairs == 0 || settings.max_pairs >= kNoIndex)
     throw Error("GPU scene: max_pairs is 1 … 2^32 - 2");
