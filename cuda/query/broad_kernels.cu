@@ -68,19 +68,21 @@ void ready_broad(const BroadArrays& scene, cudaStream_t stream) {
 }
 
 void launch_broad(const BroadArrays& scene, cudaStream_t stream) {
-  place_bodies<<<blocks_for(scene.count, kThreads), kThreads, 0, stream>>>(scene);
-  check_launch("placing bodies");
   std::size_t bytes = scene.scratch_bytes;
-  check(sort_bodies(scene, scene.scratch, bytes, stream), "sorting bodies");
-  for (int level = 1; level <= scene.top; ++level) {
-    fit_nodes<<<blocks_for(scene.nodes[level], kWarps), kThreads, 0, stream>>>(scene, level);
-    check_launch("fitting boxes");
-  }
   check(cudaMemsetAsync(scene.met, 0, sizeof *scene.met, stream), "starting a step");
   check(cudaMemsetAsync(scene.found, 0xFF, scene.max_pairs * sizeof *scene.found, stream),
         "starting a step");
-  find_body_pairs<<<blocks_for(scene.nodes[1], kWarps), kThreads, 0, stream>>>(scene);
-  check_launch("finding pairs");
+  if (scene.count > 0) {
+    place_bodies<<<blocks_for(scene.count, kThreads), kThreads, 0, stream>>>(scene);
+    check_launch("placing bodies");
+    check(sort_bodies(scene, scene.scratch, bytes, stream), "sorting bodies");
+    for (int level = 1; level <= scene.top; ++level) {
+      fit_nodes<<<blocks_for(scene.nodes[level], kWarps), kThreads, 0, stream>>>(scene, level);
+      check_launch("fitting boxes");
+    }
+    find_body_pairs<<<blocks_for(scene.nodes[1], kWarps), kThreads, 0, stream>>>(scene);
+    check_launch("finding pairs");
+  }
   check(sort_found(scene, scene.scratch, bytes, stream), "sorting pairs");
   write_pairs<<<blocks_for(scene.max_pairs, kThreads), kThreads, 0, stream>>>(scene);
   check_launch("writing pairs");

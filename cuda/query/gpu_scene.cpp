@@ -48,7 +48,6 @@ std::size_t GpuScene::bytes() const noexcept { return impl_->memory.bytes(); }
 const GpuScenePairs& GpuScene::pairs() const noexcept { return impl_->pairs; }
 
 void GpuScene::find_pairs(const Pose* poses, CUstream_st* stream) {
-  if (impl_->arrays.count == 0) return;
   const gpu::DeviceGuard guard(impl_->device);
   impl_->arrays.poses = poses;
   gpu::launch_broad(impl_->arrays, stream);

@@ -28,13 +28,14 @@ struct BroadScene {
 inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
                                    std::span<const GpuSceneBody> bodies,
                                    const GpuSceneSettings& settings) {
-  if (!(settings.margin >= 0)) throw Error("GPU scene: a margin that is negative or NaN");
+  if (!(settings.margin >= 0 && std::isfinite(settings.margin)))
+    throw Error("GPU scene: a margin that is negative, infinite or NaN");
   if (bodies.size() > 1u << 31) throw Error("GPU scene: more than 2^31 bodies");
   if (settings.max_pairs == 0 || settings.max_pairs >= kNoIndex)
     throw Error("GPU scene: max_pairs is 1 … 2^32 - 2");
   BroadScene scene;
-  std::uint32_t worlds = 1;
-  double sizes = 0;  // log2, of those that have one
+  std::vector<std::uint32_t> of_world(1);  // bodies
+  double sizes = 0;                        // log2, of those that have one
   std::size_t sized = 0;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const GpuSceneBody& body = bodies[i];
@@ -51,7 +52,8 @@ inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
         settings.margin / 2 + (settings.measure == Measure::matched ? box.protrusion : 0);
     scene.bodies.push_back(
         {box, wider, body.scale, body.world, body.solid, body.layers, body.meets, body.moves});
-    worlds = std::max(worlds, body.world + 1);
+    if (body.world >= of_world.size()) of_world.resize(body.world + 1);
+    ++of_world[body.world];
     const double size = norm(box.half) + wider;
     if (size > 0 && std::isfinite(size)) {
       sizes += std::log2(size);
@@ -63,10 +65,15 @@ inline BroadScene make_broad_scene(std::span<const SolidBox> boxes,
   arrays.max_pairs = static_cast<std::uint32_t>(settings.max_pairs);
   // A cell is about as large as a body: smaller ones order bodies no better.
   arrays.cells = sized == 0 ? 1 : std::exp2(-std::round(sizes / static_cast<double>(sized)));
-  const auto world_bits = static_cast<int>(std::bit_width(worlds - 1));
-  arrays.axis_bits = std::min(20, (64 - world_bits) / 3);
+  const auto bits_of_count = [](std::size_t count) {
+    return static_cast<int>(std::bit_width(count));
+  };
+  const int world_bits = bits_of_count(of_world.size() - 1);
+  // Few bodies need no fine order, and each 8 bits of a key are a pass of the sort.
+  const int most = bits_of_count(*std::max_element(of_world.begin(), of_world.end()));
+  arrays.axis_bits = std::min({20, (64 - world_bits) / 3, 4 + most});
   arrays.key_bits = 3 * arrays.axis_bits + world_bits;
-  arrays.index_bits = std::max(1, static_cast<int>(std::bit_width(arrays.count)));
+  arrays.index_bits = std::max(1, bits_of_count(arrays.count));
   for (const ScenePairName& two : settings.excluded) {
     if (two.a >= bodies.size() || two.b >= bodies.size())
       throw Error("GPU scene: an excluded pair of bodies " + std::to_string(two.a) + " and " +

@@ -353,7 +353,8 @@ ist_status_t ist_workspace_release(ist_workspace_t* workspace);
 /* A capacity that suffices for two solids at any pose by spheres alone: not for the exact measure,
  * the meshes that answer for unlike sizes (ist_penetration_settings_t::spheres_only) and
  * ist_time_of_impact(), see workspace_capacity() in ist/query.h. Poses are ignored, scales are not.
- * It allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two shapes. */
+ * It allocates and takes some 0.3 s for 16,000 spheres. IST_INVALID_INPUT for two shapes
+ * and for an asset without spheres. */
 ist_status_t ist_workspace_capacity(const ist_placed_t* a, const ist_placed_t* b, size_t* capacity);
 
 /* --- Settings: a null pointer means the defaults, all 0 except `size` ------------------------ */

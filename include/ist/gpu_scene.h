@@ -58,7 +58,7 @@ class GpuScene {
   /// Bodies are named by their index.
   ///
   /// Throws Error if the device cannot be used or has no memory left, for an index or a number out
-  /// of range, for more than 2^31 bodies, and for a margin that is negative or NaN.
+  /// of range, for more than 2^31 bodies, and for a margin that is negative, infinite or NaN.
   GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
            const GpuSceneSettings& settings, const GpuSettings& gpu = {});
   ~GpuScene();

@@ -237,7 +237,7 @@ class Workspace {
 /// The mesh must have no more than c blocks. What these return here may be too little for them (a
 /// bolt in its nut: 10,710, where 34,816 are needed): use the default capacity.
 ///
-/// Throws Error for an empty asset, a scale out of range, or two shapes.
+/// Throws Error for an empty asset, one without spheres, a scale out of range, or two shapes.
 std::size_t workspace_capacity(const PlacedSolid& a, const PlacedSolid& b);
 
 /// Volume, wrench and centroid of the overlap.

@@ -131,6 +131,13 @@ class Capacity {
   std::size_t capacity_ = kWidth * OpenRuns::kMostVisits;
 };
 
+void need_spheres(const PlacedAsset& solid) {
+  if (solid.asset.sphere_count() == 0)
+    throw Error(
+        "workspace_capacity: an asset without spheres is asked by its mesh: use the default "
+        "capacity");
+}
+
 RelativePose scales_of(const std::optional<RelativePose>& pose) {
   if (!pose)
     throw Error("workspace_capacity: an asset is empty, or a scale is not positive and finite");
@@ -141,7 +148,8 @@ std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
   const PlacedAsset still_a{a.asset, {}, a.scale}, still_b{b.asset, {}, b.scale};
   const RelativePose a_from_b = scales_of(relative_pose(still_a, still_b));
   Capacity capacity;
-  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return capacity.value();
+  need_spheres(a);
+  need_spheres(b);
   const AssetHeader &header_a = a.asset.header(), &header_b = b.asset.header();
   const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
     capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
@@ -163,7 +171,7 @@ std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
 std::size_t capacity_of(const PlacedShape& a, const PlacedAsset& b) {
   scales_of(relative_pose(Pose{}, a.scale, PlacedAsset{b.asset, {}, b.scale}));
   Capacity capacity;
-  if (b.asset.sphere_count() == 0) return capacity.value();
+  need_spheres(b);
   for (const Measure measure : {Measure::matched, Measure::inner})
     capacity.add_count(sphere_tree(b.asset, measure).count(0));
   return capacity.value();

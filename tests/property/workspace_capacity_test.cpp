@@ -130,6 +130,11 @@ TEST_F(WorkspaceCapacity, RefusesWhatNoQueryTakes) {
   EXPECT_THROW(workspace_capacity(tree, PlacedAsset{asset.view(), {}, 0}), Error);
   EXPECT_THROW(workspace_capacity(tree, PlacedShape{ball.shape, {}, -1}), Error);
   EXPECT_THROW(workspace_capacity(ball, ball), Error);
+  const Asset bare = bake_mesh_only(close_mesh(testing::box_mesh({0, 0, 0}, {1, 1, 1}), "box"));
+  const PlacedAsset mesh{bare.view(), {}, 1};
+  EXPECT_THROW(workspace_capacity(mesh, tree), Error);
+  EXPECT_THROW(workspace_capacity(tree, mesh), Error);
+  EXPECT_THROW(workspace_capacity(ball, mesh), Error);
 }
 
 }  // namespace

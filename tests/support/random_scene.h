@@ -43,7 +43,7 @@ struct RandomScene {
     for (std::size_t k = 0; k < count / 4; ++k)
       excluded.push_back(
           {static_cast<std::uint32_t>(below(count)), static_cast<std::uint32_t>(below(count))});
-    settings.max_pairs = 64 * count;
+    settings.max_pairs = 64 * count + 1;
     settings.margin = below(2) == 0 ? 0 : 0.25;
     settings.measure = below(2) == 0 ? Measure::matched : Measure::exact;
   }
@@ -80,7 +80,7 @@ struct RandomScene {
     std::uint32_t worlds = 0;
     for (const GpuSceneBody& body : bodies) worlds = std::max(worlds, body.world + 1);
     for (std::uint32_t world = 0; world < worlds; ++world) {
-      Scene scene({.max_bodies = bodies.size(), .max_pairs = settings.max_pairs});
+      Scene scene({.max_bodies = bodies.size() + 1, .max_pairs = settings.max_pairs});
       SceneRule rule;
       rule.answer = SceneAnswer::boxes;
       rule.margin = settings.margin;

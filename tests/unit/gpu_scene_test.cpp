@@ -32,7 +32,7 @@ NamedPairs names_of(const GpuScenePairs& found) {
 
 TEST(GpuScene, HasThePairsOfScene) {
   std::size_t pairs = 0, refused = 0, scenes = 0;
-  for (const std::size_t count : {1, 2, 31, 32, 33, 200, 1100}) {
+  for (const std::size_t count : {0, 1, 2, 31, 32, 33, 200, 1100}) {
     for (const std::uint32_t worlds : {1u, 3u, 40u}) {
       if (count > 1000 && worlds != 3) continue;
       RandomScene random(some_solids(), count, worlds, static_cast<unsigned>(++scenes));
@@ -92,7 +92,7 @@ TEST(GpuScene, RefusesWhatItCannotHold) {
   EXPECT_EQ(fault({{}, {.solid = 6}}), "GPU scene: body 1 is of solid 6; there are 6");
   EXPECT_EQ(fault({{.world = kGpuWorlds}}),
             "GPU scene: body 0 is of world 16777216; worlds are below 16777216");
-  EXPECT_EQ(fault({}, {.margin = -1}), "GPU scene: a margin that is negative or NaN");
+  EXPECT_EQ(fault({}, {.margin = -1}), "GPU scene: a margin that is negative, infinite or NaN");
   EXPECT_EQ(fault({}, {.max_pairs = 0}), "GPU scene: max_pairs is 1 … 2^32 - 2");
   const ScenePairName two[] = {{0, 3}};
   EXPECT_EQ(fault({{}}, {.excluded = two}),
