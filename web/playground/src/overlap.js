@@ -59,6 +59,10 @@ export class Overlap {
     this.drawOutline(outline);
   }
 
+  setOpacity(opacity) {
+    for (const {mesh} of this.skins) Object.assign(mesh.material, {transparent: true, opacity});
+  }
+
   recolour() {
     for (const {name, mesh} of this.skins) paint(colour(name), mesh.material);
     this.line.color.set(colour('outline'));

@@ -158,9 +158,10 @@ export class Tray extends Hand {
       }
       if (pair.overlap) pair.overlap.group.visible = volume > 0;
       if (!(volume > 0)) continue;
+      const size = Math.cbrt(volume) / Math.min(a.radius, b.radius);
       pair.overlap.update([a.group, b.group]);
-      const mark = 0.6 * (1 - Math.exp(-8 * Math.cbrt(volume) / Math.min(a.radius, b.radius)));
-      for (const solid of [a, b]) solid.mark = Math.max(solid.mark, mark);
+      pair.overlap.setOpacity(1 - Math.exp(-50 * size));
+      for (const solid of [a, b]) solid.mark = Math.max(solid.mark, 0.6 * (1 - Math.exp(-8 * size)));
     }
     const overlap = new THREE.Color(colour('overlap'));
     for (const solid of this.solids) {
