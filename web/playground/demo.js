@@ -77,17 +77,20 @@ const kPairs = [
  * the first, and bolts and nuts beside them.
  */
 function trayParts() {
-  const kScale = 4.8, kApart = 9.65 * kScale;        // [u] the shafts: the teeth just clear
+  const kScale = 4.8, kApart = 9.65 * kScale;  // [u] the shafts: the teeth just clear
   const kUpright = [1, 0, 0, 0], kOnHead = [0, 1, 0, 0];
-  const turned = (degrees) => [Math.cos(degrees * Math.PI / 360), 0, 0, Math.sin(degrees * Math.PI / 360)];
+  const turned =
+      (degrees) => [Math.cos(degrees * Math.PI / 360), 0, 0, Math.sin(degrees * Math.PI / 360)];
   const part = (solid, rotation, ...translation) => ({solid, pose: {rotation, translation}});
-  const parts = [[0, 0], [kApart - 1.5, 0], [kApart, kApart], [0, kApart]].flatMap(([x, y], i) => [
-    {...part('gear', turned(i % 2 ? 5.5 : 0), x, y, 5 + 0.8 * kScale), scale: kScale},
-    part('bolt', kOnHead, x, y, 21),
-    part('nut', kOnHead, x, y, 17),
+  const parts = [[0, 0], [kApart - 1.5, 0], [kApart, kApart], [0, kApart]].flatMap(
+      ([x, y], i) =>
+          [{...part('gear', turned(i % 2 ? 5.5 : 0), x, y, 5 + 0.8 * kScale), scale: kScale},
+           part('bolt', kOnHead, x, y, 21),
+           part('nut', kOnHead, x, y, 17),
   ]);
   for (let i = 0; i < 4; ++i) {
-    parts.push(part('bolt', kOnHead, 22 * i - 10, -42, 21), part('nut', kUpright, 22 * i - 10, -64, 4));
+    parts.push(
+        part('bolt', kOnHead, 22 * i - 10, -42, 21), part('nut', kUpright, 22 * i - 10, -64, 4));
   }
   return parts;
 }

@@ -97,7 +97,7 @@ await row('nut_patches.png', [
   {b: 0.25, overlays: {patches: true, arrows: true}, size: [460, 480]},
 ]);
 await row('tray.png', [
-  {pair: 'tray', move: ['nut 6', 2, 40, 4], far: 0.74, size: [720, 460]},
+  {pair: 'tray', move: ['nut 6', 2, 40, 4], far: 0.74, size: [640, 440]},
 ]);
 
 const trade = JSON.parse(readFileSync(join(root, 'benchmarks/results/trade.json'), 'utf8'));

@@ -6,8 +6,8 @@ const kGrazing = 0.15;  // of the floor's normal: below that the part goes up an
 
 export class Drag {
   /**
-   * `act.ready()`: whether there is anything; `act.pick(ray)`: the point of a part that a ray meets,
-   * if it does; `act.take()`: takes that part in hand; `act.move(by)` moves it.
+   * `act.ready()`: whether there is anything; `act.pick(ray)`: the point of a part that a ray
+   * meets, if it does; `act.take()`: takes that part in hand; `act.move(by)` moves it.
    */
   constructor(view, act) {
     this.view = view;
@@ -24,9 +24,10 @@ export class Drag {
       view.orbit.enabled = false;
     });
     holder.addEventListener('pointermove', (event) => {
-      if (!act.ready() || !event.isPrimary) return;
+      if (!event.isPrimary) return;
       if (!this.at) {
-        if (event.buttons === 0) holder.style.cursor = act.pick(this.ray(event)) ? 'grab' : '';
+        if (event.buttons === 0)
+          holder.style.cursor = act.ready() && act.pick(this.ray(event)) ? 'grab' : '';
         return;
       }
       const at = this.ray(event).intersectPlane(this.plane, new THREE.Vector3());

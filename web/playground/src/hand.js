@@ -83,7 +83,10 @@ export class Hand {
 }
 
 /** Where an Object3D stands, as queries take it. */
-export function poseOf({position, quaternion: {x, y, z, w}}, into = {rotation: [], translation: []}) {
+export function poseOf({position, quaternion: {x, y, z, w}}, into = {
+  rotation: [],
+  translation: []
+}) {
   Object.assign(into.rotation, [w, x, y, z]);
   position.toArray(into.translation);
   return into;

@@ -169,11 +169,12 @@ export class Library {
 
   tellStage() {
     const {stage, world, tray} = this, many = stage === tray;
-    $('hint').textContent =
-        many ? 'Drag any part. Drag beside them to look around.' :
-               'Drag an arrow to push B into A. Drag beside it to look around.';
-    $('view').setAttribute('aria-label', many ? `${tray.solids.length} parts. Arrow keys move the part in hand, N takes the next.` :
-                                                'Solids A and B. Arrow keys move B.');
+    $('hint').textContent = many ? 'Drag any part. Drag beside them to look around.' :
+                                   'Drag an arrow to push B into A. Drag beside it to look around.';
+    $('view').setAttribute(
+        'aria-label',
+        many ? `${tray.solids.length} parts. Arrow keys move the part in hand, N takes the next.` :
+               'Solids A and B. Arrow keys move B.');
     $('motion-title').textContent = many ? 'Part in hand' : 'B';
     if (many) {
       document.body.classList.remove('moved');

@@ -3,8 +3,8 @@
 import {init} from 'ist-query';
 
 import {$, attempt, tell, untell} from './dom.js';
-import {acceptDrops} from './files.js';
 import {Drag} from './drag.js';
+import {acceptDrops} from './files.js';
 import {Keys} from './keys.js';
 import {Library} from './library.js';
 import {Pairs} from './pairs.js';
@@ -24,17 +24,18 @@ async function start() {
     force: new Plot($('plot-force'), $('plot-force-told'), 'u²'),
   };
   const view = new View($('view'));
+  const moved = () => document.body.classList.add('moved');
   const world = new World(view, {
     asked: (contact) => readouts.note(contact, performance.now()),
     timed: (contact) => readouts.noteTimes(contact),
-    moved: () => document.body.classList.add('moved'),
+    moved,
     held: (free) => $('letgo').setAttribute('aria-pressed', free),
   });
   const pairs = new Pairs($('pairs'), $('read-step'), $('live'));
   const tray = new Tray(view, {
     asked: () => pairs.note(tray, performance.now()),
     timed: () => pairs.noteTimes(tray),
-    moved: () => document.body.classList.add('moved'),
+    moved,
     taken: (solid) => library.tellTaken(solid),
   });
   const settings = new Settings(world, view);
@@ -83,7 +84,9 @@ async function start() {
   const told = () => library.stage === tray ? pairs : readouts;
   new Keys(
       $('view'),
-      () => ({right: view.right, up: view.up, near: view.near, radius: library.stage.b.bounds.radius}), {
+      () => (
+          {right: view.right, up: view.up, near: view.near, radius: library.stage.b.bounds.radius}),
+      {
         ready: () => library.stage.b !== undefined,
         move: (by) => library.stage.move(by),
         turn: (by) => library.stage.turn(by),
@@ -147,7 +150,6 @@ async function start() {
     view,
     player,
     readouts,
-    pairs,
     setMode: (mode) => settings.setMode(mode),
     choose: () => library.choose(),
   };

@@ -3,7 +3,8 @@
 import {digits, whole} from './format.js';
 import {Told} from './readouts.js';
 
-const kNew = 1500;  // [ms] a pair is said to begin for so long, and one that ended stays in the list
+const kNew =
+    1500;  // [ms] a pair is said to begin for so long, and one that ended stays in the list
 
 export class Pairs extends Told {
   constructor(body, time, live) {
@@ -40,7 +41,9 @@ export class Pairs extends Told {
       const apart = !(pair.volume > 0);
       const words = [
         `${pair.a.name}, ${pair.b.name}`,
-        event === 'ended' ? '–' : apart ? nearness(pair) : digits(pair.volume, 4),
+        event === 'ended' ? '–' :
+            apart         ? nearness(pair) :
+                            digits(pair.volume, 4),
         apart ? '' : digits(pair.force, 4),
         event,
       ];
@@ -67,11 +70,14 @@ export class Pairs extends Told {
     const meeting = this.contact.ranked().filter(({volume}) => volume > 0);
     if (meeting.length === 0) return 'No parts overlap.';
     const [{a, b, volume}] = meeting;
-    return `${meeting.length === 1 ? 'One pair overlaps' : `${meeting.length} pairs overlap`}, most ` +
+    return `${
+               meeting.length === 1 ? 'One pair overlaps' :
+                                      `${meeting.length} pairs overlap`}, most ` +
         `${a.name} and ${b.name}: ${digits(volume, 4)} cubic units.`;
   }
 }
 
 /** Of a pair that does not overlap. */
-const nearness = ({volume, gap}) =>
-    gap > 0 ? `gap ${digits(gap, 2)} u` : volume === 0 ? 'touching' : 'unknown';
+const nearness = ({volume, gap}) => gap > 0 ? `gap ${digits(gap, 2)} u` :
+    volume === 0 ? 'touching' :
+                   'unknown';

@@ -28,8 +28,8 @@ export class Tray extends Hand {
   }
 
   /**
-   * Takes `assets` by name, which it frees when others come, and parts {solid: an asset's name, pose,
-   * scale}.
+   * Takes `assets` by name, which it frees when others come, and parts {solid: an asset's name,
+   * pose, scale}.
    */
   hold(assets, parts) {
     for (const solid of this.solids) solid.dispose();
@@ -81,7 +81,8 @@ export class Tray extends Hand {
   /** The part that a ray meets, and where. */
   pick({origin, direction}) {
     const {number, point} = this.scene.raycast(origin.toArray(), direction.toArray());
-    return number[0] ? {solid: this.solids[number[0] - 1], at: new THREE.Vector3(...point)} : undefined;
+    return number[0] ? {solid: this.solids[number[0] - 1], at: new THREE.Vector3(...point)} :
+                       undefined;
   }
 
   /** Takes a part in hand. */
@@ -99,7 +100,8 @@ export class Tray extends Hand {
 
   /** Largest first; those that ended too, until they are dropped from `pairs`. */
   ranked() {
-    return [...this.pairs.values()].sort((p, q) => q.rank - p.rank || p.a.number - q.a.number || p.b.number - q.b.number);
+    return [...this.pairs.values()].sort(
+        (p, q) => q.rank - p.rank || p.a.number - q.a.number || p.b.number - q.b.number);
   }
 
   // --- A frame
@@ -161,7 +163,8 @@ export class Tray extends Hand {
       const size = Math.cbrt(volume) / Math.min(a.radius, b.radius);
       pair.overlap.update([a.group, b.group]);
       pair.overlap.setOpacity(1 - Math.exp(-50 * size));
-      for (const solid of [a, b]) solid.mark = Math.max(solid.mark, 0.6 * (1 - Math.exp(-8 * size)));
+      for (const solid of [a, b])
+        solid.mark = Math.max(solid.mark, 0.6 * (1 - Math.exp(-8 * size)));
     }
     const overlap = new THREE.Color(colour('overlap'));
     for (const solid of this.solids) {
