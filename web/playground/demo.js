@@ -72,6 +72,29 @@ const kPairs = [
     cut: 0.5,
   },
 ];
+/**
+ * Twenty parts: four gears in mesh, each on a bolt with a nut, of which the second stands too near
+ * the first, and bolts and nuts beside them.
+ */
+function trayParts() {
+  const kScale = 4.8, kApart = 9.65 * kScale;  // [u] the shafts: the teeth just clear
+  const kUpright = [1, 0, 0, 0], kOnHead = [0, 1, 0, 0];
+  const turned =
+      (degrees) => [Math.cos(degrees * Math.PI / 360), 0, 0, Math.sin(degrees * Math.PI / 360)];
+  const part = (solid, rotation, ...translation) => ({solid, pose: {rotation, translation}});
+  const parts = [[0, 0], [kApart - 1.5, 0], [kApart, kApart], [0, kApart]].flatMap(
+      ([x, y], i) =>
+          [{...part('gear', turned(i % 2 ? 5.5 : 0), x, y, 5 + 0.8 * kScale), scale: kScale},
+           part('bolt', kOnHead, x, y, 21),
+           part('nut', kOnHead, x, y, 17),
+  ]);
+  for (let i = 0; i < 4; ++i) {
+    parts.push(
+        part('bolt', kOnHead, 22 * i - 10, -42, 21), part('nut', kUpright, 22 * i - 10, -64, 4));
+  }
+  return parts;
+}
+const kTrays = [{id: 'tray', name: 'Twenty parts on a tray', parts: trayParts()}];
 /** Scenes of examples/bullet: write_scene runs them. */
 const kScenes = [
   {id: 'nut', name: 'A nut turns down a bolt'},
@@ -108,9 +131,10 @@ export function bakeDemo() {
     for (const spheres of sphereCounts) names = [pair.a, pair.b].map((s) => file(s, spheres));
     return {...pair, a: names[0], b: names[1]};
   });
+  for (const {solid} of kTrays.flatMap(({parts}) => parts)) file(solid, sphereCounts[0]);
   writeFileSync(
       join(demoFolder, 'demo/pairs.json'),
-      JSON.stringify({sphereCounts, pairs, scenes: kScenes}, null, 2) + '\n');
+      JSON.stringify({sphereCounts, pairs, trays: kTrays, scenes: kScenes}, null, 2) + '\n');
 }
 
 if (process.argv[1] === import.meta.filename) bakeDemo();

@@ -14,7 +14,7 @@ const server = await serve({'/': siteFolder}), chrome = await browser();
 
 /**
  * A figure of the solids alone. `how`: caption (COUNT: A's spheres), pair, spheres, mode, level,
- * shares, overlays shown, size.
+ * shares, overlays shown, size; `move`: a part of the tray, and by how much [u].
  */
 async function shot(how) {
   const [width, height] = how.size ?? [350, 430];
@@ -22,7 +22,7 @@ async function shot(how) {
   await page.goto(`${server.url}/`);
   await page.waitForFunction('window.playground?.world.contact?.best');
   const count = await page.evaluate(async (how) => {
-    const {world, view, setMode, choose} = playground;
+    const {world, tray, view, setMode, choose} = playground;
     document.body.classList.add('bare');
     document.getElementById('pair').value = how.pair ?? 'bolt-nut';
     document.getElementById('spheres').value = how.spheres ?? 10000;
@@ -34,7 +34,8 @@ async function shot(how) {
     world.show(
         {level: how.level ?? 0, opacityA: how.a ?? 1, opacityB: how.b ?? 1, cut: how.cut ?? 0});
     view.resize();
-    world.frame();
+    const stage = how.move ? tray : world;
+    stage.frame();
     view.camera.position.sub(view.orbit.target)
         .multiplyScalar(how.far ?? 0.82)
         .add(view.orbit.target);
@@ -42,7 +43,13 @@ async function shot(how) {
     view.handles.detach();
     view.floor.visible = false;
     view.setColours({ground: '#ffffff', line: '#ffffff', handle: '#000000', held: '#000000'});
-    world.update(0);
+    if (how.move) {
+      const [name, ...by] = how.move;
+      tray.take(tray.solids.find((solid) => solid.name === name));
+      tray.move(view.up.clone().fromArray(by));
+      view.handles.detach();
+    }
+    stage.update(0);
     view.dirty = true;
     await new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)));
     return world.a.levels('spheres')[how.level ?? 0];
@@ -88,6 +95,9 @@ await row('packing_levels.png', [0, 1, 2].map((level) => ({
                                               })));
 await row('nut_patches.png', [
   {b: 0.25, overlays: {patches: true, arrows: true}, size: [460, 480]},
+]);
+await row('tray.png', [
+  {pair: 'tray', move: ['nut 6', 2, 40, 4], far: 0.74, size: [640, 440]},
 ]);
 
 const trade = JSON.parse(readFileSync(join(root, 'benchmarks/results/trade.json'), 'utf8'));

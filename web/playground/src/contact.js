@@ -4,7 +4,7 @@ import {contactPatches, overlapOutline, penetration, separation} from 'ist-query
 
 export const kMostPatches = 16;
 const kTimedFor = 5;    // [ms] a browser's clock is coarse
-const kTimedOften = 16;  // times, of which the least is told
+export const kTimedOften = 16;  // times, of which the least is told
 
 export class Contact {
   constructor(a, b) {
@@ -63,7 +63,7 @@ export class Contact {
 }
 
 /** [ms] */
-function meanTime(act) {
+export function meanTime(act) {
   const start = performance.now();
   let count = 0, time;
   do {

@@ -1,4 +1,4 @@
-// B by keys, while the view has the focus.
+// B, or the part in hand, by keys, while the view has the focus.
 
 import * as THREE from 'three';
 
@@ -43,6 +43,7 @@ export class Keys {
       ' ': this.act.letGo,
       'Home': this.act.home,
       'r': this.act.read,
+      'n': () => this.act.next(shiftKey ? -1 : 1),
     }[key.length === 1 ? key.toLowerCase() : key];
     act?.();
     return act !== undefined;

@@ -6,6 +6,8 @@
 import {contactPatches, Shape, overlap} from 'ist-query';
 import * as THREE from 'three';
 
+import {poseOf} from './hand.js';
+
 const kStep = 1 / 960;  // [s]
 const kBudget = 10;     // [ms] of a frame; beyond it time goes slower
 const kGravity = 8;     // [B's radii/s²]
@@ -114,10 +116,7 @@ export class LetGo {
   /** What one solid does to B, added to force and torque about B's origin. */
   push(contact, body) {
     const {solid, options, memory} = contact;
-    body.position.toArray(pose.translation);
-    const {x, y, z, w} = body.quaternion;
-    Object.assign(pose.rotation, [w, x, y, z]);
-    if (overlap(solid, this.b, pose) === 'no') {
+    if (overlap(solid, this.b, poseOf(body, pose)) === 'no') {
       memory.clear();
       return;
     }

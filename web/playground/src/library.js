@@ -1,4 +1,4 @@
-// What the page shows: pairs and scenes that it offers, and a visitor's own.
+// What the page shows: pairs, parts and scenes that it offers, and a visitor's own.
 
 import {Asset} from 'ist-query';
 
@@ -12,11 +12,12 @@ const stem = (name) => name.replace(/\.[^.]+$/, '');
 
 export class Library {
   /** `on.held`: what to call when solids were taken. */
-  constructor({world, view, player, settings}, on) {
-    Object.assign(this, {world, view, player, settings, on});
+  constructor({world, tray, view, player, settings}, on) {
+    Object.assign(this, {world, tray, view, player, settings, on});
+    this.stage = world;  // or the tray, or the player
     $('swap').onclick = () => {
       if (!world.a) return;
-      this.leaveScene();
+      this.enter(this.world);
       world.swap();
       this.tellNames(world.names.toReversed());
       settings.tellLevels();
@@ -24,9 +25,11 @@ export class Library {
   }
 
   async open() {
-    const {sphereCounts, pairs, scenes} =
+    const {sphereCounts, pairs, trays, scenes} =
         await fetched('demo/pairs.json', (answer) => answer.json());
+    this.sphereCounts = sphereCounts;
     this.pairs = pairs;
+    this.trays = trays;
     this.scenes = scenes;
     const group = (label, entries) => {
       const made = Object.assign(document.createElement('optgroup'), {label});
@@ -34,6 +37,7 @@ export class Library {
       if (entries.length > 0) $('pair').append(made);
     };
     group('Solids', pairs);
+    group('Many parts', trays);
     group('Scenes from Bullet', scenes);
     for (const count of sphereCounts) $('spheres').append(new Option(whole(count), count));
   }
@@ -41,8 +45,9 @@ export class Library {
   /** Shows what is chosen. What was chosen before is dropped if it arrives later. */
   async choose() {
     const id = $('pair').value, mine = this.latest = {};
-    const pair = this.pairs.find((p) => p.id === id), scene = this.scenes.find((s) => s.id === id);
-    if (!pair && !scene) return;
+    const [pair, tray, scene] =
+        [this.pairs, this.trays, this.scenes].map((all) => all.find((one) => one.id === id));
+    if (!pair && !tray && !scene) return;
     $('loading').hidden = false;
     try {
       if (scene) {
@@ -51,12 +56,21 @@ export class Library {
         if (mine === this.latest) this.enterScene({...read, name: scene.name});
         return;
       }
-      const names = [pair.a, pair.b], count = $('spheres').value;
+      const names = tray ? [...new Set(tray.parts.map(({solid}) => solid))] : [pair.a, pair.b];
+      const count = tray ? this.sphereCounts[0] : $('spheres').value;  // exact, the fewest will do
       const bytes = await Promise.all(names.map(
           (name) => fetched(`demo/${name}_${count}.ist`, (answer) => answer.arrayBuffer())));
       if (mine !== this.latest) return;
-      this.leaveScene();
-      this.hold(...bytes.map((b, k) => Asset.from(b, names[k])), names, pair);
+      const assets = bytes.map((b, k) => Asset.from(b, names[k]));
+      if (tray) {
+        untell();
+        this.enter(this.world);  // leaves the parts that were there
+        this.tray.hold(Object.fromEntries(names.map((name, k) => [name, assets[k]])), tray.parts);
+        this.enter(this.tray);
+        return;
+      }
+      this.enter(this.world);
+      this.hold(...assets, names, pair);
       this.settings.setCut(pair.cut ?? 0);
     } finally {
       if (mine === this.latest) $('loading').hidden = true;
@@ -116,7 +130,7 @@ export class Library {
     if (solids.length === 0) return;
     this.latest = {};  // what is on its way is not wanted any more
     $('loading').hidden = true;
-    this.leaveScene();
+    this.enter(this.world);
     // One alone is the new B.
     const a = solids.length === 2 ? solids[0].asset : world.a.asset, b = solids.at(-1).asset;
     const names = [
@@ -133,34 +147,63 @@ export class Library {
     $('pair').value = kOwn;
   }
 
+  // --- What is on the stage
+
+  /** Puts the world, the tray or the player on the stage. */
+  enter(stage) {
+    const {world, tray, player} = this;
+    if (stage === this.stage) return;
+    if (this.stage === player)
+      player.stop();
+    else
+      this.stage.setVisible(false);
+    this.stage = stage;
+    world.letGo(false);
+    document.body.classList.toggle('playing', stage === player);
+    document.body.classList.toggle('tray', stage === tray);
+    this.tellStage();
+    if (!stage.b) return;
+    stage.setVisible(true);
+    stage.frame();
+  }
+
+  tellStage() {
+    const {stage, world, tray} = this, many = stage === tray;
+    $('hint').textContent = many ? 'Drag any part. Drag beside them to look around.' :
+                                   'Drag an arrow to push B into A. Drag beside it to look around.';
+    $('view').setAttribute(
+        'aria-label',
+        many ? `${tray.solids.length} parts. Arrow keys move the part in hand, N takes the next.` :
+               'Solids A and B. Arrow keys move B.');
+    $('motion-title').textContent = many ? 'Part in hand' : 'B';
+    if (many) {
+      document.body.classList.remove('moved');
+      $('name-a').textContent = 'parts';
+      $('part').replaceChildren(...tray.solids.map(({name}) => new Option(name)));
+      this.tellTaken(tray.b);
+    } else if (world.names) {
+      this.tellNames(world.names);
+    }
+  }
+
+  /** A part that was taken in hand. */
+  tellTaken({name}) {
+    $('part').value = $('name-b').textContent = name;
+  }
+
   // --- Playback
 
   enterScene(scene) {
-    const {world, view, player} = this;
-    world.letGo(false);
-    for (const solid of [world.a, world.b])
-      if (solid) solid.group.visible = false;
-    view.handles.detach();
+    const {view, player} = this;
+    this.enter(player);
     const {centre, radius} = player.start(scene, view.scene);
     view.frame(centre, radius, 'y');
     if (view.floor) view.floor.visible = false;
-    document.body.classList.add('playing');
-  }
-
-  leaveScene() {
-    const {world, view, player} = this;
-    if (!player.open) return;
-    player.stop();
-    document.body.classList.remove('playing');
-    if (!world.a) return;
-    for (const solid of [world.a, world.b]) solid.group.visible = true;
-    view.handles.attach(world.b.group);
-    world.frame();
   }
 
   /** Back to the solids that were there, or to the first pair. */
   async backToSolids() {
-    this.leaveScene();
+    this.enter(this.world);
     const held =
         this.pairs.find(({a, b}) => this.world.names?.[0] === a && this.world.names[1] === b);
     if (held) {

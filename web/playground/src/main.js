@@ -3,14 +3,17 @@
 import {init} from 'ist-query';
 
 import {$, attempt, tell, untell} from './dom.js';
+import {Drag} from './drag.js';
 import {acceptDrops} from './files.js';
 import {Keys} from './keys.js';
 import {Library} from './library.js';
+import {Pairs} from './pairs.js';
 import {Player} from './player.js';
 import {Plot} from './plot.js';
 import {Readouts} from './readouts.js';
 import {Settings} from './settings.js';
 import {colour, theme} from './theme.js';
+import {Tray} from './tray.js';
 import {View} from './view.js';
 import {World} from './world.js';
 
@@ -21,11 +24,19 @@ async function start() {
     force: new Plot($('plot-force'), $('plot-force-told'), 'u²'),
   };
   const view = new View($('view'));
+  const moved = () => document.body.classList.add('moved');
   const world = new World(view, {
     asked: (contact) => readouts.note(contact, performance.now()),
     timed: (contact) => readouts.noteTimes(contact),
-    moved: () => document.body.classList.add('moved'),
+    moved,
     held: (free) => $('letgo').setAttribute('aria-pressed', free),
+  });
+  const pairs = new Pairs($('pairs'), $('read-step'), $('live'));
+  const tray = new Tray(view, {
+    asked: () => pairs.note(tray, performance.now()),
+    timed: () => pairs.noteTimes(tray),
+    moved,
+    taken: (solid) => library.tellTaken(solid),
   });
   const settings = new Settings(world, view);
   const player = new Player(
@@ -38,12 +49,15 @@ async function start() {
         leave: $('leave')
       },
       () => attempt(() => library.backToSolids()));
-  const library = new Library({world, view, player, settings}, {
+  const library = new Library({world, tray, view, player, settings}, {
     held: () => {
       for (const plot of Object.values(plots)) plot.clear();
     },
   });
-  theme($('theme'), () => world.recolour());
+  theme($('theme'), () => {
+    world.recolour();
+    tray.recolour();
+  });
 
   await init();
   await library.open();
@@ -62,23 +76,39 @@ async function start() {
   };
 
   const letGo = () => {
-    library.leaveScene();
+    library.enter(world);
     world.letGo(!world.free);
   };
   $('letgo').onclick = letGo;
-  $('home').onclick = () => world.reset();
+  $('home').onclick = () => library.stage.reset();
+  const told = () => library.stage === tray ? pairs : readouts;
   new Keys(
       $('view'),
-      () => ({right: view.right, up: view.up, near: view.near, radius: world.b.bounds.radius}), {
-        ready: () => world.b !== undefined && !player.open,
-        move: (by) => world.move(by),
-        turn: (by) => world.turn(by),
+      () => (
+          {right: view.right, up: view.up, near: view.near, radius: library.stage.b.bounds.radius}),
+      {
+        ready: () => library.stage.b !== undefined,
+        move: (by) => library.stage.move(by),
+        turn: (by) => library.stage.turn(by),
         handles: (mode) => settings.setHandles(mode),
-        letGo,
-        home: () => world.reset(),
-        read: () => readouts.say(readouts.words()),
-        say: (words) => readouts.say(words),
+        letGo: () => library.stage === world && letGo(),
+        home: () => library.stage.reset(),
+        read: () => told().say(told().words()),
+        next: (by) => {
+          if (library.stage !== tray) return;
+          tray.next(by);
+          told().say(`${tray.b.name} in hand.`);
+        },
+        say: (words) => told().say(words),
       });
+  let under;
+  new Drag(view, {
+    ready: () => library.stage === tray,
+    pick: (ray) => (under = tray.pick(ray))?.at,
+    take: () => tray.take(under.solid),
+    move: (by) => tray.move(by),
+  });
+  $('part').onchange = () => tray.take(tray.solids[$('part').selectedIndex]);
 
   // --- Frames
 
@@ -95,14 +125,14 @@ async function start() {
     }
   }
   function go(seconds, now) {
-    if (player.open) {
+    if (library.stage === player) {
       if (player.advance(seconds)) view.dirty = true;
     } else {
-      world.update(seconds);
-      plotNow(now);
-      readouts.tick(now);
+      library.stage.update(seconds);
+      if (library.stage === world) plotNow(now);
+      told().tick(now);
     }
-    view.render(player.open ? null : world.overlays);
+    view.render(library.stage.overlays);
   }
   function plotNow(now) {
     if (!world.contact?.best) return;
@@ -116,6 +146,7 @@ async function start() {
   // For the console, tests and pictures.
   window.playground = {
     world,
+    tray,
     view,
     player,
     readouts,

@@ -6,23 +6,25 @@ import {LineMaterial} from 'three/addons/lines/LineMaterial.js';
 import {LineSegments2} from 'three/addons/lines/LineSegments2.js';
 import {LineSegmentsGeometry} from 'three/addons/lines/LineSegmentsGeometry.js';
 
-import {Columns, kIsInside} from './columns.js';
+import {kIsInside} from './columns.js';
+import {colour} from './theme.js';
 
 const kLineWidth = 1.5;  // [px]
+/** Of a solid's radius: points of its surface are looked at so far below, lest flush faces flicker. */
+const kBelow = 1e-4;
 
 export class Overlap {
-  /** `materials`: of A's surface and of B's. */
-  constructor(materials) {
+  constructor() {
     this.group = new THREE.Group();
     this.line = new LineMaterial({linewidth: kLineWidth});
     this.outline = new LineSegments2(new LineSegmentsGeometry(), this.line);
     this.capacity = 0;  // [segments]
-    this.skins = materials.map((material) => {
-      const uniforms = {lists: {}, corners: {}, side: {}, toColumns: {value: new THREE.Matrix4()}};
+    this.skins = ['overlap', 'overlap-b'].map((name) => {
+      const material = paint(), uniforms = {lists: {}, corners: {}, side: {}, below: {}, toColumns: {value: new THREE.Matrix4()}};
       material.onBeforeCompile = (shader) => drawInside(shader, uniforms);
       // Behind the outline, which lies on it.
       Object.assign(material, {polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4});
-      return {uniforms, mesh: new THREE.Mesh(undefined, material)};
+      return {name, uniforms, mesh: new THREE.Mesh(undefined, material)};
     });
     for (const part of [this.outline, ...this.skins.map(({mesh}) => mesh)]) {
       part.frustumCulled = false;
@@ -32,30 +34,38 @@ export class Overlap {
 
   /** Takes two solids; nothing is drawn where one holds no mesh. */
   hold(a, b) {
-    for (const {columns} of this.skins) columns?.dispose();
     const drawn = a.info.meshTriangles > 0 && b.info.meshTriangles > 0;
     [[a, b], [b, a]].forEach(([own, other], k) => {
       const skin = this.skins[k], {mesh, uniforms} = skin;
-      skin.columns = undefined;
       mesh.visible = drawn;
       if (!drawn) return;
-      const columns = skin.columns = new Columns(other.mesh().getAttribute('position').array);
+      const columns = skin.columns = other.columns();
       mesh.geometry = own.mesh();
       uniforms.lists.value = columns.lists;
       uniforms.corners.value = columns.corners;
       uniforms.side.value = columns.side;
+      uniforms.below.value = kBelow * own.bounds.radius;
     });
   }
 
-  /** `b` is B's matrix, A's is the identity; `outline` is of overlapOutline(), or undefined. */
-  update(b, outline) {
-    const [{mesh, uniforms, columns}, ofB] = this.skins;
-    if (mesh.visible) {
-      uniforms.toColumns.value.copy(b).invert().premultiply(columns.toGrid);
-      ofB.uniforms.toColumns.value.copy(ofB.columns.toGrid);
-      b.decompose(ofB.mesh.position, ofB.mesh.quaternion, ofB.mesh.scale);
-    }
+  /** `groups` of A and B; `outline` is of overlapOutline(), or undefined. */
+  update(groups, outline) {
+    for (const group of groups) group.updateMatrixWorld();
+    this.skins.forEach(({mesh, uniforms, columns}, k) => {
+      if (!mesh.visible) return;
+      uniforms.toColumns.value.copy(groups[1 - k].matrixWorld).invert().premultiply(columns.toGrid);
+      groups[k].matrixWorld.decompose(mesh.position, mesh.quaternion, mesh.scale);
+    });
     this.drawOutline(outline);
+  }
+
+  setOpacity(opacity) {
+    for (const {mesh} of this.skins) Object.assign(mesh.material, {transparent: true, opacity});
+  }
+
+  recolour() {
+    for (const {name, mesh} of this.skins) paint(colour(name), mesh.material);
+    this.line.color.set(colour('outline'));
   }
 
   drawOutline(outline) {
@@ -74,12 +84,19 @@ export class Overlap {
   }
 }
 
+/** A material that is drawn over the solids. */
+export function paint(colour = 0xffffff, material = new THREE.MeshStandardMaterial({roughness: 0.6})) {
+  material.color.set(colour);
+  material.emissive.set(colour).multiplyScalar(0.3);
+  return material;
+}
+
 /** Leaves of a surface what lies in the columns' solid. */
 function drawInside(shader, uniforms) {
   Object.assign(shader.uniforms, uniforms);
-  shader.vertexShader = 'uniform mat4 toColumns;\nvarying vec3 vInColumns;\n' +
+  shader.vertexShader = 'uniform mat4 toColumns;\nuniform float below;\nvarying vec3 vInColumns;\n' +
       shader.vertexShader.replace('#include <project_vertex>', `#include <project_vertex>
-      vInColumns = (toColumns * modelMatrix * vec4(transformed, 1.0)).xyz;`);
+      vInColumns = (toColumns * modelMatrix * vec4(transformed - below * normal, 1.0)).xyz;`);
   shader.fragmentShader = `varying vec3 vInColumns;\n${kIsInside}` +
       shader.fragmentShader.replace('void main() {', `void main() {
       if (!isInside(vInColumns)) discard;`);

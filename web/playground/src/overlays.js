@@ -3,29 +3,25 @@
 import * as THREE from 'three';
 
 import {kMostPatches} from './contact.js';
-import {Overlap} from './overlap.js';
+import {Overlap, paint} from './overlap.js';
 
 const kUp = new THREE.Vector3(0, 1, 0), kForward = new THREE.Vector3(0, 0, 1);
 const kTurn = 1.6 * Math.PI;  // [rad] of the arc that shows a torque
 
-export class Overlays {
-  /** They lie in a scene of their own, which is drawn last, over everything. */
+/** A scene of its own, which is drawn last, over everything. */
+export class Top {
   constructor() {
-    this.scene = new THREE.Scene();
-    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xa0a8b0, 1.8));
-    const light = new THREE.DirectionalLight(0xffffff, 1.3);
-    this.light = light;
-    this.scene.add(light, light.target);
-    const material = () => new THREE.MeshStandardMaterial({roughness: 0.6});
-    this.materials = {
-      force: material(),
-      torque: material(),
-      patch: material(),
-      overlapA: material(),
-      overlapB: material(),
-      gap: material(),
-    };
-    const {force, torque, patch, overlapA, overlapB, gap} = this.materials;
+    this.light = new THREE.DirectionalLight(0xffffff, 1.3);
+    this.scene = new THREE.Scene().add(
+        new THREE.HemisphereLight(0xffffff, 0xa0a8b0, 1.8), this.light, this.light.target);
+  }
+}
+
+export class Overlays extends Top {
+  constructor() {
+    super();
+    this.materials = {force: paint(), torque: paint(), patch: paint(), gap: paint()};
+    const {force, torque, patch, gap} = this.materials;
     patch.side = THREE.DoubleSide;
     this.shown = {arrows: true, patches: false, overlap: true, gap: true};
 
@@ -39,7 +35,7 @@ export class Overlays {
     this.turn = new THREE.Group().add(this.arc, this.arcHead);
     this.discs =
         new THREE.InstancedMesh(new THREE.CylinderGeometry(1, 1, 0.12, 40), patch, kMostPatches);
-    this.overlap = new Overlap([overlapA, overlapB]);
+    this.overlap = new Overlap();
     this.bridge = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 12).translate(0, 0.5, 0), gap);
     this.ends = [0, 1].map(() => new THREE.Mesh(new THREE.SphereGeometry(1, 20, 14), gap));
     this.discs.frustumCulled = false;
@@ -48,21 +44,13 @@ export class Overlays {
     this.scene.visible = false;  // until update() gave everything its size
   }
 
-  /** Takes two solids. */
-  hold(a, b) {
-    this.overlap.hold(a, b);
-  }
-
   setColours(colours) {
-    for (const [name, material] of Object.entries(this.materials)) {
-      material.color.set(colours[name]);
-      material.emissive.set(colours[name]).multiplyScalar(0.3);
-    }
-    this.overlap.line.color.set(colours.outline);
+    for (const [name, material] of Object.entries(this.materials)) paint(colours[name], material);
+    this.overlap.recolour();
   }
 
-  /** Of a contact that was asked; `size` [u] is that of the smaller solid, `b` holds B. */
-  update({best, separation, patches, outline}, size, b) {
+  /** Of a contact that was asked; `size` [u] is that of the smaller solid; `a` and `b` hold them. */
+  update({best, separation, patches, outline}, size, a, b) {
     const touching = best.volume > 0;
     this.scene.visible = true;
     this.drawForce(touching && this.shown.arrows, best, size);
@@ -79,10 +67,7 @@ export class Overlays {
     }
     this.discs.instanceMatrix.needsUpdate = true;
     this.overlap.group.visible = touching && this.shown.overlap;
-    if (this.overlap.group.visible) {
-      b.updateMatrixWorld();
-      this.overlap.update(b.matrixWorld, outline);
-    }
+    if (this.overlap.group.visible) this.overlap.update([a, b], outline);
     this.drawGap(!touching && this.shown.gap, separation, size);
   }
 

@@ -15,11 +15,6 @@ export class Player {
     form.onsubmit = () => false;
   }
 
-  /** Whether a scene is open. */
-  get open() {
-    return this.mixer !== undefined;
-  }
-
   /** Takes a scene into `into`; says its ball and its axis up, which glTF lays down. */
   start({name, scene, animations}, into) {
     this.stop();

@@ -16,9 +16,46 @@ const kRows = [
 const kOften = 100;  // [ms] numbers are written at most so often
 const kCalm = 900;   // [ms] words are said once nothing moved for so long
 
-export class Readouts {
-  constructor(table, live) {
+/** What is told of a contact: written often, and said once nothing moves. */
+export class Told {
+  constructor(live) {
     this.live = live;
+    this.written = -Infinity;
+  }
+
+  /** After every query; `now` [ms]. */
+  note(contact, now, touching, apart = false) {
+    this.contact = contact;
+    this.changed = now;
+    this.said = false;
+    document.body.classList.toggle('touching', touching);
+    document.body.classList.toggle('apart', apart);
+    this.stale = true;
+  }
+
+  /** Every frame: writes what is due. */
+  tick(now) {
+    if (this.stale && now - this.written >= kOften) this.write(now);
+    if (this.contact && !this.said && now - this.changed > kCalm) {
+      this.say(this.words());
+      this.said = true;
+    }
+  }
+
+  write(now) {
+    this.stale = false;
+    this.written = now;
+  }
+
+  say(text) {
+    // The same words again are said again.
+    this.live.textContent = this.live.textContent === text ? `${text} ` : text;
+  }
+}
+
+export class Readouts extends Told {
+  constructor(table, live) {
+    super(live);
     this.cells = {};
     for (const [key, label, unit, style = ''] of kRows) {
       const row = table.insertRow();
@@ -31,18 +68,11 @@ export class Readouts {
       }
       row.insertCell().textContent = unit;
     }
-    this.written = -Infinity;
   }
 
-  /** After every query; `now` [ms]. */
   note(contact, now) {
-    this.contact = contact;
-    this.changed = now;
-    this.said = false;
     const touching = contact.best.volume > 0;
-    document.body.classList.toggle('touching', touching);
-    document.body.classList.toggle('apart', !touching && contact.separation.distance > 0);
-    this.stale = true;
+    super.note(contact, now, touching, !touching && contact.separation.distance > 0);
   }
 
   /** Once times were taken. */
@@ -51,24 +81,14 @@ export class Readouts {
     this.put('time-spheres', whole(1000 * times.spheres));
   }
 
-  /** Every frame: writes what is due. */
-  tick(now) {
-    if (this.stale && now - this.written >= kOften) this.write(now);
-    if (this.contact && !this.said && now - this.changed > kCalm) {
-      this.say(this.words());
-      this.said = true;
-    }
-  }
-
   put(key, text) {
     const cell = this.cells[key];
     if (cell.textContent !== text) cell.textContent = text;
   }
 
   write(now) {
+    super.write(now);
     const {exact, spheres, best, separation: s} = this.contact;
-    this.stale = false;
-    this.written = now;
     for (const [p, key] of [[exact, ''], [spheres, '-spheres']]) {
       this.put(`volume${key}`, p ? digits(p.volume) : '–');
       this.put(`force${key}`, p ? digits(Math.hypot(...p.force)) : '–');
@@ -94,11 +114,6 @@ export class Readouts {
       return `Apart by ${digits(s.distanceMin, 3)} to ${digits(s.distanceMax, 3)} units.`;
     }
     return 'Touching, without measurable overlap.';
-  }
-
-  say(text) {
-    // The same words again are said again.
-    this.live.textContent = this.live.textContent === text ? `${text} ` : text;
   }
 }
 

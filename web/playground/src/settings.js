@@ -48,7 +48,7 @@ export class Settings {
   /** 'translate' or 'rotate'. */
   setHandles(mode) {
     document.querySelector(`input[name=gizmo][value=${mode}]`).checked = true;
-    this.view.handles.setMode(mode);
+    this.view.setHandles({mode});
   }
 
   tellLevels() {

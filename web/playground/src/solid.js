@@ -5,6 +5,7 @@ import * as THREE from 'three';
 import {toCreasedNormals} from 'three/addons/utils/BufferGeometryUtils.js';
 
 import {balls} from './balls.js';
+import {Columns} from './columns.js';
 
 /**
  * What a cut lays open is filled: inner sides, which only a cut shows, are painted flat, and those
@@ -42,9 +43,13 @@ function fillCuts(shader) {
 const kCrease = 0.6;
 
 export class Solid {
-  /** `order`: solids of a higher one are drawn over transparent ones of a lower. */
-  constructor(asset, colour, order) {
+  /**
+   * `order`: solids of a higher one are drawn over transparent ones of a lower. `like`: a solid of
+   * the same asset, whose surface it shares.
+   */
+  constructor(asset, colour, order, like) {
     this.asset = asset;
+    this.surface = like?.surface ?? {};
     this.info = asset.info();
     this.bounds = asset.bounds();
     this.order = order;
@@ -97,7 +102,8 @@ export class Solid {
 
   dispose() {
     this.clear();
-    this.geometry?.dispose();
+    this.surface.geometry?.dispose();
+    this.surface.columns?.dispose();
     this.material.dispose();
     this.depth.dispose();
     this.group.removeFromParent();
@@ -106,14 +112,19 @@ export class Solid {
   // --- Below: what lies in the group
 
   mesh() {
-    if (this.geometry) return this.geometry;
+    if (this.surface.geometry) return this.surface.geometry;
     const {positions, triangles} = this.asset.mesh();
     const shared = new THREE.BufferGeometry();
     shared.setAttribute('position', new THREE.BufferAttribute(new Float32Array(positions), 3));
     shared.setIndex(new THREE.BufferAttribute(triangles, 1));
-    this.geometry = toCreasedNormals(shared, kCrease);
+    this.surface.geometry = toCreasedNormals(shared, kCrease);
     shared.dispose();
-    return this.geometry;
+    return this.surface.geometry;
+  }
+
+  /** What tells a shader which points lie inside. */
+  columns() {
+    return this.surface.columns ??= new Columns(this.mesh().getAttribute('position').array);
   }
 
   draw() {

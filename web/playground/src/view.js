@@ -84,6 +84,13 @@ export class View {
     this.scene.add(this.floor);
   }
 
+  /** `mode`: 'translate' or 'rotate'; `lift`: they move up and down alone. */
+  setHandles({mode = this.handles.mode, lift = this.lift}) {
+    this.lift = lift;
+    this.handles.setMode(mode);
+    this.handles.showX = this.handles.showY = !lift || mode === 'rotate';
+  }
+
   /** `handle`: of all three axes, none of which then looks like a force or an overlap. */
   setColours({ground, line, handle, held}) {
     this.renderer.setClearColor(ground);

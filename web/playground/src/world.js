@@ -3,28 +3,28 @@
 import * as THREE from 'three';
 
 import {Contact} from './contact.js';
+import {Hand, poseOf} from './hand.js';
 import {LetGo} from './letgo.js';
 import {Overlays} from './overlays.js';
 import {Solid} from './solid.js';
 import {colour} from './theme.js';
 
-export class World {
+export class World extends Hand {
   /**
    * `on`: what to call when a contact was asked (`asked`), when its times were taken (`timed`),
    * when a visitor moved B (`moved`) and when B was let go or held (`held`).
    */
   constructor(view, on) {
-    this.view = view;
-    this.on = on;
+    super(view, on);
     this.overlays = new Overlays();
     this.pose = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
     this.home = {rotation: [1, 0, 0, 0], translation: [0, 0, 0]};
     this.settings = {mode: 'surface', level: 0, opacityA: 1, opacityB: 0.45, cut: 0};
-    view.handles.addEventListener('objectChange', () => {
-      this.touched();
-      this.on.moved();
-    });
-    view.handles.addEventListener('dragging-changed', () => this.free?.still());
+    view.handles.addEventListener('dragging-changed', () => this.still());
+  }
+
+  get solids() {
+    return [this.a, this.b].filter(Boolean);
   }
 
   /**
@@ -33,14 +33,14 @@ export class World {
   hold(assetA, assetB, {pose, up = 'z', friction}) {
     const own = new Set([assetA, assetB]);
     this.letGo(false);
-    for (const solid of [this.a, this.b]) {
-      solid?.dispose();
-      if (solid && !own.has(solid.asset)) solid.asset.free();
+    for (const solid of this.solids) {
+      solid.dispose();
+      if (!own.has(solid.asset)) solid.asset.free();
     }
     this.a = new Solid(assetA, colour('a'), 0);
     this.b = new Solid(assetB, colour('b'), 1);
     this.contact = new Contact(assetA, assetB);
-    this.overlays.hold(this.a, this.b);
+    this.overlays.overlap.hold(this.a, this.b);
     this.view.scene.add(this.a.group, this.b.group);
     this.view.handles.attach(this.b.group);
     this.home = pose;
@@ -52,20 +52,8 @@ export class World {
     this.frame();
   }
 
-  /** Sees both solids whole, on a floor below. */
   frame() {
-    const box = new THREE.Box3();
-    for (const solid of [this.a, this.b]) {
-      solid.group.updateMatrixWorld(true);
-      box.union(ofBounds(solid.bounds).applyMatrix4(solid.group.matrixWorld));
-    }
-    const whole = box.getBoundingSphere(new THREE.Sphere());
-    this.view.frame(whole.center, Math.max(0.86 * whole.radius, this.b.bounds.radius), this.up);
-    const axis = this.up === 'y' ? 1 : 2;
-    this.floor =
-        Math.min(box.min.getComponent(axis), this.a.bounds.lower[axis]) - 0.02 * whole.radius;
-    this.view.setFloor(this.floor, whole.radius);
-    this.recolour();
+    super.frame();
     this.show();
   }
 
@@ -83,39 +71,13 @@ export class World {
 
   // --- Where B stands
 
-  setPose({rotation: [w, x, y, z], translation}) {
-    this.b.group.quaternion.set(x, y, z, w).normalize();
-    this.b.group.position.fromArray(translation);
-    this.touched();
-  }
-
   reset() {
-    this.free?.still();
+    this.still();
     this.setPose(this.home);
   }
 
-  move(by) {
-    this.on.moved();
-    this.b.group.position.add(by);
+  still() {
     this.free?.still();
-    this.touched();
-  }
-
-  /** About the middle of B. */
-  turn(by) {
-    this.on.moved();
-    const middle = new THREE.Vector3().fromArray(this.b.bounds.centre);
-    const {position, quaternion} = this.b.group;
-    position.add(middle.clone().applyQuaternion(quaternion));
-    quaternion.premultiply(by).normalize();
-    position.sub(middle.applyQuaternion(quaternion));
-    this.free?.still();
-    this.touched();
-  }
-
-  touched() {
-    this.stale = true;
-    this.view.dirty = true;
   }
 
   /** Lets B fall, or takes it in hand again. */
@@ -159,21 +121,13 @@ export class World {
   }
 
   recolour() {
+    super.recolour();
     for (const name of ['a', 'b']) this[name]?.material.color.set(colour(name));
     this.overlays.setColours({
       force: colour('force'),
       torque: colour('torque'),
       patch: colour('patch'),
-      overlapA: colour('overlap'),
-      overlapB: colour('overlap-b'),
-      outline: colour('outline'),
       gap: colour('soft'),
-    });
-    this.view.setColours({
-      ground: colour('ground'),
-      line: colour('line'),
-      handle: colour('ink'),
-      held: colour('accent'),
     });
   }
 
@@ -191,15 +145,8 @@ export class World {
       return;
     }
     this.stale = false;
-    const {x, y, z, w} = group.quaternion, {pose} = this;
-    Object.assign(pose.rotation, [w, x, y, z]);
-    group.position.toArray(pose.translation);
-    const {shown} = this.overlays;
-    this.contact.ask(pose, shown);
-    this.overlays.update(this.contact, this.size, group);
+    this.contact.ask(poseOf(group, this.pose), this.overlays.shown);
+    this.overlays.update(this.contact, this.size, this.a.group, group);
     this.on.asked(this.contact);
   }
 }
-
-const ofBounds = ({lower, upper}) =>
-    new THREE.Box3(new THREE.Vector3().fromArray(lower), new THREE.Vector3().fromArray(upper));
