@@ -73,7 +73,7 @@ std::string obstacle(int device) {
 
 bool gpu_available(int device, std::string* why) {
   const std::string found = obstacle(device);
-  cudaGetLastError();  // an error that is not sticky must not be met again by the next call
+  cudaGetLastError();  // clears the error if it is not sticky, or the next call would report it
   if (!found.empty() && why != nullptr) *why = found;
   return found.empty();
 }

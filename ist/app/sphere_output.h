@@ -31,7 +31,7 @@ struct ClosePair {
   std::size_t spheres;  ///< of both that this takes, about
 };
 
-/// What `ist spheres` reads and makes.
+/// Input and result of `ist spheres`.
 struct SphereRobot {
   std::string name, input, output;  ///< of the robot or the mesh; paths
   std::vector<SphereLink> links;    ///< those with shapes

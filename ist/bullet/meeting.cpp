@@ -18,7 +18,7 @@ namespace ist::bullet {
 
 namespace {
 
-/// Of the thread: a query's scratch memory.
+/// The scratch memory of the thread's queries.
 Workspace& workspace() {
   thread_local Workspace memory;
   return memory;
@@ -43,7 +43,7 @@ Body body_of(const btCollisionObject& object) {
 /// How far apart flat faces of meshes may be and push, of the smaller solid's size.
 constexpr double kReach = 0.02;
 
-/// Of two assets whose meshes do not overlap: a push where they touch or are nearest, for
+/// For two assets whose meshes do not overlap: a push where they touch or are nearest, for
 /// SupportPolygon.
 std::optional<Penetration> push_across(const Penetration& apart, const Separation& gap,
                                        double reach, const Eigen::Vector3d& origin_b) {

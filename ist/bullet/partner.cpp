@@ -214,7 +214,7 @@ bool MeshDistance::is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d&
     if ((triangle.normal - first.normal).squaredNorm() > 1e-24 ||
         std::abs(first.normal.dot(triangle.centre - first.centre)) > same)
       return false;
-  // What each has of the rectangle under the box, clipped by its four sides.
+  // The part of each triangle inside the rectangle under the box, clipped by its four sides.
   const Eigen::Vector3d axes[2] = {
       (first.corner[1] - first.corner[0]).normalized(),
       first.normal.cross(first.corner[1] - first.corner[0]).normalized()};

@@ -86,7 +86,7 @@ class LensSearch {
     if (result_.count == room_.size()) return;
     const Vector3d way = b.centre - a.centre;
     const double d = way.norm();
-    // Along the way from A's centre: where the lens begins and ends, and its rim.
+    // Along the line from A's centre: begin and end of the lens, and its rim.
     const double begin = std::max(d - b.r, -a.r), end = std::min(a.r, d + b.r);
     const double rim = d > 0 ? (d * d + (a.r - b.r) * (a.r + b.r)) / (2 * d) : 0;
     OverlapLens& lens = room_[result_.count++];

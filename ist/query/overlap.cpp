@@ -73,7 +73,7 @@ class MeetingSearch {
     const double radius_a = a_.ball(pair.level_a, pair.a).r;
     const double radius_b = scale_ * b_.ball(pair.level_b, pair.b).r;
     const bool open_a = pair.level_b == 0 || (pair.level_a > 0 && radius_a >= radius_b);
-    // Of the side that is opened, in that side's unit frame.
+    // In the unit frame of the side that is opened.
     const GapSide& side = open_a ? a_side_ : b_side_;
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t block = open_a ? pair.a : pair.b;

@@ -21,7 +21,7 @@ TimeOfImpact overlap() noexcept {
   return result;
 }
 
-/// Of the frame's lengths.
+/// In lengths of the frame.
 double tolerance_of(const ImpactSettings& settings, double smaller, double errors,
                     double unit) noexcept {
   return settings.tolerance > 0 ? settings.tolerance / unit

@@ -24,7 +24,7 @@ struct SerialTeam {
 
   static constexpr int kBatch = 64;  ///< items that are worth working out side by side
 
-  /// Of a pointer to what the team's lanes share: itself.
+  /// Marks a pointer to memory that the team's lanes share.
   template <class T>
   IST_HD T* memory(T* p) const {
     return p;

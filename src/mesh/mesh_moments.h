@@ -13,8 +13,8 @@ using HierarchyMaker = std::function<const MeshView&()>;
 /// ∫ of 1, x, y, z, x², y², z², xy, xz, yz over something, unit frame.
 using Moments = Eigen::Array<double, 10, 1>;
 
-/// What a mesh counts that is no part of the solid: ∫ (winding − [winding ≥ 1]), with the integrand
-/// times each of the ten.
+/// The volume that a mesh counts beyond its solid: ∫ (winding − [winding ≥ 1]) times each of the
+/// ten integrands.
 struct WindingExcess {
   Moments value = Moments::Zero();
   Moments error = Moments::Zero();  ///< estimate: the bends of the last intervals, without signs

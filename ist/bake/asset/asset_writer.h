@@ -46,7 +46,7 @@ struct MeshArrays {
   std::vector<std::vector<BoxSums>> sums;    ///< of each level of boxes
 };
 
-/// What an asset is made of.
+/// The parts of an asset.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
   std::vector<Sphere> inner_spheres;

@@ -74,7 +74,7 @@ class SampledMoments {
   std::vector<char> inside_;
 };
 
-/// What points say of volume, first and second moments.
+/// Volume, first and second moments by sampling.
 std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& solid) {
   const SampledMoments points(solid);
   const char* const kAbove =

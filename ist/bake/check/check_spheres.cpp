@@ -96,7 +96,7 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
   const Sphere* const matched = matched_spheres(asset, detail);
   const double stated =
       detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
-  // Of the mesh in the place of a solid, the solid may be that far.
+  // The mesh stands for a solid whose surface may be this far from it.
   const double protrusion = stated - asset.polygonise_error;
   std::vector<Invariant> out;
   Tally sum;

@@ -43,7 +43,7 @@ void measure_group(SwapGroup& group) {
 
 /// Lower bounds of a group's radius once a ball joins it in place of a member.
 struct Fit {
-  double farthest = 0;  ///< half of the way across the ball and the member it is farthest from
+  double farthest = 0;  ///< half of the chord across the ball and the member it is farthest from
   double next = 0;      ///< and the member after that
   std::size_t member = 0;
 
@@ -100,7 +100,7 @@ class JoinCosts {
     return (group_.touching >> left_out & 1u) != 0 ? of_touching_[left_out] : of_ball_;
   }
 
-  /// Of one that joins, by the member whose place it takes.
+  /// Costs for a ball that joins, by the member whose place it takes.
   LaneValues column(std::size_t joining) const {
     LaneValues costs;
     costs.fill(of_ball_[joining]);
@@ -227,8 +227,8 @@ class SwapSearch {
     return bits;
   }
 
-  /// The cost of a group with another ball in place of a member. May be one on the way to it that
-  /// is too much already.
+  /// The cost of a group with another ball in place of a member, or an intermediate cost that is
+  /// too high already.
   template <class Gains>
   double cost_with(const SwapGroup& group, std::size_t left_out, const Ball& added,
                    const Gains& gains) const {

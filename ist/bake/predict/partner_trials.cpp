@@ -96,7 +96,7 @@ using Eigen::Quaterniond;
 
 constexpr std::size_t kPoints = 100'000;
 constexpr std::uint32_t kTriesPerTrial = 6;
-// Of the solid's diagonal.
+// Fractions of the solid's diagonal.
 constexpr double kSmallest = 0.1, kLargest = 0.3;  // diameters and edges
 constexpr double kPlateThickness = 0.02;
 constexpr double kPlaneReach = 4;  // half extent of the box that the plane's truth is
@@ -174,7 +174,8 @@ TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direc
 std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>& points,
                              const Vector3d& target, const Vector3d& direction,
                              std::size_t wanted) {
-  std::vector<std::pair<double, int>> events;  // on the way in: a point comes in, or is left behind
+  // during the approach: a point enters (1) or leaves (−1)
+  std::vector<std::pair<double, int>> events;
   for (const Vector3d& x : points)
     if (const auto part = body.part_of(x - target, -direction)) {
       events.emplace_back(part->to, 1);

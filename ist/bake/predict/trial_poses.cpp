@@ -13,9 +13,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of a class's poses, as many are tried again where no place or no truth was found.
+// Retries per pose if no place or no true volume was found.
 constexpr std::uint32_t kTriesPerPose = 4;
-// Size of a contained B over A's, if it finds room; half of it if not, and so on.
+// Size of a contained B over A's, halved until it fits.
 constexpr double kContainedSize = 0.15;
 constexpr std::uint32_t kContainedTries = 400;  // for each pose
 constexpr int kApproachSteps = 24;

@@ -12,7 +12,7 @@
 
 namespace ist {
 
-/// What is known of all spheres below a block.
+/// Sums over all spheres below a block.
 struct NodeSums {
   double volume = 0;   ///< Σ of sphere volumes, rounded up
   double overlap = 1;  ///< κ: no point lies in more spheres than this

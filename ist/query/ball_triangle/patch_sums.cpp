@@ -112,8 +112,8 @@ HWY_INLINE void measure_chords(Chords& chords) {
   }
 }
 
-/// What lies between the foot and an edge at signed distance m from it, positive if the foot is
-/// within, that goes from t1 to t2.
+/// Adds the part between the foot and an edge that goes from t1 to t2 at signed distance m from it,
+/// positive if the foot is within.
 HWY_INLINE void add_edge(DiscTag d, const DiscShape& disc, Disc m, Disc t1, Disc t2,
                          ShareVectors& sums) {
   const Disc zero = hn::Zero(d);
@@ -331,7 +331,7 @@ ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexce
 void put_right(const ProbeSums& moved, const ProbeBalls& balls, ProbeSums& sums) noexcept {
   for (std::size_t i = 0; i < kWidth; ++i) {
     if ((sums.on_edge >> i & 1) == 0) continue;
-    double change = 0;  // of the volume, on the way back
+    double change = 0;  // of the volume, when the ball moves back
     for (int k = 0; k < 3; ++k)
       change += 0.5 * (sums.pull[k][i] + moved.pull[k][i]) * (moved_along(k) * balls.r[i]);
     sums.cones[i] = moved.cones[i] + change;

@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What was placed most recently: slot n % kPlaces holds the last thing whose number has that
+/// The most recently placed blocks: slot n % kPlaces stores the last block whose number has that
 /// remainder. Call forget() before the first use.
 template <class T, std::uint32_t kPlaces>
 struct PlacedCache {

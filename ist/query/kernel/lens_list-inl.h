@@ -19,8 +19,8 @@ namespace ist::HWY_NAMESPACE {
 inline constexpr std::size_t kFullList = 8 * kWidth;
 inline constexpr std::size_t kListRoom = kFullList + 2 * kWidth;
 
-/// Pairs of spheres i, j that may meet, in A's axes. A store writes a whole vector and counts what
-/// is valid of it, so there is room beyond the last.
+/// Pairs of spheres i, j that may overlap, in A's axes. A store writes a whole vector and counts
+/// its valid lanes, so the arrays are longer than the list.
 template <class T>
 struct alignas(64) LensList {
   T dx[kListRoom], dy[kListRoom], dz[kListRoom];  ///< centre of j less centre of i

@@ -12,7 +12,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Appends the pairs of the chosen lanes and y to two lists, whose room ends a vector later.
+/// Appends the pairs of the chosen lanes and y to two lists, which have a spare vector at their
+/// ends.
 template <class T, class M>
 HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
                               std::uint32_t* out_x, std::uint32_t* out_y) {
@@ -22,8 +23,8 @@ HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::
   return append_lanes<T>(d, chosen, first, out_x);
 }
 
-/// What stands still while nodes are opened: the ball of node y of each pair, from the origin of
-/// the block that is opened.
+/// The balls that are not opened: the ball of node y of each pair, from the origin of the block
+/// that is opened.
 template <class T>
 struct alignas(64) StandingBalls {
   T x[kNodePairs], y[kNodePairs], z[kNodePairs];

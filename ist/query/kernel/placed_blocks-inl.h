@@ -40,8 +40,8 @@ HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&differe
     store_as(hn::Load(d, x + k) - hn::Load(d, y + k), d, difference + k);
 }
 
-/// What follows from where a block and its leaf ball are; `size` bounds the way from the block's
-/// origin to the end of any of its spheres.
+/// Derives the remaining members from the positions of a block and its leaf ball; `size` bounds the
+/// distance from the block's origin to the end of any of its spheres.
 template <class T>
 HWY_INLINE void finish_placing(double size, const TurnedAxes<T>& axes, PlacedBlock<T>& placed) {
   // Two blocks that touch have origins no further apart than both sizes. The sums that take errors

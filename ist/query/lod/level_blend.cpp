@@ -159,7 +159,7 @@ void add(double weight, const Penetration& part, Penetration& sum) {
 // The part of the accepted error by which volumes about the smaller solid's are kept within it.
 constexpr double kCapWidth = 0.1;
 
-/// What a level says, no more than `most`, the smaller solid's volume: smooth, with its slope.
+/// A level's answer, limited smoothly to `most`, the smaller solid's volume, with its slope.
 Penetration kept_within_solid(Penetration part, double most, double error) {
   const double width = kCapWidth * std::min(error, 1.0) * most;
   if (!(width > 0) || !std::isfinite(most) || !(part.volume_max > most - width)) return part;
@@ -176,7 +176,7 @@ Penetration kept_within_solid(Penetration part, double most, double error) {
   return part;
 }
 
-/// What is known where a limit stopped the coarse estimate: any level might have been meant.
+/// Bounds for a coarse estimate that a limit stopped: any level might have been chosen.
 Penetration stopped_blend(DetailQueries& queries, const PlacedAsset& a, const PlacedAsset& b,
                           const PenetrationSettings& settings, const DetailChain& chain,
                           const Penetration& coarse) {
@@ -193,7 +193,7 @@ Penetration stopped_blend(DetailQueries& queries, const PlacedAsset& a, const Pl
   return result;
 }
 
-/// Who gives which part of a blend.
+/// The shares of levels and measures in a blend.
 struct BlendShares {
   WantedError::Shares wanted;  ///< by errors; nothing is the exact measure's if it can't answer
   DetailChain::Weights weights = {};  ///< of levels: what of `wanted` the pair budget affords
@@ -362,7 +362,7 @@ class BlendSum {
   double exact_slope_ = 0;    ///< … the coarse estimate
   double slope_ = 0;          ///< of the sum by the coarse estimate
   double sure_slope_ = 0;     ///< and by the quick look
-  // Of the sum and of the exact measure's weight, as volumes that decide weights are rounded:
+  // Rounding of the sum and of the exact measure's weight, since volumes decide weights:
   double doubt_ = 0, weight_doubt_ = 0;
   double largest_volume_ = 0;  ///< of levels
 };

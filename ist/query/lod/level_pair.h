@@ -9,7 +9,7 @@
 #include "query/asset/shared_constants.h"
 #include "query/base/smooth_step.h"
 
-// What levels of detail cost and which part of an answer each gives, on the CPU and on the GPU.
+// Costs and weights of levels of detail, on the CPU and on the GPU.
 
 namespace ist {
 
@@ -28,7 +28,7 @@ struct LevelCost {
 struct DetailPair {
   std::uint32_t a, b;  ///< 0: the finest
 
-  // What the expected number of sphere pairs is made of, A's unit frame.
+  // The parts of the expected number of sphere pairs, A's unit frame.
   double density;  ///< pairs over volume of overlap
   double skin;     ///< √volume: makes up for the rim of a shallow contact
 };

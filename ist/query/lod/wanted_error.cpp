@@ -116,8 +116,8 @@ WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const Relat
     double& from = from_[i];
     from = overlap_for(tree_a, tree_b, error_);
     if (wider_[i] >= kLeastWider) {
-      // What the coarser one does not confirm is answered twice. It does in half of the poses and
-      // more from where its median error is small enough for that.
+      // A level that the coarser one does not confirm costs two answers. It is confirmed in half of
+      // the poses and more once the coarser one's median error is small enough.
       from = std::max(from, overlap_for(wide_a, wide_b, kMostOverMedian * wider_[i] * error_));
     } else {
       from = std::numeric_limits<double>::infinity();

@@ -75,7 +75,8 @@ class OpenRuns {
   }
 
  private:
-  // Of the distance over the sum of radii, for a level further up (measured on the oracle's poses).
+  // Added to the distance over the sum of radii for each level further up (measured on the oracle's
+  // poses).
   static constexpr double kForALevel = 0.1;
   static constexpr double kLast = 1e6;
 

@@ -137,11 +137,10 @@ CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false
 
 constexpr std::size_t kLayers = 12;
 
-/// Of each of the layers between equidistant planes across a direction: corners of triangles in it,
-/// and where planes cut sides of triangles.
-///
-/// The solid's part in a layer lies within the hull of these points: it is bounded by parts of
-/// triangles and by flat cuts, whose borders lie in triangles too.
+/// Points of each layer between equidistant planes across a direction: corners of triangles in it,
+/// and intersections of triangles' sides with planes. The solid's part in a layer lies within the
+/// hull of these points: its boundary consists of parts of triangles and of flat cuts, whose
+/// borders lie in triangles too.
 using Layers = std::array<std::vector<Vector3d>, kLayers>;
 
 Layers layers_across(const ClosedMesh& mesh, const Vector3d& along) {

@@ -249,7 +249,7 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
   std::vector<double> further(balls.size(), 0);
   vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
-    // What was seen there before needs no look.
+    // A place that was examined before needs no second look.
     CoverSphere& vouched = vouched_[i];
     if (vouched.centre == balls[i].centre && level <= vouched.radius &&
         level > kVouched * vouched.radius)
@@ -287,7 +287,7 @@ double CoverDescent::add_void(const std::vector<CoverSphere>& balls, double leve
 LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::function<void()>& look) {
   LookedCover looked = {std::move(start), {}};
   LevelCover& cover = looked.cover;
-  // What the samples hold at is no level yet: the first look says what it is.
+  // The level of the samples is not yet proven: the first round measures it.
   for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
     const bool first = step == 0;
     const double aim = cover.level * (1 - step);

@@ -147,7 +147,7 @@ class VoidSearch {
   }
 
  private:
-  /// Whether every point of the cube that is on spheres can go a little way out of all of them and
+  /// Whether every point of the cube that is on spheres can move a little out of all of them and
   /// up, so that none is the highest of a void.
   bool may_rise(const Cube& cube, const BallList& crossing) const {
     const Vector3d up(0.36, 0.48, 0.8);
@@ -236,7 +236,7 @@ OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) 
 }
 
 void grow_to_cover(const MeshSolid& solid, std::vector<CoverSphere>& balls, double finest) {
-  // What a ball is grown by for one part often holds the next.
+  // A ball that was enlarged for one part often contains the next.
   const auto take = [&](const OpenPart& part) {
     double& radius = balls[part.ball].radius;
     radius = std::max(radius, part.radius);

@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
 
-/// Which candidate holds which targets, both ways.
+/// Which candidate contains which targets, in both directions.
 struct Incidence {
   std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate
   std::vector<std::vector<std::uint32_t>> holders;  ///< candidates of a target, ascending
@@ -72,7 +72,8 @@ class Choice {
     return best;
   }
 
-  /// Of those that hold the target, the one that brings most and has been out since before `now`.
+  /// Among the candidates that contain the target, the one with the largest gain that has been out
+  /// since before `now`.
   std::uint32_t most_helpful_for(std::uint32_t target, std::int64_t now) const {
     std::uint32_t best = kNone;
     for (const std::uint32_t j : incidence_.holders[target]) {
@@ -84,7 +85,7 @@ class Choice {
     return best;
   }
 
-  /// Of the chosen ones but `kept`, those that are free to go first.
+  /// Among the chosen ones except `kept`, the one whose removal costs least; free ones go first.
   std::uint32_t least_missed(std::int64_t now, std::uint32_t kept) const {
     std::uint32_t best = kNone;
     const auto before = [&](std::uint32_t j, std::uint32_t k) {
@@ -353,7 +354,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   return cover;
 }
 
-/// Of the ball that reaches furthest; `enough` where none reaches so far.
+/// The protrusion of the ball that reaches furthest; `enough` if none reaches so far.
 double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>& balls,
                           double enough) {
   std::vector<double> most(balls.size());

@@ -119,13 +119,13 @@ constexpr double kOfGuess = 1;   ///< with room: of a plain choice's balls, to b
 constexpr int kRoomTries = 2;    ///< with room: counts that are tried
 constexpr double kAbout = 1.25;  ///< with room: times the level that are good enough
 
-/// What several searches have done together, told by the thread that started them.
+/// The joint progress of several searches, reported by the thread that started them.
 class Watch {
  public:
   Watch(const ProgressCallback& progress, std::size_t searches)
       : stage_("spheres", progress), searches_(searches) {}
 
-  /// Of one search: its share that is done went from `before` to `now`. Throws WorkStop::Stopped.
+  /// Advances one search's share from `before` to `now`. Throws WorkStop::Stopped.
   void look(double before, double now) {
     double done = done_.load();
     while (!done_.compare_exchange_weak(done, done + (now - before))) {
@@ -213,8 +213,8 @@ CoverSearch search_of(const MeshSolid& solid, std::uint64_t seed, std::function<
           most / solid.frame().scale()};
 }
 
-/// As few spheres as reach no further than asked: twice as many until it is enough, then halfway
-/// between too few and enough.
+/// The fewest spheres that reach no further than asked: doubles the count until it is enough, then
+/// bisects.
 SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings, bool room) {
   int tries = 0;

@@ -29,7 +29,7 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
   /// The same where depth_in() is known.
   double radius(const Eigen::Vector3d& centre, double depth) const;
 
-  /// What the distance to the surface alone vouches for; 0 for a centre further out.
+  /// The radius that the distance to the surface alone proves; 0 for a centre further out.
   double sure_radius(const Eigen::Vector3d& centre) const;
 
   /// Points within `reach`, appended.

@@ -30,7 +30,7 @@ bool holds(const CoverSphere& ball, const Points& points) {
 
 class Cutter {
  public:
-  /// Of triangles within a box.
+  /// Cuts triangles within a box.
   Cutter(std::span<const CoverSphere> balls, const Eigen::AlignedBox3d& box) : balls_(balls) {
     for (std::uint32_t i = 0; i < balls.size(); ++i)
       if (box.squaredExteriorDistance(balls[i].centre) <= balls[i].radius * balls[i].radius)
@@ -70,7 +70,7 @@ class Cutter {
   }
 
  private:
-  /// What of the piece lies in the ball's cell; false where nothing is left, or the ball holds it.
+  /// Clips the piece to the ball's cell; false if nothing is left, or the ball contains it.
   bool cut_to_cell(std::uint32_t i) {
     const CoverSphere& own = balls_[i];
     const double own_power = own.centre.squaredNorm() - own.radius * own.radius;

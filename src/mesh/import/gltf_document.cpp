@@ -313,7 +313,7 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
   if (accessor.contains("bufferView")) {
     values = numbers(accessor, accessor, type, count, name);
   } else {
-    // As many zeros as the file has bytes: other attributes of as many vertices take more.
+    // Adds no more zeros than the file has bytes: other attributes of as many vertices take more.
     std::size_t stored = file_.bytes.size();
     for (const std::string_view buffer : buffers_) stored += buffer.size();
     if (count > stored) fail(name + ": " + std::to_string(count) + " elements without data");

@@ -85,7 +85,7 @@ class TriangleError {
     return best;
   }
 
-  /// Length of a way at whose ends the signs differ: along the normal, or across it.
+  /// A distance at which the sign changes, along the normal or across it.
   double to_change(const Vector3d& middle) const {
     const double here = solid_.signed_distance(middle);
     const auto changes = [&](const Vector3d& way) {
@@ -123,7 +123,7 @@ class CellError {
             std::vector<TriangleFrame<double>> triangles)
       : solid_(solid), grid_(grid), near_(near), triangles_(std::move(triangles)) {}
 
-  /// Of the cell around `middle`; infinite if there may be surface, and there are no triangles.
+  /// An error bound for the cell around `middle`; infinite if it may have surface and no triangles.
   double bound(const Vector3d& middle) const {
     std::vector<Vector3d> open = {middle}, next;
     double half = 0.5 * grid_.edge, most = 0;

@@ -23,7 +23,8 @@ namespace {
 using Point = Eigen::Vector3d;
 using Polygon = std::vector<Point>;  ///< convex
 
-/// Of what is near: no face that touches another is smaller, nor the part that does.
+/// In units of the near distance: a face that touches another, and the part that does, is at least
+/// this large.
 constexpr double kNarrowest = 16;
 
 class Faces {
@@ -91,8 +92,8 @@ class Faces {
   std::vector<Point> normals_;
 };
 
-/// The shortest way, nearly, that goes one step along each normal; at an edge as sharp as a knife
-/// it ends early. No way where faces on both sides have the vertex.
+/// Nearly the shortest displacement that moves one step along each normal; at a knife-sharp edge it
+/// is cut short. Zero if faces on both sides share the vertex.
 Point way_along(const std::vector<Point>& normals) {
   constexpr double kFarthest = 8;
   constexpr int kRounds = 64;

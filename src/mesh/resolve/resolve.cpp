@@ -276,7 +276,7 @@ class Resolver {
       if (std::binary_search(arrangement_.walls.begin(), arrangement_.walls.end(),
                              arrangement_.plane[t]))
         any = changed[groups[t]] = true;
-    // What differs by less is one vertex, near the origin too.
+    // Points that differ by less become one vertex, near the origin too.
     const double step = spacing_at(largest_coordinate(bounds_of(vertices_)));
     TriangleMesh made;
     if (!any && pressed_.moved == 0) {

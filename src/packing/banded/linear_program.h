@@ -14,7 +14,7 @@ constexpr int kMostPivots = 24;
 constexpr float kTolerance = 1e-5f;   ///< of a violation, in half-edges of the box
 constexpr float kLeastPivot = 1e-5f;  ///< below it an element of the basis counts as 0
 
-/// What the multipliers prove: `sums` of λ, λb, λ·gradient; z the vertex (t, y).
+/// The bound that the multipliers prove. `sums`: of λ, λb, λ·gradient; z: the vertex (t, y).
 IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5], const float z[4],
                                           float a) {
   ClearanceOptimum optimum;

@@ -87,9 +87,9 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
   return written;
 }
 
-/// What MeshSurface and WideMeshSurface have in common. Features are triangles, named by their
-/// places in the hierarchy's blocks; no answer depends on the hierarchy. A surface's functions that
-/// take a team are called by all its lanes and answer the same to each.
+/// Base of MeshSurface and WideMeshSurface. Features are triangles, named by their places in the
+/// hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its functions,
+/// and all get the same answer.
 template <class Surface>
 class TriangleSurface {
  public:

@@ -54,7 +54,7 @@ IST_HD inline SphereGridLayout sphere_grid_layout(std::uint64_t spheres, float r
   return layout;
 }
 
-/// Of the cell that holds the coordinate x, or the nearest one; |x| < 2^20.
+/// The coordinate of the cell that contains x, or of the nearest cell; |x| < 2^20.
 IST_HD inline int grid_coordinate(const SphereGridLayout& layout, float x) {
   const int i = static_cast<int>((x + kGridHalfExtent) * layout.inverse_size);
   return i < 0 ? 0 : (i >= layout.cells_per_side ? layout.cells_per_side - 1 : i);
@@ -79,7 +79,7 @@ IST_HD inline GridRange grid_range(const SphereGridLayout& layout, const Sphere&
            grid_coordinate(layout, s.z + outer)}};
 }
 
-/// What a sphere is to a cell or a block.
+/// How a sphere lies to a cell or a block.
 enum class GridRelation : std::uint8_t {
   away,    ///< not listed
   near,    ///< listed, if nothing covers it

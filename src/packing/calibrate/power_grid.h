@@ -147,7 +147,7 @@ struct PowerBlock {
         j0(cell.j << cell.level),
         j1(least((cell.j + 1) << cell.level, grid.columns.nz)) {}
 
-  /// What lies within; x0 ≥ x1 if nothing does.
+  /// The part of a span within this one; x0 ≥ x1 if there is none.
   IST_HD ColumnSpan part_of(const ColumnSpan& span) const {
     return {span.x0 > x0 ? span.x0 : x0, span.x1 < x1 ? span.x1 : x1};
   }
@@ -272,7 +272,7 @@ struct PowerSums {
   }
 };
 
-/// What a piece adds to its site's sums.
+/// The terms of a piece in its site's sums.
 IST_HD inline PowerSums piece_sums(const PowerGrid& grid, double x0, double x1, double y,
                                    double z) {
   const double length = (x1 - x0) * grid.to_fixed;

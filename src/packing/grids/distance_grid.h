@@ -14,7 +14,7 @@ namespace ist::packing {
 constexpr std::uint32_t kTriangleTag = 0x80000000u;
 constexpr std::uint32_t kNoTag = 0xFFFFFFFFu;
 
-/// What an *active* cell of the distance grid stores: the primitives that meet it.
+/// The record of an *active* cell of the distance grid: the primitives that overlap it.
 struct CellRecord {
   std::uint32_t cell = 0;  ///< its id in the layout
   std::uint32_t triangles = 0, triangle_count = 0;
