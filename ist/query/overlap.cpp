@@ -36,19 +36,16 @@ class MeetingSearch {
   }
 
   YesNo run() {
-    NodePair pair{0, 0, a_.top, b_.top};
     if (root_cover_gap() > error_) return YesNo::no;
-    do {
-      if (!waiting_.grant()) return YesNo::unknown;
-      if (pair.level_a == 0 && pair.level_b == 0) {
-        const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
-        if (leaf.gap < -error_) return YesNo::yes;
-        covers_meet_ |= leaf.cover <= error_;
-      } else {
+    return waiting_.search({0, 0, a_.top, b_.top}, covers_meet_, [&](const NodePair& pair) {
+      if (pair.level_a > 0 || pair.level_b > 0) {
         open(pair);
+        return false;
       }
-    } while (waiting_.take_best(covers_meet_, pair));
-    return covers_meet_ ? YesNo::unknown : YesNo::no;
+      const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
+      covers_meet_ |= leaf.cover <= error_;
+      return leaf.gap < -error_;
+    });
   }
 
  private:
