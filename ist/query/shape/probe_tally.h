@@ -22,8 +22,6 @@ class ProbeTally {
   ProbeTally(const SphereTree& probes, const RelativePose& pose, ContactBins* bins) noexcept
       : probes_(probes), pose_(pose), map_(pose.a_from_b), bins_(bins) {}
 
-  bool has_bins() const noexcept { return bins_ != nullptr; }
-
   /// A leaf block, its balls summed.
   void add(std::uint32_t block, const ProbeTotal& part) noexcept {
     total_.add(part);

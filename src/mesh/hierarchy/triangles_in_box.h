@@ -8,15 +8,6 @@
 
 namespace ist {
 
-/// Whether the box around a triangle meets another.
-inline bool box_meets(const Corners& t, const float low[3], const float high[3]) {
-  for (int k = 0; k < 3; ++k) {
-    if (t.p[0][k] < low[k] && t.p[1][k] < low[k] && t.p[2][k] < low[k]) return false;
-    if (t.p[0][k] > high[k] && t.p[1][k] > high[k] && t.p[2][k] > high[k]) return false;
-  }
-  return true;
-}
-
 /// Clears hit[i] where, seen along x, oriented box i is apart from a box.
 inline void leave_out_apart(const OrientedBoxes<kBvhWidth>& boxes, const float low[3],
                             const float high[3], int hit[kBvhWidth]) {
@@ -73,14 +64,6 @@ bool none_about_box(const MeshView& mesh, const float low[3], const float high[3
       if (hit[i] != 0) stack[top++] = node.child[i];
   }
   return true;
-}
-
-/// Asks those alone whose boxes meet the box: the hierarchy has no say in it.
-template <class Is>
-bool none_in_box(const MeshView& mesh, const float low[3], const float high[3], const Is& is) {
-  return none_about_box(mesh, low, high, [&](const Corners& triangle) {
-    return box_meets(triangle, low, high) && is(triangle);
-  });
 }
 
 }  // namespace ist
