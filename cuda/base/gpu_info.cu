@@ -14,7 +14,7 @@ constexpr int kOldest = 75;  // compute capability; CUDA 13 has none older
 
 __global__ void any_kernel() {}  // all are compiled for the same architectures
 
-/// Success if this build holds code for the device. Makes the device's context.
+/// Success if this build has code for the device. Makes the device's context.
 cudaError_t find_code_for(int device) {
   int previous = 0;
   cudaError_t status = cudaGetDevice(&previous);

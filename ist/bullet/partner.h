@@ -77,7 +77,7 @@ class Partner {
   PlacedShape placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
 
-  /// [u] What placed() says of distances holds for motions up to this.
+  /// [u] The distances of placed() are valid for motions up to this.
   double clearance(double thickness) const {
     return mesh_ != nullptr ? thickness : std::numeric_limits<double>::infinity();
   }

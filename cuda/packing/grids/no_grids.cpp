@@ -1,4 +1,4 @@
-// What a build without the paper's grids says.
+// The grid functions of a build without the paper's grids: all of them throw.
 #include "cuda/packing/grids/pack_grids.h"
 #include "packing/grids/medial_grids.h"
 

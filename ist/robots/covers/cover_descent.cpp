@@ -214,15 +214,15 @@ class CoverDescent::Round {
   }
 
   /// Levels beyond its surface a ball looks at. Where it looks further, it lets go of what it
-  /// holds, for a target that it will not reach, and gaps grow.
+  /// contains, for a target that it will not reach, and gaps grow.
   static constexpr double kReach = 0.3;
 
   const PointGrid& targets_;
   const OffsetSurface& surface_;
   const double reach_;
   Balls& balls_;
-  std::vector<int> holders_;         ///< balls that hold a target
-  std::vector<std::uint32_t> open_;  ///< targets that none holds, and some that one does by now
+  std::vector<int> holders_;         ///< balls that contain a target
+  std::vector<std::uint32_t> open_;  ///< targets that none contains, and some that one does by now
   std::vector<Vector3d> needed_, walls_;
 };
 

@@ -93,7 +93,7 @@ class VoidSearch {
     double half;
   };
 
-  /// The cube is settled, or is to be divided: then `kept` holds the balls that reach into it.
+  /// The cube is settled, or is to be divided: then `kept` contains the balls that reach into it.
   enum class Verdict { settled, divide, open };
   Verdict look(const Cube& cube, const BallList& from, BallList& kept, OpenPlace& open) const {
     double gap = std::numeric_limits<double>::infinity();
@@ -174,8 +174,8 @@ BallList all_of(std::size_t count) {
   return all;
 }
 
-/// Those that no other ball holds whole: the union is the same without the others, and coincident
-/// spheres would cross everywhere.
+/// Those that no other ball contains whole: the union is the same without the others, and
+/// coincident spheres would cross everywhere.
 BallList outermost(std::span<const CoverSphere> balls) {
   BallList list;
   for (std::uint32_t i = 0; i < balls.size(); ++i) {

@@ -39,7 +39,7 @@ struct Incidence {
     }
   }
 
-  std::int64_t pairs = 0;  ///< of a candidate and a target it holds
+  std::int64_t pairs = 0;  ///< of a candidate and a target it contains
 };
 
 /// The state of the search: what a candidate would bring, and what a chosen one would be missed
@@ -167,9 +167,9 @@ class Choice {
 
   const Incidence& incidence_;
   std::vector<std::int64_t> weight_;    ///< of a target
-  std::vector<std::uint32_t> holders_;  ///< how many chosen ones hold a target
-  std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate holds
-  std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone holds
+  std::vector<std::uint32_t> holders_;  ///< how many chosen ones contain a target
+  std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate contains
+  std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone contains
   std::vector<std::int64_t> since_;     ///< it stays as it is until this exchange
   std::vector<char> in_;
   std::int64_t steps_ = 0;
@@ -292,7 +292,8 @@ SampledSolid sampled_for(const MeshSolid& solid, std::size_t count, const LevelS
   return sampled;
 }
 
-/// Balls hold little of the surface where their share of the level is small: then more are tried.
+/// Balls contain little of the surface where their share of the level is small: then more are
+/// tried.
 std::size_t candidate_count(const SampledSolid& sampled, std::size_t usual, std::size_t count) {
   return sampled.share ? std::max(usual, kCandidatesABall * count) : usual;
 }
@@ -316,7 +317,7 @@ LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std
       low = level;
     }
   }
-  // One ball around the cube of the frame holds anything.
+  // One ball around the cube of the frame contains anything.
   if (best.centres.empty()) best = {{Vector3d::Zero()}, 2};
   return best;
 }
@@ -339,7 +340,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   std::int64_t steps = sampled.share ? kTightSteps : kSteps;
   for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
     const double level = cover.level * factor;
-    // Tight edges are held by balls for their level alone.
+    // Tight edges are contained by balls for their level alone.
     if (sampled.share) candidates = candidates_at(level);
     const std::vector<CoverSphere> balls =
         candidates.balls_at(OffsetSurface(solid, sampled, level));

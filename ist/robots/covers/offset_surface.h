@@ -35,7 +35,8 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
   /// Points within `reach`, appended.
   void walls(const Eigen::Vector3d& centre, double reach, std::vector<Eigen::Vector3d>& out) const;
 
-  /// Centres of largest balls: of the medial axis of what the surface holds. At most some `most`.
+  /// Centres of largest balls: of the medial axis of what the surface contains. At most some
+  /// `most`.
   std::vector<Eigen::Vector3d> medial_centres(std::size_t most) const;
 
  private:

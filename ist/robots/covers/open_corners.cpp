@@ -37,7 +37,7 @@ class Cutter {
         touching_.push_back(i);
   }
 
-  /// `holder`: tried first, and set to what holds the triangle whole.
+  /// `holder`: tried first, and set to what contains the triangle whole.
   void cut(const Corners& triangle, std::uint32_t& holder, std::vector<OpenCorner>& out) {
     if (holder < balls_.size() && holds(balls_[holder], triangle)) return;
     const Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3;

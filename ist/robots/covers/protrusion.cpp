@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may end above what was seen
 constexpr double kTolerance = 0.01;
 
-/// Divides the cube around a ball until no part can hold a point further out than was seen.
+/// Divides the cube around a ball until no part can contain a point further out than was seen.
 class ProtrusionSearch {
  public:
   ProtrusionSearch(const MeshSolid& solid, const CoverSphere& ball, double tolerance, double enough,

@@ -108,7 +108,7 @@ struct BandSchedule {
       threshold = smallest_wanted();
       slack = kLastSlack;
     }
-    // A cell with a half-diagonal below a quarter of the margin settles or holds a candidate, for
+    // A cell with a half-diagonal below a quarter of the margin settles or gets a candidate, for
     // its bound exceeds its prototype's radius by no more than the half-diagonal.
     margin = threshold * (1 + 0.5f * slack);
     spheres_before_band = spheres;

@@ -106,7 +106,7 @@ class TriangleSurface {
     return self().winding_number(team, x) >= 1;
   }
 
-  /// Inside by a winding number of 1: no other shell of the solid holds x.
+  /// Inside by a winding number of 1: no other shell of the solid contains x.
   template <class Team>
   IST_HD bool inside_once(const Team& team, Float3 x) const {
     return self().winding_number(team, x) == 1;

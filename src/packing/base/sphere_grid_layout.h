@@ -116,8 +116,8 @@ IST_HD inline GridRelation block_relation(const SphereGridLayout& layout, const 
                        axis_span(layout, 8 * j, 8, s.y), axis_span(layout, 8 * k, 8, s.z));
 }
 
-/// Cell (i, j, k) of a block that the sphere is near; where it is away from the block or covers it,
-/// that holds for all of the block's cells.
+/// Cell (i, j, k) of a block that the sphere is near. If it is away from the block or covers it, so
+/// it is for all of the block's cells.
 IST_HD inline GridRelation cell_relation(const SphereGridLayout& layout, const Sphere& s, int i,
                                          int j, int k) {
   return grid_relation(layout, s, axis_span(layout, i, 1, s.x), axis_span(layout, j, 1, s.y),

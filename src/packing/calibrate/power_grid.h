@@ -97,7 +97,7 @@ struct PowerGrid {
   LineLattice columns;
   double x0 = 0, x1 = 0, step_x = 0;     ///< extent of the solid, steps along x; unit frame
   std::uint32_t nx = 0;                  ///< steps
-  int levels = 0;                        ///< the one cell of level levels − 1 holds everything
+  int levels = 0;                        ///< the one cell of level levels − 1 contains everything
   double to_fixed = 1;                   ///< scale of the integer sums
   const std::uint32_t* first = nullptr;  ///< spans of column (i, j) start at first[j ny + i]
   const ColumnSpan* spans = nullptr;

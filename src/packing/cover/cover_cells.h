@@ -14,7 +14,7 @@
 namespace ist {
 
 // Every ball starts this much larger than it need be, over the mean leaf radius: cells that it
-// holds then need not be divided down to the surface.
+// contains then need not be divided down to the surface.
 constexpr double kCoverSlack = 0.1;
 // A cell is small enough once its half-diagonal is this part of the extension that it asks for.
 constexpr double kCoverRefinement = 0.2;
@@ -136,7 +136,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
     return farthest_from(ball, cell.x, cell.y, cell.z, level.half);
   };
   const CoverBest whole = best_ball(team, level, keep, kept, farthest);
-  if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball holds the cell
+  if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball contains the cell
 
   // A point of the solid in the cell or beside it: its middle, or the surface's nearest.
   double point[3] = {cell.x, cell.y, cell.z};
