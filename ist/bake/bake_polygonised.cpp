@@ -55,8 +55,9 @@ void require_lipschitz(const Solid& solid) {
       q[k] = p[k] + reach * (2 * random_at(at + 3) - 1);
     }
     const double a = solid.signed_distance(p), b = solid.signed_distance(q);
-    const Eigen::Vector3d way = q - p;
-    const double apart = std::sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
+    const Eigen::Vector3d between = q - p;
+    const double apart =
+        std::sqrt(between[0] * between[0] + between[1] * between[1] + between[2] * between[2]);
     Finding& found = findings[i];
     found.place = p;
     found.not_finite = !std::isfinite(a) || !std::isfinite(b);

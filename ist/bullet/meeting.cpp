@@ -241,19 +241,19 @@ bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& cont
     }
     const SurfacePoint near = closest_point(solids[1 - inner], centre);
     if (shape == nullptr && !(near.distance <= -radius)) continue;
-    ContactPatch& way = contact.patches[0] = {};
-    way.id = ~std::uint64_t{0};
-    way.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
-    way.depth = radius - near.distance;
+    ContactPatch& exit_patch = contact.patches[0] = {};
+    exit_patch.id = ~std::uint64_t{0};
+    exit_patch.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
+    exit_patch.depth = radius - near.distance;
     if (near.status != QueryStatus::ok) {  // it keeps no mesh
       const Eigen::Vector3d between = to_eigen(at[1].getOrigin() - at[0].getOrigin());
-      way.normal =
+      exit_patch.normal =
           between.norm() > 0 ? Eigen::Vector3d(between.normalized()) : Eigen::Vector3d::UnitZ();
-      way.depth = first_->reach() + second_->reach() - between.norm();
+      exit_patch.depth = first_->reach() + second_->reach() - between.norm();
     }
-    way.centroid = way.point = centre;
-    way.area = std::pow(volume(), 2.0 / 3);
-    way.volume = overlap;
+    exit_patch.centroid = exit_patch.point = centre;
+    exit_patch.area = std::pow(volume(), 2.0 / 3);
+    exit_patch.volume = overlap;
     contact.count = 1;
     return true;
   }

@@ -171,9 +171,9 @@ TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direc
 
 /// How far from `target` along `direction` a body that comes from there first holds `wanted` of
 /// the points, in lengths of `direction`.
-std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>& points,
-                             const Vector3d& target, const Vector3d& direction,
-                             std::size_t wanted) {
+std::optional<double> travel_of(const ConvexBody& body, const std::vector<Vector3d>& points,
+                                const Vector3d& target, const Vector3d& direction,
+                                std::size_t wanted) {
   // during the approach: a point enters (1) or leaves (−1)
   std::vector<std::pair<double, int>> events;
   for (const Vector3d& x : points)
@@ -183,11 +183,11 @@ std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>
     }
   std::sort(events.begin(), events.end(), std::greater<>());
   std::size_t held = 0;
-  for (const auto& [way, change] : events)
+  for (const auto& [travel, change] : events)
     if (change < 0) {
       --held;
     } else if (++held >= wanted) {
-      return way;
+      return travel;
     }
   return std::nullopt;
 }
@@ -300,9 +300,9 @@ std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overl
     const double share = volume / solid_.volume();
     const auto wanted =
         static_cast<std::size_t>(std::ceil(share * static_cast<double>(points_.size())));
-    const auto way = way_of(shape.body, points_, target, direction, wanted);
-    if (!way) continue;
-    const Vector3d place = target + *way * direction;
+    const auto travel = travel_of(shape.body, points_, target, direction, wanted);
+    if (!travel) continue;
+    const Vector3d place = target + *travel * direction;
     Pose pose = shape.pose;
     for (int k = 0; k < 3; ++k) pose.t[k] = place[k];
     double truth = 0;

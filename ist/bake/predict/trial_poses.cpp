@@ -52,14 +52,14 @@ class Trials {
     // From outside in, since solids may have holes in the middle.
     const double start = radius_a_ + radius_b_;
     double near = start, far = start;
-    const auto shares = [&](double way) {
-      const Pose pose = pose_of(q, centre_a_ + way * direction - q * centre_b_);
+    const auto shares = [&](double travel) {
+      const Pose pose = pose_of(q, centre_a_ + travel * direction - q * centre_b_);
       const double volume = shared_volume(pose, 1);
       if (!(volume >= fraction * smaller_)) {
-        far = way;
+        far = travel;
         return false;
       }
-      near = way;
+      near = travel;
       out.b_in_a = pose;
       out.volume = volume;
       return true;

@@ -69,8 +69,8 @@ HWY_INLINE void place(const SphereTree& tree, const Similarity& map, const doubl
         const V moved = ((hn::Set(d, map.m[3 * k]) * x + hn::Set(d, map.m[3 * k + 1]) * y) +
                          hn::Set(d, map.m[3 * k + 2]) * z) +
                         hn::Set(d, shift[k]);
-        const V way = moved - hn::Set(d, middle[k] - about[k]);
-        square = square + way * way;
+        const V between = moved - hn::Set(d, middle[k] - about[k]);
+        square = square + between * between;
         hn::Store(hn::DemoteTo(df, moved), df, to[k] + out.count + lane);
       }
       const V placed_r = r * scale;

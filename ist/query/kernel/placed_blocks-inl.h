@@ -121,7 +121,7 @@ HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Tu
   const FourDoubles d4;
   const Origin& o = tree.level[0].origins[block];
   const NodeBall ball = tree.ball(0, block);
-  alignas(32) double way[4];
+  alignas(32) double extent[4];
   for (std::size_t k = 0; k < 4; k += hn::Lanes(d4)) {
     const auto x = hn::Load(d4, axes.column[0] + k);
     const auto y = hn::Load(d4, axes.column[1] + k);
@@ -133,11 +133,11 @@ HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Tu
                         t;
     hn::Store(origin, d4, placed.origin + k);
     hn::Store(centre, d4, placed.centre + k);
-    hn::Store(hn::Abs(centre - origin), d4, way + k);
+    hn::Store(hn::Abs(centre - origin), d4, extent + k);
   }
   const double radius = ball.r * axes.scale;
   placed.radius = static_cast<T>(radius);
-  finish_placing(radius + ((way[0] + way[1]) + way[2]), axes, placed);
+  finish_placing(radius + ((extent[0] + extent[1]) + extent[2]), axes, placed);
 }
 
 }  // namespace ist::HWY_NAMESPACE

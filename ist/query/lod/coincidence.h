@@ -26,12 +26,12 @@ IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], doub
   const double centre[3] = {root[0], root[1], root[2]};
   double moved[3];
   a_from_b.apply(centre, moved);
-  const Vec3 way = {moved[0] - centre[0], moved[1] - centre[1], moved[2] - centre[2]};
+  const Vec3 displacement = {moved[0] - centre[0], moved[1] - centre[1], moved[2] - centre[2]};
   const Vec3 lever = {moved[0] - t0[0], moved[1] - t0[1], moved[2] - t0[2]};
   // The mean square of each coordinate over a ball is r²/5.
   const double spread = root[3] * root[3] / 5, scale = a_from_b.scale;
   const double turned = 3 * (scale * scale + 1) - 2 * ((m[0] + m[4]) + m[8]);
-  const double square = dot(way, way) + spread * (turned > 0 ? turned : 0);
+  const double square = dot(displacement, displacement) + spread * (turned > 0 ? turned : 0);
   CoincidenceWeight result;
   if (!(square < (kCopyApart * kCopyApart) * (mean_radius * mean_radius))) return result;
   const double distance = std::sqrt(square);
@@ -39,9 +39,9 @@ IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], doub
   result.weight = smooth_step(part);
   if (part >= 1) return result;
   const double slope = -smooth_slope(part) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
-  result.slope.by_translation = slope * way;
+  result.slope.by_translation = slope * displacement;
   result.slope.by_rotation =
-      slope * (cross(lever, way) - spread * Vec3{m[5] - m[7], m[6] - m[2], m[1] - m[3]});
+      slope * (cross(lever, displacement) - spread * Vec3{m[5] - m[7], m[6] - m[2], m[1] - m[3]});
   return result;
 }
 

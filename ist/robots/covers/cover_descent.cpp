@@ -66,10 +66,10 @@ struct Slopes {
         if (const double x = g.dot(one); x < least) least = x, u = &one;
       for (const Vector3d& one : down)
         if (const double x = g.dot(one); x > most) most = x, v = &one;
-      const Vector3d way = (*u - *v) - g;
-      const double slope = -g.dot(way);
+      const Vector3d change = (*u - *v) - g;
+      const double slope = -g.dot(change);
       if (slope <= 1e-3 * g.squaredNorm()) break;
-      g += std::min(1.0, slope / way.squaredNorm()) * way;
+      g += std::min(1.0, slope / change.squaredNorm()) * change;
     }
     return g;
   }
@@ -200,10 +200,10 @@ class CoverDescent::Round {
     surface_.walls(centre, radius + 2 * trust, walls_);
     const Recentred moved = recentre(centre, needed_, walls_, trust);
     const double next = surface_.radius(moved.centre);
-    const double way = std::sqrt((moved.centre - centre).squaredNorm());
-    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * surface_.level(),
+    const double moved_by = std::sqrt((moved.centre - centre).squaredNorm());
+    trust = std::clamp(moved_by > 0 ? 2 * moved_by : 0.5 * trust, 0.02 * surface_.level(),
                        0.7 * surface_.level());
-    if (!(next > 0) || !(way > 0)) return false;
+    if (!(next > 0) || !(moved_by > 0)) return false;
     targets_.within(centre, radius, [&](std::uint32_t x, float) {
       if (--holders_[x] == 0) open_.push_back(x);
     });

@@ -156,11 +156,11 @@ class VoidSearch {
       const Vector3d d = cube.middle - balls_[i].centre;
       out += d / std::max(std::sqrt(d.squaredNorm()), kDistanceMargin);
     }
-    Vector3d way = out - out.dot(up) * up;
-    way += 1e-3 * std::sqrt(way.squaredNorm()) * up;
-    const double slack = cube.half * way.cwiseAbs().sum() + kDistanceMargin;
-    return way.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
-             return way.dot(cube.middle - balls_[i].centre) > slack;
+    Vector3d climb = out - out.dot(up) * up;
+    climb += 1e-3 * std::sqrt(climb.squaredNorm()) * up;
+    const double slack = cube.half * climb.cwiseAbs().sum() + kDistanceMargin;
+    return climb.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
+             return climb.dot(cube.middle - balls_[i].centre) > slack;
            });
   }
 

@@ -88,15 +88,15 @@ class TriangleError {
   /// A distance at which the sign changes, along the normal or across it.
   double to_change(const Vector3d& middle) const {
     const double here = solid_.signed_distance(middle);
-    const auto changes = [&](const Vector3d& way) {
-      return (solid_.signed_distance(middle + way) < 0) != (here < 0);
+    const auto changes = [&](const Vector3d& offset) {
+      return (solid_.signed_distance(middle + offset) < 0) != (here < 0);
     };
     for (double s = std::max(kMargin * std::abs(here), 0x1p-20 * edge_); s < edge_; s *= 1.5) {
       if (changes(s * normal_) || changes(-s * normal_)) return s;
       for (int k = 0; k < 3; ++k) {
-        Vector3d way = Vector3d::Zero();
-        way[k] = s;
-        if (changes(way) || changes(-way)) return s;
+        Vector3d offset = Vector3d::Zero();
+        offset[k] = s;
+        if (changes(offset) || changes(-offset)) return s;
       }
       for (int i = 0; i < 8; ++i) {
         const double part = 0.5773502691896257 * s;  // of the diagonal

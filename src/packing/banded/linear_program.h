@@ -101,10 +101,10 @@ IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMem
     const bool may_leave = w > kLeastPivot;
     const float inverse_w = 1 / (may_leave ? w : 1);
     const float ratio = lambda * inverse_w + 0.f;  // no −0
-    const std::uint32_t way = may_leave && ratio < kFarAway ? bits_of(ratio) : 0xFFFFFFFFu;
-    const std::uint32_t shortest = team.min(way);
+    const std::uint32_t travel = may_leave && ratio < kFarAway ? bits_of(ratio) : 0xFFFFFFFFu;
+    const std::uint32_t shortest = team.min(travel);
     if (shortest == 0xFFFFFFFFu) break;
-    const int leaving = team.first(way == shortest, holders);
+    const int leaving = team.first(travel == shortest, holders);
     const float theta = float_of(shortest);
     const float column =
         team.broadcast(inverse, (team.lane() & ~3) | leaving) * team.broadcast(inverse_w, leaving);
@@ -212,7 +212,7 @@ struct SimplexBasis {
 /// the linear model that the ascent follows.
 ///
 /// A linear program in (t, y): max t, t − gradient_i·y ≤ b_i, ±y_k ≤ a. Dual simplex from the
-/// constraint that alone is tightest; every basis on the way is dual feasible, so stopping early
+/// constraint that alone is tightest; every basis in between is dual feasible, so stopping early
 /// still gives a bound. The value is formed at the end from the multipliers by weak duality,
 /// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the pivots
 /// can only loosen it. Ties go to the smallest tag, so the result is a function of the set of

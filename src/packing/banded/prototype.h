@@ -162,10 +162,10 @@ class PrototypeField {
     if (cell.inside) {
       const float window = kWindow * cell.half;
       const Float3 there = x + cell.prototype;
-      const float way = norm(cell.prototype);
-      bool better = way < 0.99f * cell.surface_at_least;
+      const float moved_by = norm(cell.prototype);
+      bool better = moved_by < 0.99f * cell.surface_at_least;
       if (better) {
-        view = look(team, there, window, cell.surface_at_least - way, cell, scratch, at);
+        view = look(team, there, window, cell.surface_at_least - moved_by, cell, scratch, at);
         better = view.sample.clearance > clearance;
       }
       if (better)
