@@ -147,9 +147,9 @@ std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
     capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
   };
   add(header_a.inner_tree, header_b.inner_tree);
-  const DetailChain chain(header_a, header_b, a_from_b.a_from_b.scale);
+  const LevelChain chain(header_a, header_b, a_from_b.a_from_b.scale);
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    const DetailPair& pair = chain[i];
+    const LevelPair& pair = chain[i];
     add(matched_tree(header_a, pair.a), matched_tree(header_b, pair.b));
     if (pair.a != pair.b || !are_one_asset(header_a, header_b)) continue;
     // Copies that coincide are asked as unlike levels.

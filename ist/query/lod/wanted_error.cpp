@@ -83,7 +83,7 @@ double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
 }
 
 WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-                         const PenetrationSettings& settings, const DetailChain& chain,
+                         const PenetrationSettings& settings, const LevelChain& chain,
                          bool exact) noexcept
     : error_(std::min(settings.relative_error, 1.0)), size_(chain.size()) {
   const AssetHeader& asset_a = a.asset.header();
@@ -139,14 +139,14 @@ bool WantedError::by_spheres() const noexcept {
 
 WantedError::Shares WantedError::shares(double coarse) const noexcept {
   Shares shares;
-  DetailWeight& rest = shares.rest;
+  LevelWeight& rest = shares.rest;
   for (std::size_t i = size_; i-- > 0;) {
     const double from = from_[i];
     // (so that a damaged asset's NaN is never exact enough)
     const double t = coarse > kTooRough * from
                          ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0)
                          : 0;
-    const DetailWeight part{smooth_step(t), t < 1 ? smooth_slope(t) / ((1 - kTooRough) * from) : 0};
+    const LevelWeight part{smooth_step(t), t < 1 ? smooth_slope(t) / ((1 - kTooRough) * from) : 0};
     shares.levels[i] = rest * part;
     rest = rest * complement(part);
   }

@@ -41,14 +41,14 @@ class WantedError {
  public:
   /// `exact`: the exact measure may answer.
   WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-              const PenetrationSettings& settings, const DetailChain& chain, bool exact) noexcept;
+              const PenetrationSettings& settings, const LevelChain& chain, bool exact) noexcept;
 
   /// Some level is exact enough at some overlap.
   bool by_spheres() const noexcept;
 
   struct Shares {
-    DetailChain::Weights levels = {};  ///< of the chain
-    DetailWeight rest{1, 0};           ///< at which no level is exact enough
+    LevelChain::Weights levels = {};  ///< of the chain
+    LevelWeight rest{1, 0};           ///< at which no level is exact enough
   };
   /// Parts of the answer, which sum to 1: all of it is the coarsest pair's from the overlap on at
   /// which that is exact enough, none up to 0.7 of that; what is left goes to the next finer pair
@@ -56,7 +56,7 @@ class WantedError {
   Shares shares(double coarse) const noexcept;
 
   /// The partner of pair i in comparisons: both sides a level coarser, as far as there is one.
-  const DetailPair& coarser(std::size_t i) const noexcept { return coarser_[i]; }
+  const LevelPair& coarser(std::size_t i) const noexcept { return coarser_[i]; }
   /// The prediction is made from random poses. In others, such as flush faces and solids in one
   /// place, the protrusions and gaps of spheres add up to an error in proportion to their radius,
   /// which a coarser level reveals. The level is trusted if the error derived from that is below
@@ -66,9 +66,9 @@ class WantedError {
  private:
   const double error_;
   std::size_t size_;
-  std::array<DetailPair, DetailChain::kMost> coarser_;
-  std::array<double, DetailChain::kMost> wider_;  ///< radii of coarser_, less 1
-  std::array<double, DetailChain::kMost> from_;   ///< overlap, A's unit frame; infinity: never
+  std::array<LevelPair, LevelChain::kMost> coarser_;
+  std::array<double, LevelChain::kMost> wider_;  ///< radii of coarser_, less 1
+  std::array<double, LevelChain::kMost> from_;   ///< overlap, A's unit frame; infinity: never
 };
 
 }  // namespace ist
