@@ -46,11 +46,11 @@ void leave_out_apart(const OrientedBoxes<kBvhWidth>& boxes, const float low[3], 
   }
 }
 
-/// Calls is(corners) for all triangles whose boxes meet a box, and for some others, until one is
-/// so: whether none was.
-template <class Is>
-bool none_about_box(const MeshView& mesh, const float low[3], const float high[3], const Is& is) {
-  if (mesh.root == kBvhEmpty) return true;
+/// Calls visit(corners) for all triangles whose boxes meet a box, and for some others.
+template <class Visit>
+void visit_about_box(const MeshView& mesh, const float low[3], const float high[3],
+                     const Visit& visit) {
+  if (mesh.root == kBvhEmpty) return;
   std::uint32_t stack[kBvhStackSize];
   int top = 0;
   stack[top++] = mesh.root;
@@ -58,7 +58,7 @@ bool none_about_box(const MeshView& mesh, const float low[3], const float high[3
     const std::uint32_t at = stack[--top];
     if ((at & kBvhLeaf) != 0) {
       for (const std::uint32_t triangle : mesh.blocks[at & ~kBvhLeaf].triangle)
-        if (triangle != kNoTriangle && is(corners_of(mesh, triangle))) return false;
+        if (triangle != kNoTriangle) visit(corners_of(mesh, triangle));
       continue;
     }
     const BvhNode& node = mesh.nodes[at];
@@ -70,7 +70,6 @@ bool none_about_box(const MeshView& mesh, const float low[3], const float high[3
     for (int i = 0; i < kBvhWidth; ++i)
       if (hit[i] != 0) stack[top++] = node.child[i];
   }
-  return true;
 }
 
 }  // namespace
@@ -78,10 +77,8 @@ bool none_about_box(const MeshView& mesh, const float low[3], const float high[3
 int winding_number(const MeshView& mesh, const double p[3]) {
   int winding = 0;
   const RayBox box = RayBox::ray(p);
-  none_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
-    winding += ray_winding(t, p);
-    return false;
-  });
+  visit_about_box(mesh, box.lower, box.upper,
+                  [&](const Corners& t) { winding += ray_winding(t, p); });
   return winding;
 }
 
@@ -89,10 +86,9 @@ void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossi
   out.clear();
   const double yz[2] = {y, z};
   const RayBox box = RayBox::line(y, z);
-  none_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
+  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
     const int facing = pierced(t, yz);
     if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
-    return false;
   });
   std::sort(out.begin(), out.end(), comes_before);
 }
