@@ -47,7 +47,7 @@ struct SphereRobot {
                        [](const auto& link) { return !link.capsules.empty(); });
   }
   bool is_robot() const { return !robot.file.bytes.empty(); }
-  std::vector<LinkSpheres> spheres() const;  ///< as files hold them
+  std::vector<LinkSpheres> spheres() const;  ///< as in files
   std::vector<LinkSpheres> covers() const;   ///< the same, with spheres that contain capsules
 };
 

@@ -195,7 +195,7 @@ Asset bake(const Solid& solid, const PackingSettings& settings, const ProgressCa
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
     if (solid.mesh() == nullptr) return bake_field(solid, settings, meshing, progress);
-    ClosedMesh described;  // the solid holds its geometry, which make_solid() has resolved
+    ClosedMesh described;  // the solid has its geometry, which make_solid() has resolved
     described.name = meshing.name;
     return bake_solid(described, *solid.mesh(), Resolution(), settings, progress);
   });

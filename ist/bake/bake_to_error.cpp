@@ -325,7 +325,7 @@ class TargetBake {
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
   std::vector<OtherTrial> others_;
   std::optional<Candidate> best_;
-  std::optional<Asset> own_mesh_;  ///< where the candidates hold another or none
+  std::optional<Asset> own_mesh_;  ///< if the candidates' best is another or none
   Workspace workspace_;
 };
 

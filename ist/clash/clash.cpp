@@ -147,7 +147,7 @@ class PairQuery {
       return true;
     }
     if (!(found.volume > 0)) {
-      out.depth = 0;  // patches may hold rounding
+      out.depth = 0;  // patches may be rounding alone
       return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);

@@ -45,10 +45,10 @@ MeshMoments enclosed_moments(const MeshView& mesh);
 
 /// Those of the set where the winding number is ≥ 1 (docs/design.md 3.6): the enclosed ones less
 /// those of the excess.
-/// No excess, no loss of accuracy. The errors hold what the excess's integral estimates and, unless
-/// `meets_itself` is false, what folds of the surface may hide between its columns. The same for
-/// any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where there
-/// is an excess.
+/// No excess, no loss of accuracy. The errors include what the excess's integral estimates and,
+/// unless `meets_itself` is false, what folds of the surface may hide between its columns. The same
+/// for any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where
+/// there is an excess.
 MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
                                 const HierarchyMaker& hierarchy);
 

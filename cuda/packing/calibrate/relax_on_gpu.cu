@@ -52,7 +52,7 @@ class BlockTeam {
     return earlier + before;
   }
 
-  /// The value that lane `from` holds.
+  /// The value of lane `from`.
   __device__ std::uint32_t broadcast(std::uint32_t value, int from) const {
     if (lane() == from) shared_.words[0] = value;
     __syncthreads();

@@ -61,7 +61,7 @@ struct AssetArrays {
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.
 std::vector<std::byte> asset_bytes(const AssetArrays& arrays);
 
-/// Sets the content hash of bytes that hold at least a header.
+/// Sets the content hash of bytes that contain at least a header.
 void seal(std::vector<std::byte>& bytes);
 
 }  // namespace ist

@@ -78,7 +78,7 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
       }).named("spheres disjoint", "sum of two radii − distance of their centres, unit frame"));
 
   Tally coverage;
-  // The mesh of a ball may hold less than the ball.
+  // The mesh of a ball may contain less than the ball.
   const double covered = std::min(volume_of(inner, n) / asset.volume, 1.0);
   coverage.add(std::fabs(covered - asset.coverage) - 1e-9, 0);
   out.push_back(coverage.named("coverage",

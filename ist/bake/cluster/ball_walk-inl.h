@@ -115,7 +115,7 @@ Ball smallest_ball(const Balls& balls, const Enough& enough) {
     if (!farthest.found) return current;
     Ball next = current;
     if (!grow(support, ball_at(balls, farthest.place), next) || next.r <= current.r) {
-      current.r = worst;  // degenerate to rounding: hold it from where we stand
+      current.r = worst;  // degenerate to rounding: contain it from the present centre
       return current;
     }
     current = next;

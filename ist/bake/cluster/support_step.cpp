@@ -136,7 +136,8 @@ class SupportStep {
  public:
   SupportStep(const Support& support, const Ball& added) : support_(support), added_(added) {}
 
-  /// The smallest ball of the support and `added`, which it does not hold. False if there is none.
+  /// The smallest ball of the support and `added`, which it does not contain. False if there is
+  /// none.
   bool run() { return guess() || try_all(); }
 
   const Support& support() const { return best_support_; }

@@ -25,7 +25,7 @@ void measure_group(SwapGroup& group) {
   for (std::size_t i = 0; i < members.count; ++i) {
     Ball& without = group.without[i];
     without = group.ball;
-    // Only a ball that touches the bounding ball from inside holds it at its size.
+    // Only a ball that touches the bounding ball from inside contains it at its size.
     if (members.count == 1) {
       without.r = 0;
     } else if (reach(group.ball.x, group.ball.y, group.ball.z, members.ball(i)) >=
@@ -78,13 +78,13 @@ struct Fit {
 };
 
 /// Lower bounds of a group's cost once a ball joins it in place of a member, for the members of
-/// another group. A ball of radius R that holds a set whose smallest ball has radius r has its
-/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it holds a ball, too, that
+/// another group. A ball of radius R that contains a set whose smallest ball has radius r has its
+/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it contains a ball, too, that
 /// reaches D from there.
 class JoinCosts {
  public:
   JoinCosts(const SwapGroup& group, const BallLanes& added, double reach) : group_(group) {
-    if (group.members.count == 1) {  // nothing is left that would hold the centre near
+    if (group.members.count == 1) {  // no bound on the centre is left
       of_ball_.fill(0);
       return;
     }

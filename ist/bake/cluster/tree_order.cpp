@@ -390,7 +390,7 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
                                         bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
-  // A group that is not full comes last, and so does any that holds one that is not.
+  // A group that is not full comes last, and so does any that contains one that is not.
   const std::vector<std::uint32_t> groups =
       order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
   std::vector<std::uint32_t> sorted;

@@ -169,7 +169,7 @@ TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direc
   }
 }
 
-/// How far from `target` along `direction` a body that comes from there first holds `wanted` of
+/// How far from `target` along `direction` a body that comes from there first contains `wanted` of
 /// the points, in lengths of `direction`.
 std::optional<double> travel_of(const ConvexBody& body, const std::vector<Vector3d>& points,
                                 const Vector3d& target, const Vector3d& direction,

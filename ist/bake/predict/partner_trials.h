@@ -44,7 +44,7 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 /// caller's TBB threads.
 class PartnerTrials {
  public:
-  /// `mesh`: an asset that holds the solid's own triangles. Both must outlive this.
+  /// `mesh`: an asset that contains the solid's own triangles. Both must outlive this.
   PartnerTrials(const MeshSolid& solid, const AssetView& mesh);
 
   /// About `count` trials with overlaps near `overlap` of the solid's volume; fewer or none if the

@@ -93,7 +93,7 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
          mesh.neighbours == found.neighbours;
 }
 
-/// An asset holds spheres, or a mesh alone.
+/// An asset contains spheres, or a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
   if (header.sphere_count == 0) return header.mesh != 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&

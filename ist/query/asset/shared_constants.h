@@ -60,7 +60,7 @@ inline constexpr double kAlikeVolume = 0.5;
 inline constexpr double kCopyAlone = 0.4, kCopyApart = 1.6;
 
 // A quick look: the balls of nodes lie within kPokeOut root radii of the root's middle, because
-// each holds spheres of the root's ball and is itself no larger, or little. A solid smaller than
+// each contains spheres of the root's ball and is itself no larger, or little. A solid smaller than
 // kSpeck of the other overlaps by nothing.
 inline constexpr double kPokeOut = 3;
 inline constexpr double kSpeck = 1e-9;

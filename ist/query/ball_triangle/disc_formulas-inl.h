@@ -6,9 +6,9 @@
 /// The axes of a triangle's plane: u along the first edge, n the outward normal.
 struct PlaneFrame {
   Real u[3], v[3], n[3];
-  Real length[3];                ///< of the edges
-  Real edge_x[3], edge_y[3];     ///< their directions
-  Real area, apex_x, apex_y;     ///< twice the area; the third corner
+  Real length[3];             ///< of the edges
+  Real edge_x[3], edge_y[3];  ///< their directions
+  Real area, apex_x, apex_y;  ///< twice the area; the third corner
 };
 
 /// `e`, `f`: from the first corner to the others.
@@ -42,8 +42,8 @@ IST_FORMULA void frame_of(const Real (&e)[3], const Real (&f)[3], PlaneFrame& ou
   }
 }
 
-/// Of the part of a triangle inside a ball: volume of the cones to the sphere, solid angle, area,
-/// and ∫ (r² − |y − centre|²) dA.
+/// The part of a triangle inside a ball: volume of the cones to the sphere, solid angle, area, and
+/// ∫ (r² − |y − centre|²) dA.
 struct DiscPart {
   Real cones, angle, area, second;
 };
@@ -78,8 +78,7 @@ IST_FORMULA void add_triangle(const DiscShape& disc, Real omega, Real m, Real lo
   const Real cross = m * (high - low), area = constant(0.5) * cross;
   const Real spread = constant(1.0 / 12) * cross *
                       ((low * low + low * high) + (high * high + constant(3.0) * (m * m)));
-  sum.cones =
-      sum.cones + constant(1.0 / 3) * (disc.r * (disc.r * disc.r) * omega - disc.h * area);
+  sum.cones = sum.cones + constant(1.0 / 3) * (disc.r * (disc.r * disc.r) * omega - disc.h * area);
   sum.angle = sum.angle + omega;
   sum.area = sum.area + area;
   sum.second = sum.second + (disc.rho2 * area - spread);

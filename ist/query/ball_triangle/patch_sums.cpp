@@ -34,7 +34,7 @@ struct alignas(64) Chords {
   std::size_t size = 0;
 };
 
-/// Discs that hold a corner.
+/// Discs that contain a corner.
 struct alignas(64) Corners {
   double h[kRoom], r[kRoom];
   double x[kRoom], y[kRoom];  ///< the foot in the triangle's plane
@@ -116,7 +116,7 @@ HWY_INLINE void add_share(const SurfacePatch& patch, std::size_t t, std::size_t 
   }
 }
 
-/// Lanes beyond the last must hold numbers.
+/// Lanes beyond the last must be numbers.
 template <class List>
 HWY_INLINE std::size_t fill_up(List& list) {
   const std::size_t end = (list.size + 7) / 8 * 8;

@@ -17,7 +17,7 @@ struct PlacedCache {
 
   void forget() noexcept { std::fill_n(number, kPlaces, kNoIndex); }
 
-  /// The slot of number n, and whether it holds what was placed under n.
+  /// The slot of number n, and whether it contains what was placed under n.
   std::pair<T&, bool> find(std::uint32_t n) noexcept {
     return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
   }

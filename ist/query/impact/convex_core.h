@@ -68,7 +68,7 @@ PlaneBetween plane_between(const Sampler& shape, const ConvexPiece& triangle) no
   best.apart = -std::numeric_limits<double>::infinity();
   GjkDistance between;
   best.point = (triangle.corner[0] + triangle.corner[1] + triangle.corner[2]) / 3;
-  Eigen::Vector3d across = best.point;  // the core holds the origin
+  Eigen::Vector3d across = best.point;  // the core contains the origin
   for (int i = 0; i < kSteps; ++i) {
     const double length = across.norm();
     best.distance = std::max(0.0, length - radius);

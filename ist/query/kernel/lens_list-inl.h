@@ -101,7 +101,7 @@ HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at
   const V circle = ha * (two * a - ha);
   const V cap_j = hn::IfThenElse(ri > rj, small, large);
   const V pull = hn::CopySignToAbs(circle * inverse, signed_error);
-  // Within rounding of tangency the circle says nothing; b² holds it at any distance. Else it
+  // Within rounding of tangency the circle says nothing; b² bounds it at any distance. Else it
   // is concave between the tangencies, so within ± error it is at most doubled.
   const V error = hn::Abs(signed_error);
   const V near = hn::Abs(hn::Min(g, f));

@@ -54,7 +54,7 @@ HWY_INLINE void finish_placing(double size, const TurnedAxes<T>& axes, PlacedBlo
 template <class T>
 inline constexpr T kFar = sizeof(T) == sizeof(float) ? static_cast<T>(1e18) : static_cast<T>(1e150);
 
-/// Makes points far away of the lanes of the last block that hold no sphere.
+/// Makes points far away of the lanes of the last block that contain no sphere.
 template <class T>
 HWY_INLINE void put_away_unused(const SphereTree& tree, std::uint32_t block, Spheres<T>& spheres) {
   if (block + 1 < tree.level[0].count) return;

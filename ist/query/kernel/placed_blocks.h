@@ -17,7 +17,7 @@ struct alignas(64) Spheres {
   T x[kWidth], y[kWidth], z[kWidth], r[kWidth];
 };
 
-/// A leaf block of either tree in A's unit frame. Four numbers, since vectors hold so many.
+/// A leaf block of either tree in A's unit frame. Four numbers, since vectors have so many.
 template <class T>
 struct alignas(64) PlacedBlock {
   double origin[4];  ///< of the spheres' coordinates

@@ -139,7 +139,7 @@ struct PlainGrid {
   double spacing;
   double error;
 
-  /// `sound` becomes false where the grid holds what is no number.
+  /// `sound` becomes false where the grid contains what is no number.
   IST_HD PlainSample sample(const double (&x)[3], bool& sound) const {
     const PlainSample at = interpolated(x);
     if (std::fabs(at.distance) <= kLongestLength && dot(at.gradient, at.gradient) <= 1e300)

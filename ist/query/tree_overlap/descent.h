@@ -50,7 +50,7 @@ class Descent {
   bool open_level();
 
   /// Opens pairs [from, from + n) of the current list into the next. Nodes that a sphere of the
-  /// standing side holds are added up instead.
+  /// standing side contains are added up instead.
   void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
 
   /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.

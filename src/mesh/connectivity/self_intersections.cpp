@@ -147,7 +147,7 @@ class TriangleBoxes {
   /// One for each node up to the starting level if there are large fans or needles, else empty.
   std::vector<std::vector<Slab>> slabs_;
   std::vector<Slice> slices_;  ///< of level 0, with slabs
-  /// [level][node] Bit k: box k holds a triangle that is not marked. Or none at all.
+  /// [level][node] Bit k: box k contains a triangle that is not marked. Or none at all.
   std::vector<std::vector<std::uint8_t>> wanted_;
 };
 

@@ -82,7 +82,7 @@ IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
   return beyond ? facing : -facing;
 }
 
-/// The float interval that holds a double.
+/// The float interval that contains a double.
 struct FloatInterval {
   float lower, upper;
 
@@ -90,7 +90,7 @@ struct FloatInterval {
       : lower(rounded_down(value)), upper(rounded_up(value)) {}
 };
 
-/// A box that holds the ray from p, or a whole line; rounded outward.
+/// A box that contains the ray from p, or a whole line; rounded outward.
 struct RayBox {
   float lower[3], upper[3];
 

@@ -58,7 +58,7 @@ struct GrowingBox {
   }
 };
 
-/// A triangle or a cell of triangles that is being sorted into a leaf. The spare lanes hold two
+/// A triangle or a cell of triangles that is being sorted into a leaf. The spare lanes store two
 /// numbers below 2^30, as bits of floats between 1e-38 and 8: arithmetic with subnormal floats is
 /// slow, and with infinite ones it traps.
 struct Item {
@@ -397,7 +397,7 @@ class CellTree {
     });
   }
 
-  /// of_chunk_ holds the places where a chunk's items of a cell begin.
+  /// of_chunk_ contains the places where a chunk's items of a cell begin.
   void sort_into(std::span<Item> sorted) {
     tbb::parallel_for(std::size_t{0}, chunks_of(range_.items.size()), [&](std::size_t c) {
       for (const Item& item : chunk_of(range_.items, c))

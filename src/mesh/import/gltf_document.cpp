@@ -35,7 +35,7 @@ bool is_harmless(const std::string_view extension) {
   return starts_with_any(extension, kHarmless);
 }
 
-/// Where it is not required, a file holds the same numbers without it.
+/// Where it is not required, a file contains the same numbers without it.
 bool is_compression(const std::string_view extension) {
   constexpr std::array<std::string_view, 3> kCompressions{
       "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};

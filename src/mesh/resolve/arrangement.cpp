@@ -68,7 +68,7 @@ class PairOfTriangles {
     }
   }
 
-  /// Whether a closed triangle holds a vertex in its plane.
+  /// Whether a closed triangle contains a vertex in its plane.
   bool holds(const Triangle& t, const std::uint32_t p) const {
     if (p == t[0] || p == t[1] || p == t[2]) return true;
     int k = 0;
@@ -202,7 +202,7 @@ class ClusterWork {
     }
   }
 
-  /// Puts points on the segments that hold them and finds where segments cross.
+  /// Puts points on the segments that contain them and finds where segments cross.
   /// `crossings`: how many all clusters have so far.
   void meet(std::atomic<std::size_t>& crossings) {
     std::vector<Segment>& segments = cluster_.segments;

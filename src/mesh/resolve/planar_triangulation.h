@@ -9,8 +9,8 @@
 
 namespace ist {
 
-/// A triangulation of points of a plane, seen against a coordinate axis, that holds given segments.
-/// Exact, whatever lies on one line.
+/// A triangulation of points of a plane, seen against a coordinate axis, that contains given
+/// segments. Exact, whatever lies on one line.
 class PlanarTriangulation {
  public:
   /// `frame`: three points around all others. `inner`: the points, none twice.

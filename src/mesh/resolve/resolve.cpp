@@ -310,7 +310,7 @@ class Resolver {
     return made;
   }
 
-  /// Closes the surface and holds its volume against what the mesh counts.
+  /// Closes the surface and compares its volume with what the mesh counts.
   ClosedMesh close(TriangleMesh surface, Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))

@@ -30,10 +30,10 @@ IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5]
 }
 
 /// maximise_clearance() by a team of at least 32 lanes, the same arithmetic: a row a lane, in
-/// registers, and lane 4 i + k of every 16 holds element (i, k) of the basis' inverse and what
+/// registers, and lane 4 i + k of every 16 has element (i, k) of the basis' inverse and what
 /// belongs to slot k (SimplexBasis). All lanes know the vertex z. Rows are named by numbers:
-/// constraints from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes hold
-/// the sides.
+/// constraints from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes
+/// have the sides.
 template <class Team>
 IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMemory* sample,
                                                int count, float a, float h2) {
@@ -214,9 +214,9 @@ struct SimplexBasis {
 /// A linear program in (t, y): max t, t − gradient_i·y ≤ b_i, ±y_k ≤ a. Dual simplex from the
 /// constraint that alone is tightest; every basis in between is dual feasible, so stopping early
 /// still gives a bound. The value is formed at the end from the multipliers by weak duality,
-/// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the pivots
-/// can only loosen it. Ties go to the smallest tag, so the result is a function of the set of
-/// constraints. `sample`: its constraints.
+/// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the
+/// pivots can only loosen it. Ties go to the smallest tag, so the result is a function of the set
+/// of constraints. `sample`: its constraints.
 template <class Team>
 IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory* sample, int count,
                                            float a, float h2) {

@@ -10,9 +10,9 @@ namespace ist::packing {
 
 /// Spheres by place: cubes of the unit frame, and what each of them lists. A sphere is listed where
 /// its surface is within `reach`, so what is no further than `reach` from a point stands in the one
-/// cell that holds the point. Cells come in blocks of 8³. A cell wholly inside a sphere lists that
-/// sphere alone (there is at most one: spheres do not overlap). What a cell lists is a set and a
-/// function of layout and spheres.
+/// cell that contains the point. Cells come in blocks of 8³. A cell wholly inside a sphere lists
+/// that sphere alone (there is at most one: spheres do not overlap). What a cell lists is a set and
+/// a function of layout and spheres.
 struct SphereGridLayout {
   float reach = 2;     ///< > 0, unit frame
   float size = 0.25f;  ///< edge of a cell

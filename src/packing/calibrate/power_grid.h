@@ -91,7 +91,7 @@ constexpr std::uint32_t kPowerLeafSites = 8;  ///< few enough to walk columns am
 constexpr int kFlagLevel = 2;                 ///< finest level whose cells know if they are empty
 constexpr int kMostPowerLevels = 24;
 
-/// Plain arrays of a solid's columns and of an octree over them. A cell of level l holds 2^l
+/// Plain arrays of a solid's columns and of an octree over them. A cell of level l contains 2^l
 /// columns along y, as many rows and as many steps along x; cells beyond the columns are empty.
 struct PowerGrid {
   LineLattice columns;

@@ -9,7 +9,7 @@ namespace ist::packing {
 
 /// Nothing is decided closer than this to a cell's border, unit frame: it covers the rounding of
 /// float coordinates and of float distances (float_distance_error), so that what is listed and
-/// what is searched always holds what counts.
+/// what is searched always covers what counts.
 constexpr float kListMargin = 2e-6f;
 constexpr float kSearchMargin = 8e-6f;
 

@@ -6,9 +6,10 @@
 #include "packing/grids/cell_listing.h"
 
 // The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete
-// distance says that the Manhattan ball of that radius around it holds no primitive, and how far a
-// row of cells may be skipped. The answer is the minimum of one float formula over all primitives,
-// the smallest tag among equals; it depends neither on the grid nor on the order of the search.
+// distance says that the Manhattan ball of that radius around it contains no primitive, and how far
+// a row of cells may be skipped. The answer is the minimum of one float formula over all
+// primitives, the smallest tag among equals; it depends neither on the grid nor on the order of the
+// search.
 
 namespace ist::packing {
 
