@@ -13,7 +13,9 @@ include(cmake/ist_openvdb.cmake)
 
 add_subdirectory(src)
 add_subdirectory(ist/bake)
-add_subdirectory(ist/robots)
+if(PROJECT_IS_TOP_LEVEL OR IST_ROBOTS)
+  add_subdirectory(ist/robots)
+endif()
 
 get_property(objects GLOBAL PROPERTY IST_ROOM_OBJECTS)
 ist_add_library(ist ist ${objects})

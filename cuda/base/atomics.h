@@ -10,43 +10,24 @@
 namespace ist::gpu {
 
 IST_HD inline std::uint32_t atomic_add(std::uint32_t* at, std::uint32_t value) {
-#ifdef __CUDA_ARCH__
-  return atomicAdd(at, value);
-#else
-  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
-#endif
+  return IST_GPU_OR_HOST(atomicAdd(at, value), __atomic_fetch_add(at, value, __ATOMIC_RELAXED));
 }
 
 IST_HD inline std::uint64_t atomic_add(std::uint64_t* at, std::uint64_t value) {
-#ifdef __CUDA_ARCH__
-  return atomicAdd(reinterpret_cast<unsigned long long*>(at), value);
-#else
-  return __atomic_fetch_add(at, value, __ATOMIC_RELAXED);
-#endif
+  return IST_GPU_OR_HOST(atomicAdd(reinterpret_cast<unsigned long long*>(at), value),
+                         __atomic_fetch_add(at, value, __ATOMIC_RELAXED));
 }
 
 IST_HD inline std::uint32_t atomic_or(std::uint32_t* at, std::uint32_t bits) {
-#ifdef __CUDA_ARCH__
-  return atomicOr(at, bits);
-#else
-  return __atomic_fetch_or(at, bits, __ATOMIC_ACQ_REL);
-#endif
+  return IST_GPU_OR_HOST(atomicOr(at, bits), __atomic_fetch_or(at, bits, __ATOMIC_ACQ_REL));
 }
 
 IST_HD inline std::uint32_t atomic_and(std::uint32_t* at, std::uint32_t bits) {
-#ifdef __CUDA_ARCH__
-  return atomicAnd(at, bits);
-#else
-  return __atomic_fetch_and(at, bits, __ATOMIC_RELAXED);
-#endif
+  return IST_GPU_OR_HOST(atomicAnd(at, bits), __atomic_fetch_and(at, bits, __ATOMIC_RELAXED));
 }
 
 IST_HD inline std::uint32_t atomic_exchange(std::uint32_t* at, std::uint32_t value) {
-#ifdef __CUDA_ARCH__
-  return atomicExch(at, value);
-#else
-  return __atomic_exchange_n(at, value, __ATOMIC_RELEASE);
-#endif
+  return IST_GPU_OR_HOST(atomicExch(at, value), __atomic_exchange_n(at, value, __ATOMIC_RELEASE));
 }
 
 /// Adds the first lane's `count` to what a team's lanes share with others; the value before.
@@ -102,19 +83,9 @@ struct alignas(16) Words4 {
 
 /// A load that does not look into the multiprocessor's own cache.
 IST_HD inline std::uint32_t load_fresh(const std::uint32_t* at) {
-#ifdef __CUDA_ARCH__
-  return __ldcg(at);
-#else
-  return *at;
-#endif
+  return IST_GPU_OR_HOST(__ldcg(at), *at);
 }
-IST_HD inline float load_fresh(const float* at) {
-#ifdef __CUDA_ARCH__
-  return __ldcg(at);
-#else
-  return *at;
-#endif
-}
+IST_HD inline float load_fresh(const float* at) { return IST_GPU_OR_HOST(__ldcg(at), *at); }
 IST_HD inline Words4 load_fresh(const Words4* at) {
 #ifdef __CUDA_ARCH__
   const uint4 words = __ldcg(reinterpret_cast<const uint4*>(at));
@@ -126,11 +97,8 @@ IST_HD inline Words4 load_fresh(const Words4* at) {
 
 /// A value that others may be changing.
 IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
-#ifdef __CUDA_ARCH__
-  return *static_cast<const volatile std::uint32_t*>(at);
-#else
-  return __atomic_load_n(at, __ATOMIC_ACQUIRE);
-#endif
+  return IST_GPU_OR_HOST(*static_cast<const volatile std::uint32_t*>(at),
+                         __atomic_load_n(at, __ATOMIC_ACQUIRE));
 }
 
 }  // namespace ist::gpu

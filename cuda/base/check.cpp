@@ -30,7 +30,7 @@ const char* way_out(cudaError_t status) {
 
 void check(cudaError_t status, const char* doing) {
   if (status == cudaSuccess) return;
-  cudaGetLastError();  // an error that is not sticky must not be met again by the next call
+  cudaGetLastError();  // clears the error if it is not sticky, or the next call would report it
   throw Error(std::string("GPU: ") + doing + ": " + cudaGetErrorString(status) + " (" +
               cudaGetErrorName(status) + "): " + way_out(status));
 }

@@ -4,7 +4,7 @@
 
 namespace ist::gpu {
 
-/// Throws Error unless `status` is success: what was being done, what CUDA says, and the way out.
+/// Throws Error unless `status` is success: the action, CUDA's message, and advice.
 void check(cudaError_t status, const char* doing);
 
 /// Throws Error, with the remedy, if gpu_available(device) is false.

@@ -81,7 +81,7 @@ class DeviceArray {
     return host;
   }
 
-  /// Makes room for `size` elements and keeps the first `kept` ones.
+  /// Reserves `size` elements and keeps the first `kept` ones.
   void grow(std::size_t size, std::size_t kept) {
     if (size <= size_) return;
     DeviceArray larger(*queue_, size);

@@ -14,7 +14,7 @@ constexpr int kOldest = 75;  // compute capability; CUDA 13 has none older
 
 __global__ void any_kernel() {}  // all are compiled for the same architectures
 
-/// Success if this build holds code for the device. Makes the device's context.
+/// Success if this build has code for the device. Makes the device's context.
 cudaError_t find_code_for(int device) {
   int previous = 0;
   cudaError_t status = cudaGetDevice(&previous);
@@ -73,7 +73,7 @@ std::string obstacle(int device) {
 
 bool gpu_available(int device, std::string* why) {
   const std::string found = obstacle(device);
-  cudaGetLastError();  // an error that is not sticky must not be met again by the next call
+  cudaGetLastError();  // clears the error if it is not sticky, or the next call would report it
   if (!found.empty() && why != nullptr) *why = found;
   return found.empty();
 }

@@ -33,7 +33,7 @@ struct WarpTeam {
   __device__ float min(float value) const { return from_ordered_bits(min(ordered_bits(value))); }
   __device__ float max(float value) const { return from_ordered_bits(max(ordered_bits(value))); }
   __device__ std::uint64_t min(std::uint64_t value) const {
-    // The high words first; the low words of those that hold the least.
+    // The high words first; the low words of the lanes with the least.
     const auto high = static_cast<std::uint32_t>(value >> 32);
     const auto low = static_cast<std::uint32_t>(value);
     const std::uint32_t least = min(high);

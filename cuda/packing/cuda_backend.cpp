@@ -6,12 +6,10 @@
 #include "cuda/base/queue.h"
 #include "cuda/packing/banded/banded_pack.h"
 #include "cuda/packing/calibrate/on_gpu.h"
-#include "cuda/packing/grids/device_rounds.h"
 #include "cuda/packing/grids/pack_grids.h"
 #include "cuda/packing/mesh/device_mesh.h"
 #include "mesh/mesh_solid.h"
 #include "packing/base/packing_settings.h"
-#include "packing/grids/medial_grids.h"
 
 namespace ist::gpu {
 namespace {
@@ -41,7 +39,7 @@ class CudaBackend final : public SolidBackend {
   }
 
   std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
-    return packing::medial_nodes_by(DeviceRounds(queue_, solid_.arrays()), solid_, settings);
+    return gpu::medial_nodes(queue_, solid_, settings);
   }
 
   RelaxedSites relax_sites(const RelaxTask& task,
@@ -62,7 +60,7 @@ class CudaBackend final : public SolidBackend {
     return std::make_unique<CudaBackend>(other, settings_, is_second_);
   }
 
-  /// Of a caller's stream and memory there is one, for one thread.
+  /// A caller's stream and memory serve one thread only.
   std::function<std::unique_ptr<SolidBackend>()> beside() override {
     if (settings_.stream != nullptr || settings_.memory != nullptr) return {};
     tree();

@@ -6,9 +6,9 @@
 
 namespace ist::gpu {
 
-/// The seam's CUDA implementation: the mesh in the memory of a GPU, and the queue that everything
-/// about it runs on. Keeps a reference to the solid. Throws Error if the GPU cannot be used (always
-/// in a build without CUDA), with the way out. Needs no CUDA header.
+/// The seam's CUDA implementation: the mesh in the memory of a GPU, and the queue on which its work
+/// runs. Keeps a reference to the solid. Throws Error with advice if the GPU cannot be used (always
+/// in a build without CUDA). Needs no CUDA header.
 std::unique_ptr<SolidBackend> make_cuda_backend(const MeshSolid& solid,
                                                 const GpuSettings& settings);
 

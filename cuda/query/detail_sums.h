@@ -11,7 +11,7 @@
 #include "query/lod/level_chain.h"
 
 // Pairs of trees that are asked at several levels of detail: under a pair budget, and copies of one
-// asset that all but coincide. blend_details() (query/lod/level_blend.h) by one team, in
+// asset that all but coincide. blend_levels() (query/lod/level_blend.h) by one team, in
 // double, of sums in A's unit frame.
 
 namespace ist::gpu {
@@ -116,8 +116,8 @@ class QuickLooker {
 
 struct DetailMemory {
   PairMemory pair;
-  DetailChain chain;
-  DetailWeight share[DetailChain::kMost];  ///< of the pairs of levels, by the coarse sum
+  LevelChain chain;
+  LevelWeight share[LevelChain::kMost];  ///< of the pairs of levels, by the coarse sum
   FilledMemory filled;
   LensTotals coarse, part, result;
   std::uint32_t spheres, visits;  ///< of all that was asked
@@ -148,7 +148,7 @@ class DetailSums {
     team_.sync();
     const std::size_t size = budget > 0 ? m_.chain.size() : 1;
     QuickLooker<Team> looker(team_, a_, b_, m_.pair.place.a_from_b, m_.filled);
-    DetailWeight sure = {1, 0};
+    LevelWeight sure = {1, 0};
     if (size > 1) sure = m_.chain.quick_weight(looker.look(false).volume, budget);
     const bool blends = sure.weight < 1;
     if (!blends && coincidence(m_.chain[0]).weight == 0) return false;
@@ -162,8 +162,8 @@ class DetailSums {
     IST_ROLLED
     for (std::size_t i = blends ? size + 1 : 1; i-- > 0;) {
       const bool estimates = i == size;
-      const DetailPair& levels = m_.chain[estimates ? size - 1 : i];
-      const DetailWeight share = blends && !estimates ? m_.share[i] : DetailWeight{1, 0};
+      const LevelPair& levels = m_.chain[estimates ? size - 1 : i];
+      const LevelWeight share = blends && !estimates ? m_.share[i] : LevelWeight{1, 0};
       const double alone = i == 0 ? 1 : 0;
       const double weight = sure.weight * alone + (1 - sure.weight) * share.weight;
       if (weight == 0 && share.slope == 0) continue;
@@ -176,9 +176,9 @@ class DetailSums {
           m_.chain.share(
               volume_of(m_.coarse), budget,
               [](std::size_t k) {
-                return DetailWeight{k == 0 ? 1.0 : 0.0, 0};
+                return LevelWeight{k == 0 ? 1.0 : 0.0, 0};
               },
-              [&](std::size_t k, const DetailWeight& found) { m_.share[k] = found; });
+              [&](std::size_t k, const LevelWeight& found) { m_.share[k] = found; });
         }
       } else {
         slope += (1 - sure.weight) * share.slope * volume_of(part);
@@ -213,7 +213,7 @@ class DetailSums {
     }
   }
 
-  IST_HD CoincidenceWeight coincidence(const DetailPair& levels) const {
+  IST_HD CoincidenceWeight coincidence(const LevelPair& levels) const {
     const DetailRef& tree = a_.level[levels.a];
     const bool alike = a_.first_alike == b_.first_alike && a_.coarser > 0 && levels.a == levels.b;
     return coincidence_weight(tree.tree.root, alike ? tree.level.mean_radius : 0,
@@ -222,7 +222,7 @@ class DetailSums {
 
   /// The sum of two levels, or of unlike ones where copies all but coincide and it is no estimate:
   /// to m_.part.
-  IST_HD void ask(const DetailPair& levels, bool estimates) {
+  IST_HD void ask(const LevelPair& levels, bool estimates) {
     const CoincidenceWeight same = estimates ? CoincidenceWeight() : coincidence(levels);
     const std::uint32_t a = levels.a, b = levels.b, other = a < a_.coarser ? a + 1 : a - 1;
     if (team_.lane() == 0) m_.part.clear();

@@ -4,11 +4,11 @@
 
 #include "base/bits.h"
 #include "base/host_device.h"
-#include "cuda/query/disc_part.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/met_balls.h"
 #include "cuda/query/part_sums.h"
 #include "query/asset/shared_constants.h"
+#include "query/ball_triangle/disc.h"
 
 // Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
 // add_patch() and total_of() (query/ball_triangle/patch_sums.h, query/shape/probe_sum.h) have them.

@@ -199,7 +199,7 @@ std::string cache_folder(const LibraryOptions& options) {
   return from_environment != nullptr ? from_environment : "";
 }
 
-/// What a run would bake.
+/// Prints the jobs of a dry run.
 void print_jobs(const std::vector<Job>& jobs, bool json) {
   if (json) {
     auto assets = nlohmann::ordered_json::array();

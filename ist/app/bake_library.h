@@ -12,7 +12,7 @@
 
 namespace ist::app {
 
-/// What `ist bake` takes for a manifest alone.
+/// Options of `ist bake` that only a manifest uses.
 struct LibraryOptions {
   std::string manifest, cache, shard;
   unsigned jobs = 0;
@@ -35,7 +35,7 @@ struct LibraryRun {
 /// manifest has mistakes, 130 after Ctrl-C.
 void run_library(const LibraryRun& run);
 
-/// What is wrong with an asset that was baked: a missed target, coarse spheres, overlapping parts.
+/// Warnings about a baked asset: a missed target, coarse spheres, overlapping parts.
 std::vector<std::string> warnings_of(const AssetView& tree);
 
 /// On stdout, as JSON or as a table for a person; nothing where a person wants quiet.

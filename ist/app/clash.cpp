@@ -157,7 +157,7 @@ void clash(const ClashOptions& options) {
   fmt::print("{}", options.json  ? json_text(clashes_json(report)) + "\n"
                    : options.csv ? clashes_csv(report)
                                  : clashes_text(report));
-  if (options.csv)  // the other forms hold them
+  if (options.csv)  // the other forms have them
     for (const auto& [part, what] : report.faults)
       fmt::print(stderr, "not answered: {}: {}\n", part, what);
   if (report.new_clashes() > 0) throw ExitCode{kExitViolation};

@@ -44,7 +44,7 @@ std::string tree_glb(const AssetView& view, Measure measure, std::uint32_t detai
   const TreeHeader& tree =
       measure == Measure::inner ? header.inner_tree : matched_tree(header, detail);
   const double scale = std::ldexp(1.0, header.exponent);
-  constexpr int kMostExponent = 100;  // of what floats can hold, and viewers square
+  constexpr int kMostExponent = 100;  // of the floats that viewers square
   if (std::abs(header.exponent) > kMostExponent)
     throw Error(name + ": its size of about 2^" + std::to_string(header.exponent) +
                 " u is out of range for a .glb (2^-100 to 2^100); export .csv, .ply or .json");

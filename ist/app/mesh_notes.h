@@ -22,7 +22,7 @@ class LinkMeshes {
   LinkMeshes(std::string robot, MeshSettings settings, std::vector<std::string> repaired)
       : robot_(std::move(robot)), settings_(settings), repaired_(std::move(repaired)) {}
 
-  /// What stands for a mesh that cannot be closed, and why it cannot; nothing: that is a fault.
+  /// Returns a substitute for a mesh that cannot be closed, given the reason; nothing: an error.
   using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
 
   /// The mesh of these links that `make` returns, closed; by repair or by a wrap, whichever has the
@@ -70,7 +70,7 @@ std::string describe_closing(const MeshReport& report);
 /// The same with all that stands behind it; nulls for a mesh that was closed.
 nlohmann::ordered_json closing_json(const MeshReport& report);
 
-/// What a file declares about its axes and unit and what came of it; "" if it declares nothing.
+/// Describes the axes and unit that a file declares and how they were used; "" if it declares none.
 std::string describe_declared(const DeclaredFrame& declared);
 
 /// The same; null is what it does not declare.

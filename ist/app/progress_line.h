@@ -25,9 +25,9 @@ class ProgressLine {
   WholeProgress whole_;
 };
 
-/// What `work` makes of a ProgressCallback that shows the line and ends the work at Ctrl-C.
+/// Returns work(callback) with a ProgressCallback that shows the line and stops at Ctrl-C.
 /// `patience` [s]: see InterruptGuard; `quiet`, `rounds`: see ProgressLine. Throws ExitCode 130
-/// after Ctrl-C, whatever came of the work.
+/// after Ctrl-C, whatever the result of the work.
 template <class Work>
 auto interruptibly(double patience, bool quiet, bool rounds, const Work& work) {
   const InterruptGuard guard(patience);

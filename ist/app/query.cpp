@@ -32,7 +32,7 @@ struct QueryOptions {
   bool json = false, csv = false;
 };
 
-/// What CLI11 asks of a validator: "" or what is wrong.
+/// A validator for CLI11: "" or the fault.
 std::string is_pose(const std::string& text) {
   try {
     parse_pose(text);
@@ -52,7 +52,7 @@ std::string field_fault(const std::string& text) {
   }
 }
 
-/// "", or the way out where B is described as a field.
+/// "", or advice if B is described as a shape.
 std::string not_an_asset(const std::string& text) {
   if (!is_field_spec(text)) return "";
   return fmt::format(

@@ -43,7 +43,7 @@ struct Answer {
 
   /// Surfaces alone have no spheres to be apart.
   bool has_distance() const { return result.separation.status != QueryStatus::missing_data; }
-  /// Of the halves that there are the one that says most.
+  /// The more severe status of the parts that were queried.
   QueryStatus status() const {
     const QueryStatus overlap = result.penetration.status, gap = result.separation.status;
     if (!has_distance()) return overlap;

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-// What the command line says of itself, for other places that say it: man pages and the completion
-// of shells. All of it comes from the commands' own options and help.
+// Man pages and shell completions, made from the commands' own options and help.
 
 namespace ist::app {
 

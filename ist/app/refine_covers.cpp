@@ -21,11 +21,11 @@ constexpr double kGivenUp[] = {0.05, 0.03};  ///< share of the free poses, by ro
 constexpr double kHopeless = 0.3;   ///< share that is given up where it takes too many spheres
 constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
 constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
-constexpr int kBisections = 3;      ///< of the room in a direction
+constexpr int kBisections = 3;      ///< of the free distance in a direction
 constexpr std::size_t kPosesOfAPair = 160;  ///< that are looked at, about
-constexpr std::size_t kTold = 3;            ///< pairs that are in the way
+constexpr std::size_t kTold = 3;            ///< pairs that are named as obstacles
 
-/// Positions in which spheres of two links met falsely, and how far apart the links are there.
+/// Positions in which spheres of two links overlap falsely, and how far apart the links are there.
 class Meetings {
  public:
   Meetings(const LinkSolids& solids) : solids_(solids) {}
@@ -117,7 +117,7 @@ struct LinkRoom {
   std::vector<Near> near = {};
 };
 
-/// What is known of a link.
+/// The state of a link.
 struct Refined {
   const ClosedMesh* mesh;  ///< null: its spheres stay as they are
   std::size_t own;         ///< spheres that cover the mesh
@@ -188,7 +188,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
       return rooms[i](solids, place, outward);
     };
   };
-  /// Spheres of each link for these rooms; 0 for those that stay as they are.
+  /// Sphere counts of the links for these distances; 0 for links that stay unchanged.
   const auto needed = [&](std::size_t enough) {
     std::vector<std::size_t> counts(links.size());
     tbb::parallel_for(std::size_t{0}, links.size(), [&](std::size_t i) {
@@ -242,7 +242,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
   std::tie(robot.links, robot.self) = std::move(best);
   if (robot.self.false_share() <= kEnough) return;
 
-  // What is in the way, where no more than a tenth is given up.
+  // Pairs that remain in collision even if no more than a tenth is given up.
   std::vector<Meetings::Meeting> left = meetings.without(given_up(kEnough));
   std::vector<const LinkPair*> worst;
   for (const LinkPair& pair : robot.self.pairs)

@@ -12,8 +12,8 @@
 
 namespace ist::app {
 
-/// Adds to a link's cover the spheres of its description, and, of a link that was repaired, what
-/// holds the mesh as it was read (`read`).
+/// Adds to a link's cover the spheres of its description and, for a repaired link, spheres that
+/// contain the mesh as it was read (`read`).
 void complete_cover(SphereLink& link, bool read);
 
 /// Covers links again whose spheres overlap others' though the solids do not: with as many spheres

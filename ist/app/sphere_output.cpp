@@ -22,7 +22,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// Of a link's file: beside capsules those of the description alone.
+/// The spheres for a link's file; beside capsules, only those of the description.
 const std::vector<CoverSphere>& spheres_of(const SphereLink& link) {
   return link.capsules.empty() ? link.cover.spheres : link.given;
 }
@@ -146,7 +146,7 @@ std::string robot_yaml(const SphereRobot& robot) {
   return curobo_robot(robot.robot, urdf.generic_string(), robot.spheres(), robot.self);
 }
 
-/// What planners are told of pairs of links, and how right they will be.
+/// Describes the pairs that planners are to ignore, and how accurate that is.
 std::string self_collision_text(const SphereRobot& robot) {
   const SelfCollision& self = robot.self;
   std::map<std::string, std::size_t> ignored;

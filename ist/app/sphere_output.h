@@ -31,7 +31,7 @@ struct ClosePair {
   std::size_t spheres;  ///< of both that this takes, about
 };
 
-/// What `ist spheres` reads and makes.
+/// Input and result of `ist spheres`.
 struct SphereRobot {
   std::string name, input, output;  ///< of the robot or the mesh; paths
   std::vector<SphereLink> links;    ///< those with shapes
@@ -47,7 +47,7 @@ struct SphereRobot {
                        [](const auto& link) { return !link.capsules.empty(); });
   }
   bool is_robot() const { return !robot.file.bytes.empty(); }
-  std::vector<LinkSpheres> spheres() const;  ///< as files hold them
+  std::vector<LinkSpheres> spheres() const;  ///< as in files
   std::vector<LinkSpheres> covers() const;   ///< the same, with spheres that contain capsules
 };
 

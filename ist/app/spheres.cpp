@@ -132,7 +132,7 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
       geometry();
       continue;
     }
-    // What cannot be closed is enclosed, if that is asked for.
+    // If asked to, encloses a mesh that cannot be closed.
     const auto otherwise = [&](const std::string& why) -> std::optional<ClosedMesh> {
       if (!meshes.repairs({link.name})) return std::nullopt;
       spdlog::warn("{}; a bounding capsule stands for link {}", why, link.name);

@@ -29,8 +29,8 @@
 namespace ist::app {
 namespace {
 
-/// What is said last of an asset: why it failed, else with what confidence its mesh was closed if
-/// it was not, the first warning and how many follow.
+/// The remark on an asset: why it failed; else the confidence with which its mesh was closed, if it
+/// was open, the first warning and the number of others.
 std::string remark_on(const JobResult& result) {
   if (!result.message.empty()) return result.message;
   if (result.warnings.empty()) return "";
@@ -187,7 +187,7 @@ document.querySelector('input').oninput = event => rows.forEach(row => {
 });
 </script>)";
 
-/// Of page `page` of `pages`, in a folder with the others.
+/// Links to the other pages, for page `page`.
 std::string links_of_pages(const std::vector<std::string>& files, std::size_t page) {
   std::string out;
   for (std::size_t i = 0; i < files.size() && files.size() > 1; ++i) {

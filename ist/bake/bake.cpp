@@ -15,11 +15,11 @@
 
 #include <ist/types.h>
 
-#include "base/aside.h"
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/tree_builder.h"
+#include "base/aside.h"
 #include "base/stage.h"
 #include "base/thread_arena.h"
 #include "packing/base/packing_settings.h"
@@ -69,8 +69,8 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// What a bake does: the caller, by the backend, the first three in turn; the host's threads the
-/// others.
+/// The steps of a bake. The caller runs the first three in turn on the backend, the host's threads
+/// run the others.
 enum class Step { pack, calibrate, cover, order, bounds, finest_tree, inner_tree };
 
 /// Runs a table of stages on the host's threads. Each starts when all that it waits for is done:
@@ -88,8 +88,8 @@ class HostStages {
     for (std::size_t i = 0; i < table_.size(); ++i)
       left_[i] = static_cast<int>(table_[i].waits_for.size());
   }
-  /// Waits, whichever way the scope is left: a group that is left alone would be cancelled, and
-  /// with it, unseen, the loops inside its tasks.
+  /// Waits on every exit from the scope: a task group that is not waited for would be cancelled,
+  /// and with it, silently, the loops inside its tasks.
   ~HostStages() {
     try {
       group_.wait();

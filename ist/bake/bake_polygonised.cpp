@@ -55,8 +55,9 @@ void require_lipschitz(const Solid& solid) {
       q[k] = p[k] + reach * (2 * random_at(at + 3) - 1);
     }
     const double a = solid.signed_distance(p), b = solid.signed_distance(q);
-    const Eigen::Vector3d way = q - p;
-    const double apart = std::sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2]);
+    const Eigen::Vector3d between = q - p;
+    const double apart =
+        std::sqrt(between[0] * between[0] + between[1] * between[1] + between[2] * between[2]);
     Finding& found = findings[i];
     found.place = p;
     found.not_finite = !std::isfinite(a) || !std::isfinite(b);
@@ -194,7 +195,7 @@ Asset bake(const Solid& solid, const PackingSettings& settings, const ProgressCa
   packing::check_settings(settings);
   return thread_arena(settings.threads).execute([&] {
     if (solid.mesh() == nullptr) return bake_field(solid, settings, meshing, progress);
-    ClosedMesh described;  // the solid holds its geometry, which make_solid() has resolved
+    ClosedMesh described;  // the solid has its geometry, which make_solid() has resolved
     described.name = meshing.name;
     return bake_solid(described, *solid.mesh(), Resolution(), settings, progress);
   });

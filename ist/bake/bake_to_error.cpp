@@ -254,13 +254,14 @@ class TargetBake {
     }
   }
 
-  /// Of two that do the one of fewer spheres, else the one that errs less.
+  /// If both meet the target, the one of fewer spheres is better, else the one with the smaller
+  /// error.
   bool is_better(const Candidate& candidate, const Candidate& than) const {
     if (does(candidate) && does(than)) return candidate.spheres() < than.spheres();
     return candidate.error() < than.error();
   }
 
-  /// Bakes until the count is found, a limit is met, or the time is over. Starts from the best.
+  /// Bakes until the count is found, a limit is reached, or the time is over. Starts from the best.
   void search() {
     CountSearch counts(target_.relative_error, most_);
     if (!judge(*best_)) return;
@@ -268,7 +269,7 @@ class TargetBake {
     std::size_t spheres = best_->spheres();
     StopReason stop = best_->packing_stop();
     for (;;) {
-      // A limit other than the count leaves no room for more.
+      // After a limit other than the count no more spheres fit.
       if (stop != StopReason::sphere_count && error > target_.relative_error) return;
       const std::optional<std::size_t> next = counts.next(spheres, error);
       std::optional<Asset> asset = next ? baked(*next) : std::nullopt;
@@ -324,7 +325,7 @@ class TargetBake {
   std::optional<std::size_t> first_of_classes_;  ///< among them, once they are there
   std::vector<OtherTrial> others_;
   std::optional<Candidate> best_;
-  std::optional<Asset> own_mesh_;  ///< where the candidates hold another or none
+  std::optional<Asset> own_mesh_;  ///< if the candidates' best is another or none
   Workspace workspace_;
 };
 

@@ -18,7 +18,7 @@ class CountSearch {
   /// Where to begin.
   static std::size_t first(std::size_t most);
 
-  /// What a bake of `count` spheres erred. The next count, or none: the search is over.
+  /// Takes the error of a bake of `count` spheres. Returns the next count, or nothing at the end.
   std::optional<std::size_t> next(std::size_t count, double error);
 
  private:

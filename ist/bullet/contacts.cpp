@@ -91,7 +91,7 @@ struct PairAlgorithm::State {
   std::optional<Places> before;  // where the shapes were in the last step
   Points points;
   btTransform second_in_first;  // when last asked
-  double still = -1;            // [u] until a point has moved by more than this that answer holds
+  double still = -1;            // [u] the answer is valid until a point has moved by more than this
   bool apart = true;            // it has no points
   ContactMemory memory;
   ContactForce pushed;

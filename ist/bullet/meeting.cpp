@@ -18,7 +18,7 @@ namespace ist::bullet {
 
 namespace {
 
-/// Of the thread: a query's scratch memory.
+/// The scratch memory of the thread's queries.
 Workspace& workspace() {
   thread_local Workspace memory;
   return memory;
@@ -43,7 +43,7 @@ Body body_of(const btCollisionObject& object) {
 /// How far apart flat faces of meshes may be and push, of the smaller solid's size.
 constexpr double kReach = 0.02;
 
-/// Of two assets whose meshes do not overlap: a push where they touch or are nearest, for
+/// For two assets whose meshes do not overlap: a push where they touch or are nearest, for
 /// SupportPolygon.
 std::optional<Penetration> push_across(const Penetration& apart, const Separation& gap,
                                        double reach, const Eigen::Vector3d& origin_b) {
@@ -241,19 +241,19 @@ bool Meeting::find_way_out(const Solids& solids, const Places& at, Contact& cont
     }
     const SurfacePoint near = closest_point(solids[1 - inner], centre);
     if (shape == nullptr && !(near.distance <= -radius)) continue;
-    ContactPatch& way = contact.patches[0] = {};
-    way.id = ~std::uint64_t{0};
-    way.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
-    way.depth = radius - near.distance;
+    ContactPatch& exit_patch = contact.patches[0] = {};
+    exit_patch.id = ~std::uint64_t{0};
+    exit_patch.normal = inner == 1 ? near.gradient : Eigen::Vector3d(-near.gradient);
+    exit_patch.depth = radius - near.distance;
     if (near.status != QueryStatus::ok) {  // it keeps no mesh
       const Eigen::Vector3d between = to_eigen(at[1].getOrigin() - at[0].getOrigin());
-      way.normal =
+      exit_patch.normal =
           between.norm() > 0 ? Eigen::Vector3d(between.normalized()) : Eigen::Vector3d::UnitZ();
-      way.depth = first_->reach() + second_->reach() - between.norm();
+      exit_patch.depth = first_->reach() + second_->reach() - between.norm();
     }
-    way.centroid = way.point = centre;
-    way.area = std::pow(volume(), 2.0 / 3);
-    way.volume = overlap;
+    exit_patch.centroid = exit_patch.point = centre;
+    exit_patch.area = std::pow(volume(), 2.0 / 3);
+    exit_patch.volume = overlap;
     contact.count = 1;
     return true;
   }

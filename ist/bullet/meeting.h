@@ -30,9 +30,9 @@ class Meeting {
   void find(const btTransform& first, const btTransform& second, const Settings& settings,
             Contact& contact, bool likely_apart = false) const;
 
-  /// The share [0, 1] of a motion of two bodies after which their shapes have met, or in contact
-  /// have got too deep: see Contacts::updateAction(). `in_body`: the shapes, as children of these.
-  /// 1 where no point moves by more than `threshold` [u] against the other body.
+  /// The share [0, 1] of a motion of two bodies at which their shapes collide, or get too deep in a
+  /// contact: see Contacts::updateAction(). `in_body`: the shapes, as children of these. 1 if no
+  /// point moves by more than `threshold` [u] against the other body.
   double share_until_impact(const Places& from, const Places& to, const Places& in_body,
                             double threshold, const Settings& settings) const;
 
@@ -46,7 +46,7 @@ class Meeting {
  private:
   using Solids = std::array<PlacedSolid, 2>;
   double thickness_of(const Settings& settings) const;  ///< [u] Settings::thickness, or its default
-  /// Of overlapping solids: whether one is wholly inside the other, and then the way out.
+  /// For overlapping solids: whether one is wholly inside the other, and then the shortest way out.
   bool find_way_out(const Solids& solids, const Places& at, Contact& contact) const;
   /// At the beginning of a motion.
   Solids placed(const Places& from, const Places& to, const Settings& settings) const;
@@ -71,7 +71,7 @@ struct Unsaid {
   btVector3 at(const btVector3& point) const { return velocity + turning.cross(point - origin); }
 };
 
-/// What holds two bodies apart.
+/// The spring that pushes two bodies apart.
 struct Spring {
   double stiffness = 0;   ///< [force/u³] pressure over depth
   double relaxation = 0;  ///< [s] damper over spring

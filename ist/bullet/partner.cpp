@@ -147,7 +147,7 @@ HullDistance::HullDistance(const std::vector<btVector3>& points) {
 ShapeSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
   ShapeSample inside{-std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
   double nearest = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  Eigen::Vector3d outward = Eigen::Vector3d::Zero();
   for (const Face& face : faces_) {
     const double out = face.normal.dot(x) - face.offset;
     if (out > inside.distance) inside = {out, face.normal};
@@ -160,12 +160,12 @@ ShapeSample HullDistance::at(const Eigen::Vector3d& x) const noexcept {
       if ((b - a).cross(face.normal).dot(x - a) <= 0) continue;
       over = false;
       const Eigen::Vector3d from_edge = x - on_segment(x, a, b);
-      if (from_edge.norm() < nearest) nearest = from_edge.norm(), way = from_edge / nearest;
+      if (from_edge.norm() < nearest) nearest = from_edge.norm(), outward = from_edge / nearest;
     }
-    if (over && out < nearest) nearest = out, way = face.normal;
+    if (over && out < nearest) nearest = out, outward = face.normal;
   }
   if (inside.distance <= 0) return inside;
-  return {nearest, way};
+  return {nearest, outward};
 }
 
 void HullDistance::add_faces(const Eigen::Isometry3d& pose, bool of_b,
@@ -214,7 +214,7 @@ bool MeshDistance::is_level(const Eigen::Vector3d& lower, const Eigen::Vector3d&
     if ((triangle.normal - first.normal).squaredNorm() > 1e-24 ||
         std::abs(first.normal.dot(triangle.centre - first.centre)) > same)
       return false;
-  // What each has of the rectangle under the box, clipped by its four sides.
+  // The part of each triangle inside the rectangle under the box, clipped by its four sides.
   const Eigen::Vector3d axes[2] = {
       (first.corner[1] - first.corner[0]).normalized(),
       first.normal.cross(first.corner[1] - first.corner[0]).normalized()};

@@ -66,8 +66,8 @@ class MeshDistance : public btTriangleCallback {
   bool level_ = false;  // near the body: the first triangle's plane
 };
 
-/// What an asset meets that is none: a shape of Bullet's as a field in the shape's frame. The shape
-/// must outlive it, and must not be changed meanwhile.
+/// A collision partner that is no asset: a shape of Bullet's as a shape in its own frame. Bullet's
+/// shape must outlive it and must not change meanwhile.
 class Partner {
  public:
   static std::optional<Partner> of(const btCollisionShape& shape);
@@ -77,7 +77,7 @@ class Partner {
   PlacedShape placed(const btTransform& shape, const btVector3& lower, const btVector3& upper,
                      double thickness) const;
 
-  /// [u] What placed() says of distances holds for motions up to this.
+  /// [u] The distances of placed() are valid for motions up to this.
   double clearance(double thickness) const {
     return mesh_ != nullptr ? thickness : std::numeric_limits<double>::infinity();
   }

@@ -174,7 +174,7 @@ void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const
   double stiffness = spring.at(patch.depth) * patch.area, relaxation = spring.relaxation;
   if (patch.depth > 0) {
     const double parting = spring.parting(patch.depth, together.dot(patch.normal));
-    // As the point moves along, its speed grows with its depth: hardly any is no measure.
+    // A point that moves along grows faster the deeper it is: a slight speed is no measure.
     const double placed = to_eigen(unsaid_at(to_bullet(place_of(patch)))).dot(patch.normal);
     const double speed =
         parting +
@@ -229,7 +229,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
     points[used++] = point;
   }
   for (std::size_t i = 0; i < old.count; ++i) {
-    // Who remembers an old point is told that it is gone; its impulses may go on.
+    // Owners of user data are told that the old point is gone; its impulses may continue.
     manifolds[0]->clearUserCache(old.points[i]);
   }
   for (std::size_t i = 0; i < used; ++i) {

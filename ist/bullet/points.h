@@ -10,8 +10,9 @@
 
 namespace ist::bullet {
 
-/// Where a patch pushes: a force on its wrench's axis has no twist left but that about itself. The
-/// axis runs away where a patch pushes both ways, so no farther from its middle than it is wide.
+/// The point at which a patch pushes. A force on the wrench's axis leaves no torque but that about
+/// the axis. If a patch pushes in both directions the axis may lie far away: the point stays within
+/// the patch's width of its middle.
 Eigen::Vector3d place_of(const ContactPatch& patch);
 
 /// The points of a pair in Bullet's manifolds.

@@ -91,11 +91,11 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
   // A ray's triangles are found one after another, until one hit is the last that counts.
   if (auto* const ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
     const PlacedAsset mesh_placed{tree_, to_pose(mesh_in_body_), scale_};
-    const Eigen::Vector3d from = to_eigen(ray->m_from), way = to_eigen(ray->m_to) - from;
-    const double length = way.norm(), past = 1e-9 * (length + reach());
+    const Eigen::Vector3d from = to_eigen(ray->m_from), along = to_eigen(ray->m_to) - from;
+    const double length = along.norm(), past = 1e-9 * (length + reach());
     for (double begin = 0; begin < ray->m_hitFraction * length;) {
-      const RayHit hit =
-          raycast(mesh_placed, Ray{from + begin / length * way, way, length * (1 + 1e-9) - begin});
+      const RayHit hit = raycast(
+          mesh_placed, Ray{from + begin / length * along, along, length * (1 + 1e-9) - begin});
       if (!hit.hit()) return;
       process(hit.triangle);
       begin += hit.distance + past;

@@ -3,7 +3,7 @@
 #include "c_api/structs.h"
 #include "query/base/no_answer.h"
 
-// What all queries of the C functions have in common.
+// Shared by all queries of the C functions.
 
 namespace ist::c_api {
 
@@ -20,7 +20,7 @@ ist_status_t ask_about(const ist_placed_t* a, const ist_placed_t* b, ist_workspa
   return scratch == nullptr ? status : ask(first, second, *scratch);
 }
 
-/// What was not asked: all numbers are NaN, as those of a query that cannot be answered.
+/// An answer to a refused query: all numbers are NaN, as in an unanswerable one.
 template <class Found, class Answer>
 ist_status_t refuse(ist_status_t status, Answer& answer) noexcept {
   write(invalid_input<Found>(), answer);

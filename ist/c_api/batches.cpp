@@ -6,7 +6,7 @@
 namespace ist::c_api {
 namespace {
 
-/// What a worker has to answer pairs with.
+/// The memory of the workers that answer pairs.
 struct Staff {
   ist_workspace_t* workspaces;
   std::size_t workers;

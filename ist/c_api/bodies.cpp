@@ -31,7 +31,7 @@ void write(const Bounds& found, ist_bounds_t& out) noexcept {
   out.radius = found.radius;
 }
 
-/// As queries read it, and refused for a pose that they refuse.
+/// Reads a placed asset as queries do, and refuses the poses that they refuse.
 ist_status_t read_usable(const ist_placed_t* given, PlacedAsset& placed) noexcept {
   const ist_status_t status = c_api::read(given, placed);
   if (status != IST_OK) return status;

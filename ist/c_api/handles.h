@@ -8,7 +8,7 @@
 #include <ist/deadline.h>
 #include <ist/query.h>
 
-// What lies in the memory of the caller's handles.
+// The contents of the caller's handles.
 
 namespace ist::c_api {
 

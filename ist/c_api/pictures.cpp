@@ -8,7 +8,7 @@
 #include "query/asset/mesh_parts.h"
 #include "query/asset/sphere_tree.h"
 
-// What an asset holds, number by number, for who cannot read its layout; and lenses.
+// The contents of an asset, number by number, for callers that cannot read its layout; and lenses.
 
 namespace ist::c_api {
 namespace {
@@ -93,7 +93,7 @@ ist_status_t read(const ist_lens_settings_t* given, LensSettings& settings) noex
   return IST_OK;
 }
 
-// Lenses are written where the caller has room for them.
+// Lenses are written directly to the caller's array.
 static_assert(std::is_standard_layout_v<OverlapLens>);
 static_assert(sizeof(ist_lens_t) == sizeof(OverlapLens));
 static_assert(offsetof(ist_lens_t, centre) == offsetof(OverlapLens, centre));

@@ -14,7 +14,7 @@
 namespace ist::c_api {
 namespace {
 
-/// What a handle points to.
+/// The object behind a handle.
 struct OwnedScene {
   explicit OwnedScene(const SceneSettings& settings) : scene(settings) {}
 

@@ -25,7 +25,7 @@ ist_status_t check_size(const T* given) noexcept {
   return given->size == sizeof(T) ? IST_OK : IST_WRONG_SIZE;
 }
 
-/// Makes room for an answer: all zero but its size.
+/// Clears an answer except its size.
 template <class T>
 ist_status_t clear(T* answer) noexcept {
   const ist_status_t status = check_size(answer);
@@ -118,7 +118,7 @@ inline Penetration read(const ist_penetration_t& given) noexcept {
   return result;
 }
 
-// Patches are written where the caller has room for them.
+// Patches are written directly to the caller's array.
 static_assert(std::is_standard_layout_v<ContactPatch>);
 static_assert(sizeof(ist_contact_patch_t) == sizeof(ContactPatch));
 static_assert(offsetof(ist_contact_patch_t, id) == offsetof(ContactPatch, id));

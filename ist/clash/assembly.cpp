@@ -213,7 +213,7 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
   else if (robot)
     rows = joint_rows(options.joints, source);
 
-  // What no pair asks for is not read.
+  // Reads only parts that some pair needs.
   const std::size_t n = source.parts.size();
   std::vector<bool> asked(source.shapes.size(), false), part_asked(n, true);
   for (std::size_t i = 0; i < n; ++i) {

@@ -111,13 +111,13 @@ Vector3d unit(const Vector3d& v) {
   return length > 0 ? Vector3d(v / length) : Vector3d::Zero();
 }
 
-/// What patches add up to.
+/// Sums over patches.
 struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// Faces that look one way have more than a quarter of their area along it; a pin's in its hole
-  /// cancel.
+  /// Faces that face one direction have more than a quarter of their area along it; those of a pin
+  /// in its hole cancel.
   bool has_way_out() const { return force.norm() > area / 4; }
   double depth() const { return volume / (has_way_out() ? force.norm() : area); }
 };
@@ -147,7 +147,7 @@ class PairQuery {
       return true;
     }
     if (!(found.volume > 0)) {
-      out.depth = 0;  // patches may hold rounding
+      out.depth = 0;  // patches may be rounding alone
       return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);
@@ -196,8 +196,8 @@ class PairQuery {
                              kFlush * std::min(a_.diameter, b_.diameter));
   }
 
-  /// Where sides are flush the volume falls whichever way B goes across them: the mean of two
-  /// places a little aside leaves that out.
+  /// Where sides are flush the volume falls in both directions across them: the mean of two
+  /// positions a little aside cancels that.
   void way_out(Clash& out, const Sums& whole) {
     const Vector3d by =
         std::min(kFlush * std::min(a_.diameter, b_.diameter), 1e-3 * out.depth) * out.direction;
@@ -261,7 +261,7 @@ class PairQuery {
     return true;
   }
 
-  /// Area and centroid of a contact once B has moved towards A, if there is one way to do so.
+  /// Area and centroid of a contact after moving B towards A, if there is one direction to do so.
   void measure_contact(Clash& out, double by) {
     out.kind = ClashKind::touching;
     Penetration found;
@@ -318,7 +318,7 @@ std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSet
 
 bool is_worse(const Clash& x, const Clash& y) {
   const auto rank = [](const Clash& c) {
-    // What could not be answered first, of its volume nothing is known.
+    // Pairs without an answer come first: nothing is known of their volume.
     return std::tuple(c.status != QueryStatus::ok ? 0 : 1, static_cast<int>(c.kind),
                       c.kind == ClashKind::overlapping ? -c.volume : 0.0, c.distance_min,
                       -c.contact_area);

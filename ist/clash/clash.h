@@ -15,7 +15,7 @@ namespace ist {
 struct ClashPart {
   std::string name;
   PlacedAsset solid;
-  /// What its coordinates are rounded by, as a share of them: that of float32 or of float64.
+  /// The rounding of its coordinates, as a fraction of them: that of float32 or of float64.
   double rounding = 0;
   double slack = 0;  ///< [u] how far its mesh may lie from the shape that is meant
 };
@@ -45,10 +45,10 @@ struct Clash {
   /// alone, of the overlap once B has moved by this towards A.
   double contact_area = 0;
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the overlap or the contact
-  Eigen::Vector3d direction =
-      Eigen::Vector3d::Zero();  ///< unit: B's way out of A; zero: no one way
-  /// Mean depth of the overlap's deepest connected part, its volume over its area seen along the
-  /// way out; of one wholly inside the other solid, the diameter of the smaller one's bounds.
+  /// Unit, in which B leaves A; zero if there is no single one.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  /// Mean depth of the overlap's deepest connected part: its volume over its area seen along
+  /// `direction`. If one solid is wholly inside the other, the diameter of its bounds.
   double depth = 0;
   double distance_min = 0, distance_max = 0;
   QueryStatus status = QueryStatus::ok;  ///< not ok: told as overlapping, since it may be

@@ -13,7 +13,7 @@
 
 namespace ist {
 
-/// What is told beside the pairs.
+/// The parts of a report besides the pairs.
 struct ClashReport {
   using Names = std::pair<std::string, std::string>;  ///< of two parts, sorted
 

@@ -9,7 +9,7 @@
 
 #include "clash/assembly.h"
 
-// What the readers of assemblies hand to read_assembly().
+// The readers of assemblies return these to read_assembly().
 
 namespace ist {
 

@@ -87,7 +87,7 @@ nlohmann::ordered_json predicted_json(const AssetHeader& h) {
   return result;
 }
 
-/// What was asked of the error and what became of it; empty where nothing was.
+/// The requested error and the result; empty if no error was requested.
 nlohmann::ordered_json target_json(const AssetView& tree) {
   nlohmann::ordered_json result = nlohmann::ordered_json::object();
   const PredictedErrors errors = tree.predicted_errors();

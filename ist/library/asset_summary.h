@@ -20,15 +20,13 @@ nlohmann::ordered_json asset_json(const AssetView& tree);
 std::string describe_counted_twice(const AssetView& tree);
 
 /// "target 1 % at 0.1 % overlap: met, 0.84 % measured against the worst partner, edge, of 170 poses
-/// in all", or missed and why; "" where no error was asked for.
+/// in all", or missed and why; "" if no error was requested.
 std::string describe_target(const AssetView& tree);
 
-/// Of an asset whose spheres are too coarse for thin parts of the solid, about how many would do.
-/// Nothing where they cover enough.
-///
-/// As long as spheres are as wide as the walls, each covers as much as the one before; once these
-/// are full, later ones are smaller. So the count is what the last spheres of the asset say, with
-/// room for that.
+/// For an asset whose spheres are too coarse for thin parts of the solid, about how many would do;
+/// nothing if they cover enough. As long as spheres are as wide as the walls, each covers as much
+/// as the one before; once the walls are full, later spheres are smaller. So the last spheres of
+/// the asset give the count, with a margin.
 std::optional<std::uint64_t> enough_spheres(const AssetView& tree);
 
 /// "the spheres are too coarse for thin parts: 19 % of the solid is covered; about 60,000 spheres

@@ -85,7 +85,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kEntryFormat = 3;  ///< entries of others are not found
 
-/// Of a line's other fields and of the asset.
+/// The hash of a line's other fields and of the asset.
 std::string hash_of(const Json& line, const Asset& asset) {
   Hash hash;
   hash.add_text(json_text(line, -1));
@@ -115,7 +115,7 @@ Kind kind_of(const std::string& name) {
       name.find_first_not_of("0123456789abcdef") != kKeyDigits)
     return Kind::other;
   if (name.size() == kWhole) return Kind::entry;
-  // What write_atomically() appends.
+  // The suffix that write_atomically() appends.
   return name[kWhole] == '.' && name.find_first_not_of("0123456789.", kWhole) == std::string::npos
              ? Kind::left_over
              : Kind::other;

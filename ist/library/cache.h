@@ -20,7 +20,7 @@
 
 namespace ist {
 
-/// What the bytes of an asset follow from, as a hash of 128 bits.
+/// Identifies the bytes of an asset by a hash of 128 bits.
 struct CacheKey {
   std::uint64_t high = 0, low = 0;
 
@@ -28,9 +28,9 @@ struct CacheKey {
   bool operator==(const CacheKey&) const = default;
 };
 
-/// Of the mesh's bytes, those of the files that it refers to, the settings, the asset's format and
-/// the revision of the bake; name, path, device and threads do not count. Throws Error where a file
-/// cannot be read.
+/// Hashes the mesh's bytes, those of the files that it refers to, the settings, the asset's format
+/// and the revision of the bake; name, path, device and threads do not count. Throws Error if a
+/// file cannot be read.
 CacheKey cache_key(const Job& job);
 
 struct CacheEntry {
@@ -67,7 +67,7 @@ class AssetCache {
   std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last looked after
 };
 
-/// What a cache holds.
+/// The size of a cache.
 struct CacheUse {
   std::uint64_t entries = 0, bytes = 0;
   std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files that a killed program left

@@ -6,11 +6,11 @@
 
 namespace ist {
 
-/// Whether a path holds characters that stand for others: * ? [
+/// Whether a path contains characters that stand for others: * ? [
 bool is_pattern(const std::string& path);
 
 /// The files that match, in the order of their paths' bytes. A relative pattern starts in `folder`
-/// ("": here), whose own name may hold any characters.
+/// ("": here), whose own name may contain any characters.
 ///
 /// * and ? stand for characters of one name, [abc] for one of them, ** for any number of folders,
 /// none too. What begins with a dot is found only by a pattern that does. Folders that are links

@@ -21,8 +21,8 @@ ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const Mesh
 /// Loads, scales, turns and closes a mesh. Throws Error.
 InputMesh read_input_mesh(const std::string& path, const MeshSettings& settings);
 
-/// What load_mesh() gives, scaled by scale_mesh() and then turned: the quarter turn about the third
-/// axis that takes up_axis to world_up.
+/// Scales a loaded mesh by scale_mesh() and then turns it: the quarter turn about the third axis
+/// that takes up_axis to world_up.
 void place(TriangleMesh& mesh, const MeshSettings& settings);
 
 /// An asset, and what its partners erred where an error was asked for.

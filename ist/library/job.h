@@ -8,9 +8,9 @@
 
 namespace ist {
 
-/// What an asset must be, or it fails. The bytes of an asset do not depend on it.
+/// Requirements without which an asset fails. They do not change its bytes.
 struct Demands {
-  bool mesh = false;      ///< it holds its mesh, for exact queries
+  bool mesh = false;      ///< it contains its mesh, for exact queries
   double coverage = 0;    ///< at least; share of the solid's volume
   double confidence = 0;  ///< at least; of a mesh that had to be closed
 };

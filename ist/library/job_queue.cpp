@@ -37,7 +37,7 @@ std::uint64_t machine_memory() {
          static_cast<std::uint64_t>(std::max(page, 0L));
 }
 
-/// What a control group of version 1 or 2, or one above it, leaves.
+/// The memory that a control group of version 1 or 2, or one above it, leaves.
 std::uint64_t group_memory() {
   std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
   std::ifstream groups("/proc/self/cgroup");

@@ -77,7 +77,7 @@ std::optional<std::string> text_of(const toml::node& value, SettingKind kind) {
   return std::nullopt;
 }
 
-/// As it stands in the file, for messages.
+/// The value as the file spells it, for messages.
 std::string shown(const toml::node& value) {
   if (value.is_table()) return "a table";
   if (value.is_array()) return "a list";

@@ -15,7 +15,7 @@ enum class JobStatus {
 };
 const char* name_of(JobStatus status) noexcept;
 
-/// What became of a job.
+/// The result of a job.
 struct JobResult {
   std::string name, mesh;
   JobStatus status = JobStatus::not_baked;
@@ -23,7 +23,7 @@ struct JobResult {
   double seconds = 0;   ///< wall time from beginning to end
   std::vector<std::string> warnings;
 
-  // Of an asset that was written; else empty.
+  // Filled in if an asset was written, else empty.
   std::string asset;         ///< path
   std::string content_hash;  ///< AssetHeader's, in 16 digits
   std::uint64_t bytes = 0, spheres = 0;

@@ -180,7 +180,7 @@ std::vector<std::uint64_t> needs_of(const std::vector<Job>& jobs) {
   return needs;
 }
 
-/// What is available is an estimate too, and so are the needs.
+/// Available memory is an estimate, and so are the needs.
 std::uint64_t most_of_memory() { return available_memory() / 10 * 8; }
 
 unsigned all_cores() { return static_cast<unsigned>(oneapi::tbb::info::default_concurrency()); }
@@ -201,7 +201,7 @@ class Run {
 
   std::size_t at_once() const { return at_once_; }
 
-  /// What each thread does.
+  /// The loop of each thread.
   void work() {
     while (const std::optional<std::size_t> job = queue_.take()) {
       JobResult result = result_of(*job);
@@ -220,7 +220,8 @@ class Run {
     queue_.close();
   }
 
-  /// What has ended since the last call, after a short wait; false: that was all.
+  /// Collects the jobs that ended since the last call, after a short wait; false: those were the
+  /// last.
   bool wait(std::vector<std::pair<std::size_t, JobResult>>& ended) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::milliseconds(100),

@@ -19,8 +19,8 @@
 
 namespace ist {
 
-/// What the assets of a folder were baked from, in its file .ist-bakes: line_of() each, appended
-/// when it is written. A line that is not whole is passed over.
+/// The inputs that the assets of a folder were baked from, in its file .ist-bakes: line_of() each,
+/// appended when it is written. Incomplete lines are skipped.
 class OutputRecord {
  public:
   explicit OutputRecord(const std::filesystem::path& folder);
@@ -47,11 +47,11 @@ struct RunSettings {
   unsigned threads = 0;      ///< of all jobs together; 0: all cores
   unsigned jobs = 0;         ///< at once; 0: as many as threads, and besides those that are on GPUs
   std::uint64_t memory = 0;  ///< [bytes] of all jobs together; 0: most of what is available
-  /// What is to be said of an asset; called from any thread.
+  /// Returns warnings about an asset; called from any thread.
   std::function<std::vector<std::string>(const AssetView&)> warnings_of;
 };
 
-/// Who looks on, from the thread that runs the jobs.
+/// Observes a run, from the thread that runs the jobs.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;

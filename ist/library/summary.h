@@ -18,7 +18,7 @@ struct Shard {
   bool holds(const std::string& name) const;
 };
 
-/// What a run over a library, or over a shard of it, made.
+/// The result of a run over a library, or over a shard of it.
 struct Summary {
   std::string manifest;            ///< path
   std::uint64_t library_hash = 0;  ///< of all jobs of the manifest: equal for shards of one library
@@ -31,7 +31,7 @@ struct Summary {
   bool complete() const;  ///< every asset was baked or cached
 };
 
-/// Of names and settings.
+/// The hash of all names and settings.
 std::uint64_t hash_of_library(const std::vector<Job>& jobs);
 
 /// An entry of `assets` of the next.

@@ -11,7 +11,7 @@ struct StageShare {
   std::string_view name;
   double begin;  ///< of a round's time
 };
-/// As bakes of 1,000 to 10,000 spheres take it. Where a stage is not needed the share jumps.
+/// Shares of the time of bakes of 1,000 to 10,000 spheres. A stage that is not needed is skipped.
 constexpr std::array<StageShare, 7> kStages = {{{"polygonise", 0},
                                                 {"resolve", 0.05},
                                                 {"pack", 0.1},

@@ -75,7 +75,7 @@ class ChosenPart final : public LargestPart {
              Workspace& workspace, std::span<ContactPatch> patches)
       : a_(a), b_(b), pose_(pose), inner_(inner), workspace_(workspace), patches_(patches) {}
 
-  Penetration level(const DetailPair& pair, const DescentLimits& limits) noexcept override {
+  Penetration level(const LevelPair& pair, const DescentLimits& limits) noexcept override {
     levels.emplace(a_, tree_of(a_, pair.a), b_, tree_of(b_, pair.b), pose_, *workspace_.impl());
     return levels->sum(limits);
   }
@@ -122,8 +122,8 @@ ContactPatches find_patches(const PlacedAsset& a, const PlacedAsset& b,
   ChosenPart chosen(a, b, *pose, inner, workspace, patches);
   bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
   result.penetration =
-      blends ? blend_details(a, b, *pose, settings, workspace, exact_penetration, &chosen)
-             : chosen.level(DetailPair(), limits_of(settings));
+      blends ? blend_levels(a, b, *pose, settings, workspace, exact_penetration, &chosen)
+             : chosen.level(LevelPair(), limits_of(settings));
   const ExactWeight weight = exact_weight(method, result.penetration, pose->unit3());
   if (weight.most > 0) {
     blends = true;

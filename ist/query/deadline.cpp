@@ -9,7 +9,7 @@ namespace {
 // Sphere pairs per µs of a first contact. A core does 40 to 100 in deep contacts, and 10 in shallow
 // ones. A nut in its thread, which is never apart, gains 1 % with this, 2 % with 8 or 10.
 constexpr double kFirst = 7;
-// Part of the deadline at which the percentile of the times is held. A ring and a torus knot of
+// Fraction of the deadline that the percentile of the times is to meet. A ring and a torus knot of
 // 16,000 spheres, budgets of 200 to 1,600: p99 is 1.2 to 1.3 times p95, as the budget is a target.
 constexpr double kAim = 0.8;
 // A cost above the estimate raises it by this part of a step, one below lowers it by the rest. A

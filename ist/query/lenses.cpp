@@ -84,9 +84,9 @@ class LensSearch {
   void note(const Place& a, const Place& b) {
     ++result_.total;
     if (result_.count == room_.size()) return;
-    const Vector3d way = b.centre - a.centre;
-    const double d = way.norm();
-    // Along the way from A's centre: where the lens begins and ends, and its rim.
+    const Vector3d between = b.centre - a.centre;
+    const double d = between.norm();
+    // Along the line from A's centre: begin and end of the lens, and its rim.
     const double begin = std::max(d - b.r, -a.r), end = std::min(a.r, d + b.r);
     const double rim = d > 0 ? (d * d + (a.r - b.r) * (a.r + b.r)) / (2 * d) : 0;
     OverlapLens& lens = room_[result_.count++];
@@ -95,7 +95,7 @@ class LensSearch {
                                      : std::min(a.r, b.r);
     lens.radius *= pose_.unit_a;
     lens.thickness = (end - begin) * pose_.unit_a;
-    const Vector3d axis = d > 0 ? Vector3d(way / d) : Vector3d::UnitZ();
+    const Vector3d axis = d > 0 ? Vector3d(between / d) : Vector3d::UnitZ();
     lens.axis = pose_.rotation() * axis;
     lens.centre = pose_.to_world(a.centre + 0.5 * (begin + end) * axis);
     lens.sphere_a = index_a_[a.index];

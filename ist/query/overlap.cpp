@@ -36,19 +36,16 @@ class MeetingSearch {
   }
 
   YesNo run() {
-    NodePair pair{0, 0, a_.top, b_.top};
     if (root_cover_gap() > error_) return YesNo::no;
-    do {
-      if (!waiting_.grant()) return YesNo::unknown;
-      if (pair.level_a == 0 && pair.level_b == 0) {
-        const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
-        if (leaf.gap < -error_) return YesNo::yes;
-        covers_meet_ |= leaf.cover <= error_;
-      } else {
+    return waiting_.search({0, 0, a_.top, b_.top}, covers_meet_, [&](const NodePair& pair) {
+      if (pair.level_a > 0 || pair.level_b > 0) {
         open(pair);
+        return false;
       }
-    } while (waiting_.take_best(covers_meet_, pair));
-    return covers_meet_ ? YesNo::unknown : YesNo::no;
+      const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
+      covers_meet_ |= leaf.cover <= error_;
+      return leaf.gap < -error_;
+    });
   }
 
  private:
@@ -73,7 +70,7 @@ class MeetingSearch {
     const double radius_a = a_.ball(pair.level_a, pair.a).r;
     const double radius_b = scale_ * b_.ball(pair.level_b, pair.b).r;
     const bool open_a = pair.level_b == 0 || (pair.level_a > 0 && radius_a >= radius_b);
-    // Of the side that is opened, in that side's unit frame.
+    // In the unit frame of the side that is opened.
     const GapSide& side = open_a ? a_side_ : b_side_;
     const int level = open_a ? pair.level_a : pair.level_b;
     const std::uint32_t block = open_a ? pair.a : pair.b;

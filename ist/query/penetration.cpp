@@ -18,7 +18,7 @@ Penetration by_spheres(const PlacedAsset& a, const PlacedAsset& b,
   const bool inner = settings.measure == Measure::inner;
   if (!inner &&
       (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b)))
-    return blend_details(a, b, pose, settings, workspace, exact_penetration);
+    return blend_levels(a, b, pose, settings, workspace, exact_penetration);
   return lens_sum(a, inner ? header_a.inner_tree : header_a.matched_tree, b,
                   inner ? header_b.inner_tree : header_b.matched_tree, pose, limits_of(settings),
                   *workspace.impl());

@@ -19,7 +19,7 @@ Penetration find_penetration(const PlacedShape& a, const PlacedAsset& b,
 Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace,
                            double enough = 0) noexcept;
-/// Whether inner spheres of both are seen to hold a point near the middle of an overlap that was
+/// Whether inner spheres of both are seen to contain a point near the middle of an overlap that was
 /// found: then the solids do overlap. May miss.
 bool spheres_share(const PlacedAsset& a, const PlacedAsset& b, const Penetration& found) noexcept;
 Separation find_separation(const PlacedShape& a, const PlacedAsset& b,

@@ -120,7 +120,7 @@ class MeshOfSolid {
     const MeshFoot foot = nearest_on(*mesh_, point(*x));
     const double away = std::sqrt(foot.squared);
     const double side = is_inside({*mesh_}, point(*x)) ? -1 : 1;
-    // Next to the surface the way to it is rounding.
+    // Next to the surface the direction to it is rounding.
     const double rounding =
         1e-14 * (extent_ + away) + 1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
     const Vector3d gradient =
@@ -156,7 +156,7 @@ struct Chord {
   Chord within(const Chord& other) const noexcept {
     return {std::max(first, other.first), std::min(last, other.last)};
   }
-  /// Of two solids that form a convex one.
+  /// The union of two chords whose solids form a convex one.
   Chord with(const Chord& other) const noexcept {
     if (empty() || other.empty()) return empty() ? other : *this;
     return {std::min(first, other.first), std::max(last, other.last)};

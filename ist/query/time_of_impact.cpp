@@ -21,7 +21,7 @@ TimeOfImpact overlap() noexcept {
   return result;
 }
 
-/// Of the frame's lengths.
+/// In lengths of the frame.
 double tolerance_of(const ImpactSettings& settings, double smaller, double errors,
                     double unit) noexcept {
   return settings.tolerance > 0 ? settings.tolerance / unit
@@ -32,7 +32,7 @@ double bounding_radius(const PlacedAsset& placed) noexcept {
   return placed.asset.header().inner_tree.root[3];
 }
 
-/// Whether one solid holds a part of the other without their meshes meeting there.
+/// Whether one solid contains a part of the other without their meshes meeting there.
 bool hold(const ImpactSide& a, const ImpactSide& b, const RelativePose& pose) noexcept {
   return (a.mesh() != nullptr && holds_part(*a.mesh(), b, pose.a_from_b)) ||
          (b.mesh() != nullptr && holds_part(*b.mesh(), a, pose.b_from_a));

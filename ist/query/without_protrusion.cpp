@@ -18,15 +18,15 @@ namespace {
 // the skin deep, and from there on the volume is right to 10 %.
 constexpr double kTouching = 0.135;
 constexpr double kDeepOverlap = 0.225;
-// d(log u) / d(log volume) on the way, by which the force changes with the volume.
+// d(log u) / d(log volume) along the correction, by which the force changes with the volume.
 constexpr double kStiffening = 0.42;
 // |force|³ / volume² over the depth: hundreds for round contacts of the oracle's solids, and from
 // 5,000 on for faces, up to the last sphere that touches.
 constexpr double kRound = 1500;
 constexpr double kFlat = 4500;
 
-/// [u] Scale of the layer in which a solid's matched spheres stick out and leave room: their mean
-/// radius, but for balls and the like, whose few large spheres fit better than that.
+/// [u] Scale of the layer in which a solid's matched spheres protrude and leave gaps: their mean
+/// radius, except for balls and the like, whose few large spheres fit better than that.
 double skin_of(const PlacedAsset& placed) {
   const AssetHeader& asset = placed.asset.header();
   return std::ldexp(placed.scale, asset.exponent) *
@@ -45,7 +45,7 @@ double flatness(double volume, double area, double depth) {
   return smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
 }
 
-/// What of volume and force is left at a depth < kDeepOverlap, over the skin.
+/// The share of volume and force that remains at a depth < kDeepOverlap, over the skin.
 struct Left {
   double volume, force;
 };

@@ -93,7 +93,7 @@ class Capacity {
  public:
   void add_count(std::size_t pairs) { capacity_ = std::max(capacity_, pairs + kWidth); }
 
-  /// Of a Descent.
+  /// The needs of a Descent.
   void add_trees(const SphereTree& a, const SphereTree& b, const RelativePose& pose) {
     add_trees({a, b, pose}, a.top, b.top);
   }
@@ -120,7 +120,7 @@ class Capacity {
     if (most <= capacity_) return;
     const double scale = trees.pose.a_from_b.scale;
     const double roots = trees.a.header->root[3] + scale * trees.b.header->root[3];
-    // What the kernels' rounding may let through.
+    // The kernels' rounding may let these pass.
     const double blur = distance_error(
         precision_for(trees.a.root(), trees.b.root(), trees.pose.a_from_b.scale), 32 * roots);
     const Balls a = balls_of(trees.a, level_a, 1), b = balls_of(trees.b, level_b, scale);
@@ -155,9 +155,9 @@ std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
     capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
   };
   add(header_a.inner_tree, header_b.inner_tree);
-  const DetailChain chain(header_a, header_b, a_from_b.a_from_b.scale);
+  const LevelChain chain(header_a, header_b, a_from_b.a_from_b.scale);
   for (std::size_t i = 0; i < chain.size(); ++i) {
-    const DetailPair& pair = chain[i];
+    const LevelPair& pair = chain[i];
     add(matched_tree(header_a, pair.a), matched_tree(header_b, pair.b));
     if (pair.a != pair.b || !are_one_asset(header_a, header_b)) continue;
     // Copies that coincide are asked as unlike levels.

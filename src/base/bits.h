@@ -48,36 +48,20 @@ IST_HD inline double from_ordered_bits(std::uint64_t ordered) {
 }
 
 IST_HD inline int count_bits(std::uint32_t bits) {
-#ifdef __CUDA_ARCH__
-  return __popc(bits);
-#else
-  return std::popcount(bits);
-#endif
+  return IST_GPU_OR_HOST(__popc(bits), std::popcount(bits));
 }
 
 IST_HD inline int count_bits(std::uint64_t bits) {
-#ifdef __CUDA_ARCH__
-  return __popcll(bits);
-#else
-  return std::popcount(bits);
-#endif
+  return IST_GPU_OR_HOST(__popcll(bits), std::popcount(bits));
 }
 
 /// The number of the lowest bit that is set. `bits` must not be 0.
 IST_HD inline int lowest_bit(std::uint32_t bits) {
-#ifdef __CUDA_ARCH__
-  return __ffs(static_cast<int>(bits)) - 1;
-#else
-  return std::countr_zero(bits);
-#endif
+  return IST_GPU_OR_HOST(__ffs(static_cast<int>(bits)) - 1, std::countr_zero(bits));
 }
 
 IST_HD inline int lowest_bit(std::uint64_t bits) {
-#ifdef __CUDA_ARCH__
-  return __ffsll(static_cast<long long>(bits)) - 1;
-#else
-  return std::countr_zero(bits);
-#endif
+  return IST_GPU_OR_HOST(__ffsll(static_cast<long long>(bits)) - 1, std::countr_zero(bits));
 }
 
 }  // namespace ist

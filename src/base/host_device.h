@@ -15,6 +15,13 @@
 #define IST_HD_ONCE
 #endif
 
+// IST_GPU_OR_HOST(gpu, host): the one on a device, the other on the host.
+#ifdef __CUDA_ARCH__
+#define IST_GPU_OR_HOST(gpu, host) gpu
+#else
+#define IST_GPU_OR_HOST(gpu, host) host
+#endif
+
 // The device's compiler sees which memory a pointer leads to only where the array itself is in
 // sight. This tells it, as a team's memory() does; loads then need no general addressing.
 namespace ist {

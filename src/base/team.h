@@ -24,7 +24,7 @@ struct SerialTeam {
 
   static constexpr int kBatch = 64;  ///< items that are worth working out side by side
 
-  /// Of a pointer to what the team's lanes share: itself.
+  /// Marks a pointer to memory that the team's lanes share.
   template <class T>
   IST_HD T* memory(T* p) const {
     return p;
@@ -52,7 +52,7 @@ struct SerialTeam {
   /// Bit k: lane k raises the flag.
   IST_HD std::uint32_t ballot(bool flag) const { return flag ? 1 : 0; }
 
-  /// Bit k: lane k holds the same value.
+  /// Bit k: lane k has the same value.
   IST_HD std::uint32_t alike(std::uint32_t) const { return 1; }
 
   /// The lowest lane that raises the flag, −1 if none does; `total`: how many do.
@@ -61,7 +61,7 @@ struct SerialTeam {
     return flag ? 0 : -1;
   }
 
-  /// The value that lane `from` holds, which may be another for each lane.
+  /// The value of lane `from`, which may be another for each lane.
   template <class T>
   IST_HD T broadcast(T value, int from) const {
     (void)from;

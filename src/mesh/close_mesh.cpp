@@ -207,7 +207,7 @@ void orient_outward(Surface& surface, const std::string& name, MeshReport& repor
         " inside another: solid, not a cavity, because the winding number inside it is 1 or more");
 }
 
-/// What orient_outward() finds of shells that face as they should.
+/// Reports for correctly oriented shells what orient_outward() reports for others.
 void keep_facing(const Surface& surface, MeshReport& report) {
   const TriangleMesh& mesh = surface.mesh;
   const Shells shells = find_shells(mesh.triangles, surface.edges);

@@ -11,12 +11,12 @@ namespace ist {
 /// Repaired meshes whose confidence is less are refused.
 constexpr double kLeastConfidence = 0.6;
 
-/// Of the diagonal of the bounds: surface that a repair left this near to where it was, it kept.
+/// Fraction of the bounds' diagonal within which a repair counts as having kept the surface.
 constexpr double kKept = 1e-4;
 
-/// Compares a closed mesh with the surface it was made of, whose triangles may face any way; see
-/// RepairQuality. `kept`: over the diagonal, what lies this near counts as kept. On the caller's
-/// TBB threads, the same for any number of them. `both`: of the two meshes.
+/// Compares a closed mesh with the surface it was made of, whose triangles may face either side;
+/// see RepairQuality. `kept`: a fraction of the diagonal (kKept). `both`: made from the two meshes.
+/// Uses the caller's TBB threads; their number does not change the result.
 RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, const TwoMeshes& both,
                     double kept);
 

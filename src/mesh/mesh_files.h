@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// What load_mesh() does with a file once its bytes are in memory.
+/// Parses the bytes of a file for load_mesh().
 TriangleMesh read_mesh(const SourceFile& file, const ImportSettings& settings);
 
 /// A glTF node by node, in the file's frame: x_world = in_world · x.

@@ -68,14 +68,14 @@ Values<3> line_excess(std::span<const Crossing> crossings) {
   return excess;
 }
 
-/// Of a line, the integrands of 1, x, x², y, y², xy.
+/// The integrands 1, x, x², y, y², xy from those of a line.
 Values<6> along_y(const Values<3>& line, double y) {
   Values<6> values;
   values << line[0], line[1], line[2], y * line[0], y * y * line[0], y * line[1];
   return values;
 }
 
-/// Of a plane, the integrands of the ten moments.
+/// The integrands of the ten moments from those of a plane.
 Moments along_z(const Values<6>& plane, double z) {
   Moments values;
   values << plane[0], plane[1], plane[3], z * plane[0], plane[2], plane[4], z * z * plane[0],
@@ -304,7 +304,7 @@ double squared_reach(const MeshView& mesh, const Vector3d& from) {
   return most;
 }
 
-/// What the mesh encloses less an excess.
+/// The moments that the mesh encloses, minus an excess.
 MeshMoments less(const MeshView& mesh, const WindingExcess& excess) {
   const Sum<4> enclosed = first_moments(mesh);
   const Eigen::Array4d sums = enclosed.terms.value() - excess.value.head<4>();
@@ -353,8 +353,8 @@ double slab_volume(const MeshView& mesh, double distance) {
 WindingExcess winding_excess(const MeshView& mesh, const HierarchyMaker& hierarchy) {
   const ExcessIntegral integral(mesh, hierarchy);
   const Measured<10> sum = integral.value();
-  // What n columns did not meet covers less than 3 / n of the plane, 95 times in 100. A fold is
-  // taken to be no deeper than the longest triangle.
+  // With a probability of 95 %, folds that n columns missed cover less than 3 / n of the plane. A
+  // fold is assumed to be no deeper than the longest triangle.
   constexpr double kColumns = 4.0 * kIntervals * kIntervals;
   return {sum.value, sum.error, 3 / kColumns * integral.plane() * longest_triangle(mesh)};
 }
@@ -369,7 +369,7 @@ MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
 }
 
 MeshMoments moments_near(const MeshView& mesh, MeshMoments moments, double distance) {
-  // What is added or missing lies in the slab and no further than the reach.
+  // The added or missing volume lies in the slab and no further than the reach.
   const double slab = slab_volume(mesh, distance);
   const double reach = std::sqrt(squared_reach(mesh, moments.centre)) + distance;
   // No less than this is the solid's volume; where nothing is left, its centre may be anywhere.

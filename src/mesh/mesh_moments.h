@@ -13,8 +13,8 @@ using HierarchyMaker = std::function<const MeshView&()>;
 /// ∫ of 1, x, y, z, x², y², z², xy, xz, yz over something, unit frame.
 using Moments = Eigen::Array<double, 10, 1>;
 
-/// What a mesh counts that is no part of the solid: ∫ (winding − [winding ≥ 1]), with the integrand
-/// times each of the ten.
+/// The volume that a mesh counts beyond its solid: ∫ (winding − [winding ≥ 1]) times each of the
+/// ten integrands.
 struct WindingExcess {
   Moments value = Moments::Zero();
   Moments error = Moments::Zero();  ///< estimate: the bends of the last intervals, without signs
@@ -45,10 +45,10 @@ MeshMoments enclosed_moments(const MeshView& mesh);
 
 /// Those of the set where the winding number is ≥ 1 (docs/design.md 3.6): the enclosed ones less
 /// those of the excess.
-/// No excess, no loss of accuracy. The errors hold what the excess's integral estimates and, unless
-/// `meets_itself` is false, what folds of the surface may hide between its columns. The same for
-/// any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where there
-/// is an excess.
+/// No excess, no loss of accuracy. The errors include what the excess's integral estimates and,
+/// unless `meets_itself` is false, what folds of the surface may hide between its columns. The same
+/// for any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where
+/// there is an excess.
 MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
                                 const HierarchyMaker& hierarchy);
 

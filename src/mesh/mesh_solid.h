@@ -41,7 +41,7 @@ inline std::array<Eigen::Vector3d, 3> triangle_corners(const MeshView& mesh,
 class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
  public:
   explicit MeshSolid(const ClosedMesh& mesh);
-  /// Of a mesh known to be its solid's boundary, unless it is unresolved.
+  /// For a mesh that is known to bound its solid, unless it is unresolved.
   explicit MeshSolid(const ResolvedMesh& resolved);
 
   double signed_distance(const Eigen::Vector3d& x) const override;
@@ -58,8 +58,8 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   double moved() const { return moved_; }
   /// Triangles of the mesh intersect, or may: they were not looked for. Not by rounding alone.
   bool meets_itself() const { return meets_itself_; }
-  /// ClosedMesh::meeting_pairs, where they are those of the unit frame too: no coordinate was
-  /// rounded on the way there. Null where they are not known.
+  /// ClosedMesh::meeting_pairs if they are valid in the unit frame too (the frame rounded no
+  /// coordinate), else null.
   const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const {
     return meeting_pairs_ ? &*meeting_pairs_ : nullptr;
   }

@@ -45,7 +45,7 @@ std::uint32_t lines_to_see(const TriangleMesh& soup, DisjointSets& patches) {
       std::clamp(std::min(most, 4 * std::sqrt(all) / std::sqrt(least)), 64.0, 200.0));
 }
 
-/// What is seen first along a line, from one of its ends.
+/// The first triangle along a line, seen from one of its ends.
 struct Seen {
   double x = std::numeric_limits<double>::infinity();  ///< distance along the line
   std::uint32_t triangle = kNoIndex;
@@ -99,7 +99,7 @@ std::vector<Eigen::Vector3d> unit_vertices(const TriangleMesh& soup) {
   return unit;
 }
 
-/// What is seen of each patch from far away, along the three axes both ways.
+/// Counts how far-away viewers along the three axes see each patch.
 std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
                         const std::vector<Eigen::Vector3d>& unit) {
   const std::uint32_t lines = lines_to_see(soup, patches);
@@ -159,13 +159,12 @@ std::vector<double> bulges(const TriangleMesh& soup, DisjointSets& patches,
   return result;
 }
 
-/// Turns the triangles of a soup so that as many as can be show their fronts to the outside.
-///
+/// Turns the triangles of a soup so that as many as possible show their fronts to the outside.
 /// Neighbours across edges of two triangles are made to agree, as far as the surface is orientable.
-/// Each patch that hangs together so is then turned if of what is seen of it from far away, along
-/// the three axes both ways, twice as much is backs as fronts. Where neither prevails so, as in a
-/// bowl, the side that it bulges to is its front. Patches that nobody sees go with the majority: as
-/// authored, unless most of what is seen had to be turned. The same for any threads.
+/// A connected patch is then turned if viewers far away along the three axes see its back at least
+/// twice as often as its front. If neither prevails, as in a bowl, the front is the side it bulges
+/// to. Patches that nobody sees follow the majority: they stay as authored unless most of the
+/// visible surface had to be turned. Independent of the number of threads.
 void orient_soup(TriangleMesh& soup, const EdgeTable& edges) {
   make_consistent(soup.triangles, manifold_partners(edges));
   DisjointSets patches = connected_pieces(edges, 2);

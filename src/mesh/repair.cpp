@@ -49,7 +49,8 @@ std::vector<BorderLoop> border_loops(const EdgeTable& edges) {
     while (!path.empty()) {
       auto& choices = at[path.back()];
       while (!choices.empty() && walked[choices.back()]) choices.pop_back();
-      if (choices.empty()) {  // only the start of the walk, all its loops closed, has no way on
+      // only the start of the walk has no next edge, once all its loops are closed
+      if (choices.empty()) {
         place[path.back()] = kNoIndex;
         path.pop_back();
         continue;
@@ -157,7 +158,7 @@ double least_crack(const Surface& surface, const double most) {
   return least;
 }
 
-/// Of all tolerances up to 1e-5 of the diagonal, the smallest that leaves the fewest odd edges.
+/// Takes the smallest tolerance up to 1e-5 of the diagonal that leaves the fewest odd edges.
 void close_cracks(Surface& surface, MeshReport& report) {
   const double diagonal = report.bounds.diagonal().norm();
   const double least = least_crack(surface, kWidestCrack * diagonal);

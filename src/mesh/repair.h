@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// Triangles and their edges, as they change on the way.
+/// Triangles and their edges during a repair.
 struct Surface {
   TriangleMesh mesh;
   EdgeTable edges{mesh.triangles};
@@ -27,7 +27,7 @@ void drop_inner_walls(Surface& surface, MeshReport& report);
 /// notes what it did. What is left is not oriented yet. Throws Error if nothing is left.
 void repair(Surface& surface, const std::string& name, MeshReport& report);
 
-/// What an error says of a mesh that cannot be repaired.
+/// Describes a mesh that cannot be repaired, for an error message.
 inline constexpr const char* kWrapIt =
     "Close it, or wrap it: --wrap 0.5%, in a manifest wrap = '0.5%', in C++ wrap_mesh()";
 

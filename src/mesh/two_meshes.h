@@ -41,7 +41,7 @@ class TwoMeshes {
   }
   const std::vector<Triangle>& of_b() const { return of_b_; }
 
-  /// [triangle] 1 where the other mesh has it too, whichever way it faces.
+  /// [triangle] 1 where the other mesh has it too, facing either side.
   const std::vector<std::uint8_t>& shared_of_a() const { return shared_of_a_; }
   const std::vector<std::uint8_t>& shared_of_b() const { return shared_of_b_; }
   /// [vertex] 1 where it is a corner of the other's triangles.
@@ -51,7 +51,7 @@ class TwoMeshes {
   }
 
  private:
-  /// Of the vertices [first, last) of both.
+  /// For the vertices [first, last): whether the triangles of the other mesh use them.
   std::vector<std::uint8_t> corners(const std::vector<Triangle>& others, const std::size_t first,
                                     const std::size_t last) const {
     std::vector<std::uint8_t> used(number_.size(), 0), result(last - first);

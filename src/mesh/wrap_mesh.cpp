@@ -53,7 +53,7 @@ bool is_thin(const TriangleMesh& mesh, const Triangle& t, const OutwardWinding& 
   return thin >= 2;
 }
 
-/// What is sampled: > 0 in the solid.
+/// The function that a wrap samples: > 0 in the solid.
 class Wrap {
  public:
   Wrap(const TriangleMesh& mesh, double step)
@@ -75,10 +75,10 @@ class Wrap {
 
   std::size_t thin_count() const { return thin_count_; }
 
-  /// Away from holes the distance from the surface, negative inside; across a hole it passes 0
-  /// where the winding number is ½. Where there are thin walls, at least what is left of a step's
-  /// way to them. A step beyond the bounds the solid ends: triangles that face any way may wind
-  /// about what lies outside.
+  /// Away from holes this is the distance from the surface, negative inside; across a hole it
+  /// passes 0 where the winding number is ½. Near thin walls it is at least what is left of one
+  /// step to them. The solid ends one step beyond the bounds: triangles that face either side may
+  /// wind about points outside.
   double value(const Eigen::Vector3d& x) const {
     const double side = std::clamp(4 * (0.5 - winding_.at(x)), -1.0, 1.0);
     const double most = kFarthest * step_;

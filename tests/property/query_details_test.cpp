@@ -50,7 +50,7 @@ class QueryDetails : public ::testing::Test {
     return penetration(a, b, {.pair_budget = budget}, workspace_);
   }
 
-  static DetailChain chain_of(const PlacedAsset& a, const PlacedAsset& b) {
+  static LevelChain chain_of(const PlacedAsset& a, const PlacedAsset& b) {
     return {a.asset.header(), b.asset.header(),
             std::ldexp(b.scale / a.scale, b.asset.header().exponent - a.asset.header().exponent)};
   }
@@ -60,7 +60,7 @@ class QueryDetails : public ::testing::Test {
 
   /// The coarsest trees of both.
   static std::array<SphereTree, 2> coarsest(const PlacedAsset& a, const PlacedAsset& b) {
-    const DetailPair pair = chain_of(a, b).coarsest();
+    const LevelPair pair = chain_of(a, b).coarsest();
     return {SphereTree(a.asset.header(), matched_tree(a.asset.header(), pair.a)),
             SphereTree(b.asset.header(), matched_tree(b.asset.header(), pair.b))};
   }
@@ -95,8 +95,8 @@ class QueryDetails : public ::testing::Test {
 
   /// The blended sum over all pairs of spheres in double.
   static double reference(const PlacedAsset& a, const PlacedAsset& b, std::uint32_t budget) {
-    const DetailChain chain = chain_of(a, b);
-    const auto sum = [&](const DetailPair& pair) {
+    const LevelChain chain = chain_of(a, b);
+    const auto sum = [&](const LevelPair& pair) {
       return reference_sum(a, b, Measure::matched, pair.a, pair.b).volume;
     };
     const auto weights = chain.weights(sum(chain.coarsest()) / unit3(a), budget);
@@ -156,7 +156,7 @@ TEST_F(QueryDetails, ATinyBudgetTakesTheCoarsestLevel) {
 }
 
 TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheCoarseEstimate) {
-  const DetailChain chain = chain_of(placed_a(), placed_b(0));
+  const LevelChain chain = chain_of(placed_a(), placed_b(0));
   EXPECT_EQ(chain[0].a, 0u);
   EXPECT_EQ(chain[0].b, 0u);
   EXPECT_EQ(chain.coarsest().a, 3u);
@@ -183,9 +183,9 @@ TEST_F(QueryDetails, WeightsSumToOneAndFallWithTheCoarseEstimate) {
 }
 
 /// From `least` on, the first budget under which two levels share an answer; 0 if there is none.
-std::uint32_t sharing_budget(const DetailChain& chain, double coarse, std::uint32_t least) {
+std::uint32_t sharing_budget(const LevelChain& chain, double coarse, std::uint32_t least) {
   for (std::uint32_t budget = least; budget < 10'000'000; budget += 1 + budget / 16)
-    for (const DetailWeight& w : chain.weights(coarse, budget))
+    for (const LevelWeight& w : chain.weights(coarse, budget))
       if (w.weight > 0.2 && w.weight < 0.8) return budget;
   return 0;
 }
@@ -194,7 +194,7 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 24; ++i) {
     const PlacedAsset a = placed_a(), b = placed_b(0.13 * i);
-    const DetailChain chain = chain_of(a, b);
+    const LevelChain chain = chain_of(a, b);
     const double coarse =
         reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
     const std::uint32_t budget = sharing_budget(chain, coarse / unit3(a), 10u << (2 * (i % 6)));
@@ -211,7 +211,7 @@ TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 150 && blended < 12; ++i) {
     const PlacedAsset a = placed_a(), b = placed_b(0.02 * i);
-    const DetailChain chain = chain_of(a, b);
+    const LevelChain chain = chain_of(a, b);
     const double coarse =
         reference_sum(a, b, Measure::matched, chain.coarsest().a, chain.coarsest().b).volume;
     const double volume = look(a, b).volume;

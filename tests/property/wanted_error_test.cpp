@@ -59,7 +59,7 @@ class WantedErrors : public ::testing::Test {
   static WantedError wanted(const PlacedAsset& a, const PlacedAsset& b, double error,
                             bool has_exact = true) {
     const RelativePose pose = *relative_pose(a, b);
-    const DetailChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
+    const LevelChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
     return {a, b, pose, {.relative_error = error}, chain, has_exact};
   }
 
@@ -104,7 +104,7 @@ TEST_F(WantedErrors, LessErrorIsNeverCheaper) {
     for (const double scale : {1.0, 0.3, 0.1}) {
       const PlacedAsset a = ring_at_rest(), b = blob_at(0, scale);
       for (double overlap = 1e-9; overlap < 1; overlap *= 1.1) {
-        std::array<double, DetailChain::kMost> most = {};
+        std::array<double, LevelChain::kMost> most = {};
         most.fill(-1);
         for (const double error : kErrors) {
           const WantedError::Shares shares = wanted(a, b, error, has_exact).shares(overlap);

@@ -8,7 +8,7 @@
 
 #include <ist/types.h>
 
-#include "cuda/query/disc_part.h"
+#include "query/ball_triangle/disc.h"
 #include "query/base/turned_over.h"
 
 #include "support/host_patches.h"

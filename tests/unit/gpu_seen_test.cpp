@@ -5,8 +5,8 @@
 
 #include <Eigen/Dense>
 
-#include "cuda/query/disc_part.h"
 #include "cuda/query/seen_triangles.h"
+#include "query/ball_triangle/disc.h"
 #include "support/random_pairs.h"
 
 // Triangles as the GPU's queries see them, in floats: what they tell must hold exactly.

@@ -126,7 +126,7 @@ class BandedBuffers {
     put_state(state);
   }
 
-  /// What was packed, but for its frame.
+  /// The packing, without its frame.
   SpherePacking result(const BandedState& state) const {
     const std::size_t count = state.schedule.spheres;
     const std::vector<StoredSphere> stored = spheres_.to_host(count);

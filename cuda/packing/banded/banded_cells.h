@@ -142,7 +142,7 @@ IST_HD std::uint32_t wait_for_child(const CoopLaunch& coop, const BandedArrays& 
                                     std::uint32_t place) {
   std::uint32_t code = ChildCode::kNone;
   if (coop.team().lane() == 0 && place < a.queue_capacity) {
-    // `pending` is one word for all teams: looked at seldom, not to hold up those that count in it.
+    // `pending` is one word for all teams: read seldom, so as not to delay those that count in it.
     constexpr std::uint32_t kSeldom = 8;
     for (std::uint32_t looks = 1; (code = atomic_load(&a.queue[place])) == ChildCode::kNone;
          ++looks) {
@@ -154,7 +154,7 @@ IST_HD std::uint32_t wait_for_child(const CoopLaunch& coop, const BandedArrays& 
   return coop.team().broadcast(code, 0);
 }
 
-/// Notes the largest radius and bound, in bits, of cells that hold candidates.
+/// Notes the largest radius and bound, in bits, of cells that have candidates.
 IST_HD inline void note_candidates(BandedState& s, std::uint32_t radius, std::uint32_t bound) {
   atomic_max(&s.largest_radius, radius);
   atomic_max(&s.largest_bound, bound);

@@ -2,7 +2,7 @@
 
 #include "cuda/packing/banded/banded_state.h"
 
-// What comes after each step: run by one thread at a meeting, while nobody works.
+// Chooses the next step. One thread runs this at a barrier, while the others wait.
 
 namespace ist::gpu {
 

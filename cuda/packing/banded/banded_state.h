@@ -10,7 +10,7 @@
 
 namespace ist::gpu {
 
-/// What the launch does next. Every step ends with a meeting.
+/// The next step of the launch. Every step ends at a barrier.
 enum class Step : std::uint32_t {
   start,       ///< the root cell's side
   sweep,       ///< drop dead cells, find the largest bound; the schedule begins a band
@@ -31,8 +31,8 @@ enum class Step : std::uint32_t {
   finished,
 };
 
-/// What is too small for the next step. The launch ends; the host makes it larger and starts
-/// another one where it stopped.
+/// The buffer that is too small for the next step. The launch ends; the host enlarges it and starts
+/// another launch where this one stopped.
 enum class Need : std::uint32_t { nothing, cells, candidates, spheres, grid };
 
 /// A candidate in a chain of its bucket.
@@ -42,7 +42,7 @@ struct alignas(16) BucketNode {
   std::uint32_t next;  ///< 1 + the next one's place, 0: the last
 };
 
-/// A candidate that no other goes before, on its way to become a sphere.
+/// A candidate that no other outranks: it may become a sphere.
 struct Winner {
   std::uint64_t key;     ///< the candidate's; 0: not accepted
   std::uint32_t node;    ///< place in nodes

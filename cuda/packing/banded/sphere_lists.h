@@ -23,8 +23,8 @@ struct SphereLists {
   struct Share {
     std::uint32_t index, count;
   };
-  /// What is used of the pools; above their capacities where they were too small. Then the lists
-  /// are unusable until they are filled anew.
+  /// The used part of the pools; above their capacities if they were too small. Then the lists are
+  /// unusable until they are filled again.
   struct Use {
     std::uint64_t words;
     std::uint32_t cell_blocks;

@@ -33,14 +33,14 @@ struct DeviceCoverSurface {
   __device__ bool inside(const double point[3]) const { return ist::inside(team, tree, point); }
 };
 
-/// Cells to divide and the lists that their children filter; room for so many.
+/// Cells to divide and the lists that their children filter, with their capacities.
 struct Frontier {
   CoverCell* cells;
   std::uint32_t* lists;
   std::uint32_t cell_room, list_room;
 };
 
-/// How far a level has come. Counts go on beyond the room, so that the host learns what is needed.
+/// Progress of a level. Counts continue beyond the capacities, so that the host learns the need.
 struct Counters {
   std::uint32_t next;  ///< child that a warp takes
   std::uint32_t cells, listed;
@@ -161,7 +161,8 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
       check_launch("cover radii");
       counters.download({&seen, 1});
       queue.wait();
-      // Too little room: more of it, and once more; demands that were noted already stay true.
+      // If a capacity was too small, enlarges it and repeats the level; violations that were noted
+      // already stay true.
       const bool fits = seen.cells <= to.cells.size() && seen.listed <= to.lists.size() &&
                         seen.scratch <= scratch.size();
       if (fits) break;

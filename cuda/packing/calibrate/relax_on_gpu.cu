@@ -52,7 +52,7 @@ class BlockTeam {
     return earlier + before;
   }
 
-  /// The value that lane `from` holds.
+  /// The value of lane `from`.
   __device__ std::uint32_t broadcast(std::uint32_t value, int from) const {
     if (lane() == from) shared_.words[0] = value;
     __syncthreads();
@@ -94,7 +94,7 @@ struct PowerRound {
   std::uint32_t task_room;  ///< in each
   std::uint32_t* lists;
   std::uint32_t list_room;
-  std::uint32_t* task_counts;  ///< of every level; goes on beyond the room
+  std::uint32_t* task_counts;  ///< of every level; may exceed the capacity
   std::uint32_t* listed;       ///< likewise
 };
 
@@ -144,15 +144,15 @@ __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const 
   }
 }
 
-/// Looks into one cell, all of the team together; `short_list` has room for kPowerLeafSites in
-/// memory that the team shares.
+/// Examines one cell, all of the team together; `short_list`: kPowerLeafSites elements of memory
+/// that the team shares.
 template <class Team>
 __device__ void look_into(const Team& team, const PowerRound& round, const PowerTask& task,
                           std::uint32_t* short_list) {
   const PowerGrid& grid = round.grid;
   const std::uint32_t* parent_list = round.lists + task.first;
   const PowerFilter filter(team, grid, task.cell, round.sites, parent_list, task.count);
-  /// Writes the first `room` sites that stay, and returns how many there are.
+  /// Writes the first `room` sites that pass, and returns how many pass.
   const auto filtered = [&](std::uint32_t* out, std::uint32_t room) {
     std::uint32_t kept = 0;
     for (std::uint32_t base = 0; base < task.count; base += Team::kWidth) {
@@ -329,7 +329,7 @@ class Relaxation {
     check_launch("cutting power cells");
   }
 
-  /// Whether the last cut had room for all; if not, makes more.
+  /// Whether the last cut fitted; if not, enlarges the buffers.
   bool fits() {
     const std::vector<std::uint32_t> used = counters_.to_host(counters_.size());
     std::uint32_t most = 0;

@@ -87,7 +87,7 @@ __global__ void split_cells(const GridLayout coarse, const GridLayout fine,
   children[c] = fine.id(2 * i + (n & 1), 2 * j + (n >> 1 & 1), 2 * k + (n >> 2));
 }
 
-/// A warp a cell where it holds many cells of the distance grid, else a thread. In any order.
+/// A warp per cell if it has many cells of the distance grid, else a thread. In any order.
 template <bool kByWarp>
 __global__ void keep_active_cells(const __grid_constant__ GridScene scene,
                                   const __grid_constant__ GridLayout prototypes,

@@ -31,7 +31,8 @@ __global__ void make_triangles(const double* vertices, const std::uint32_t* corn
                                              vertices + 3 * std::size_t{c[2]});
 }
 
-/// What a triangle does to a cell that it meets, and to a row whose centre line it pierces.
+/// Counts a triangle in the cells that it overlaps, and its crossings in the rows whose centre
+/// lines it pierces.
 struct CountTriangles {
   std::uint32_t* counts;
   std::int32_t* crossings;

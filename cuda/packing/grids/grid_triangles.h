@@ -12,8 +12,8 @@ void prepare_triangles(Queue& queue, const DeviceArray<double>& vertices,
                        const DeviceArray<std::uint32_t>& corners,
                        DeviceArray<packing::GridTriangle>& triangles);
 
-/// Adds to each cell how many triangles meet it, and to `crossings` what they add to the winding
-/// number along its row's centre line. `large`: room for all triangles.
+/// Adds to each cell the number of triangles that overlap it, and to `crossings` their terms in the
+/// winding number along its row's centre line. `large`: an element for every triangle.
 void count_triangles(Queue& queue, const packing::GridScene& mesh,
                      const packing::GridLayout& layout, std::uint32_t count,
                      DeviceArray<std::uint32_t>& counts, DeviceArray<std::int32_t>& crossings,

@@ -1,6 +1,7 @@
 #include "cuda/packing/grids/pack_grids.h"
 
 #include "cuda/packing/grids/device_rounds.h"
+#include "packing/grids/medial_grids.h"
 
 namespace ist::gpu {
 
@@ -13,6 +14,11 @@ SpherePacking pack_grids(Queue& queue, const MeshSolid& solid, const PackingSett
                                                 settings, free_bytes / 2, stage);
   queue.wait();
   return result;
+}
+
+std::vector<MedialNode> medial_nodes(Queue& queue, const MeshSolid& solid,
+                                     const MedialSettings& settings) {
+  return packing::medial_nodes_by(DeviceRounds(queue, solid.arrays()), solid, settings);
 }
 
 }  // namespace ist::gpu

@@ -10,4 +10,8 @@ namespace ist::gpu {
 SpherePacking pack_grids(Queue& queue, const MeshSolid& solid, const PackingSettings& settings,
                          Stage& stage);
 
+/// The first round of such a packing (packing::medial_nodes_on_host()).
+std::vector<MedialNode> medial_nodes(Queue& queue, const MeshSolid& solid,
+                                     const MedialSettings& settings);
+
 }  // namespace ist::gpu

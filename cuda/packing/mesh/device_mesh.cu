@@ -17,8 +17,8 @@ __device__ Corners corners_of(const double* vertices, const std::uint32_t* t) {
            vertices + 3 * std::size_t{t[2]}}};
 }
 
-/// Writes what its lanes' boxes hold together as the box of a node's child; `place` counts nodes
-/// and blocks alike and is not the root's.
+/// Writes the union of its lanes' boxes as the box of a node's child; `place` counts nodes and
+/// blocks alike and is not the root's.
 __device__ void write_joint_box(WideBox box, WideNode* nodes, std::uint32_t place) {
   const WarpTeam team;
   for (int k = 0; k < 3; ++k) {

@@ -184,7 +184,7 @@ __global__ void __launch_bounds__(kThreads)
     for (int j = 0; j < 6; ++j)
       part.word[j] = warp.min(of_warp[(me / 32 & ~(warps - 1)) + (me & (warps - 1))].word[j]);
     const int axis = part.longest();
-    // What is not there stays behind the last triangle.
+    // Absent lanes sort behind the last triangle.
     const std::uint32_t place =
         present ? part.place(point[axis], axis, kLastPlace - 1) : kLastPlace;
     index = sort_in_block(place << kIndexBits | index, size, room) & (kThreads - 1);

@@ -46,7 +46,7 @@ struct MeshArrays {
   std::vector<std::vector<BoxSums>> sums;    ///< of each level of boxes
 };
 
-/// What an asset is made of.
+/// The parts of an asset.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
   std::vector<Sphere> inner_spheres;
@@ -61,7 +61,7 @@ struct AssetArrays {
 /// The bytes of the asset. Throws Error unless the arrays' lengths fit each other.
 std::vector<std::byte> asset_bytes(const AssetArrays& arrays);
 
-/// Sets the content hash of bytes that hold at least a header.
+/// Sets the content hash of bytes that contain at least a header.
 void seal(std::vector<std::byte>& bytes);
 
 }  // namespace ist

@@ -9,7 +9,6 @@
 #include "packing/base/packing_settings.h"
 #include "packing/calibrate/host_calibration.h"
 #include "packing/cover/cover.h"
-#include "packing/grids/host_rounds.h"
 #include "packing/grids/medial_grids.h"
 #include "packing/grids/pack_grids.h"
 
@@ -25,7 +24,7 @@ class HostBackend final : public SolidBackend {
   }
 
   std::vector<MedialNode> medial_nodes(const MedialSettings& settings) override {
-    return packing::medial_nodes_by(packing::HostRounds(mesh().arrays()), mesh(), settings);
+    return packing::medial_nodes_on_host(mesh(), settings);
   }
 
   RelaxedSites relax_sites(const RelaxTask& task,

@@ -15,9 +15,9 @@ SpherePacking pack_on_host(const Solid& solid, const PackingSettings& settings,
 /// The seam's host implementation. What only meshes can be asked throws Error for other solids.
 std::unique_ptr<SolidBackend> make_host_backend(const Solid& solid);
 
-/// The backend for a solid, which must outlive it: a GPU's where one is asked for, or left open
-/// and there, and the solid is a mesh; else the host's. Throws Error where a GPU is asked for by
-/// name and cannot be used, with the way out.
+/// Makes the backend for a solid, which must outlive it: the GPU's if the solid is a mesh and
+/// `device` asks for one, or is automatic and there is one; else the host's. Throws Error with
+/// advice if `device` asks for a GPU that cannot be used.
 std::unique_ptr<SolidBackend> make_backend(const Solid& solid, Device device,
                                            const GpuSettings& gpu = {});
 

@@ -1,4 +1,4 @@
-// What a build without CUDA says.
+// The GPU functions of a build without CUDA: all of them throw.
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>
 #include <ist/gpu_scene.h>

@@ -74,7 +74,7 @@ class SampledMoments {
   std::vector<char> inside_;
 };
 
-/// What points say of volume, first and second moments.
+/// Volume, first and second moments by sampling.
 std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& solid) {
   const SampledMoments points(solid);
   const char* const kAbove =
@@ -143,7 +143,8 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
   return out;
 }
 
-/// Box and ball hold the surface, and what may be around it where that is a solid's mesh.
+/// Box and ball contain the surface, and the surroundings in which the surface of the solid may
+/// lie.
 std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = vector(asset.centre);

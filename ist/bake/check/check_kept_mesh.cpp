@@ -111,7 +111,7 @@ Invariant same_triangles(const std::vector<CheckCorners>& kept,
                      "triangles that only the asset's mesh or only the baked mesh has");
 }
 
-/// The baked vertices went no further than `rounding` on their way into the unit frame.
+/// Moving the vertices into the unit frame displaced them by no more than `rounding`.
 Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double rounding) {
   const double scale = frame.scale();
   const std::vector<Point>& vertices = closed.mesh.vertices;
@@ -136,7 +136,7 @@ Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double roun
              "displacement of a vertex by the unit frame's rounding − its bound, unit frame");
 }
 
-/// Every edge is run as often one way as the other.
+/// Every edge is used equally often in both directions.
 Invariant closed(const MeshOfAsset& mesh) {
   std::vector<std::pair<Edge, int>> runs;
   for (std::size_t b = 0; b < mesh.count; ++b)

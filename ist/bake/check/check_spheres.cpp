@@ -78,7 +78,7 @@ std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSoli
       }).named("spheres disjoint", "sum of two radii − distance of their centres, unit frame"));
 
   Tally coverage;
-  // The mesh of a ball may hold less than the ball.
+  // The mesh of a ball may contain less than the ball.
   const double covered = std::min(volume_of(inner, n) / asset.volume, 1.0);
   coverage.add(std::fabs(covered - asset.coverage) - 1e-9, 0);
   out.push_back(coverage.named("coverage",
@@ -96,7 +96,7 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
   const Sphere* const matched = matched_spheres(asset, detail);
   const double stated =
       detail == 0 ? asset.protrusion : at<DetailLevel>(asset, asset.details)[detail - 1].protrusion;
-  // Of the mesh in the place of a solid, the solid may be that far.
+  // The mesh stands for a solid whose surface may be this far from it.
   const double protrusion = stated - asset.polygonise_error;
   std::vector<Invariant> out;
   Tally sum;

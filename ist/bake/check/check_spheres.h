@@ -19,7 +19,7 @@ std::vector<Invariant> check_tree(const AssetHeader& asset, const TreeHeader& tr
                                   const Sphere* spheres, const float* covers,
                                   const std::string& name);
 
-/// Inner spheres lie in the solid and apart; covers hold spheres.
+/// Inner spheres lie in the solid and apart; covers contain spheres.
 std::vector<Invariant> check_spheres(const AssetHeader& asset, const CheckedSolid& checked);
 
 /// The matched spheres of a detail (0: the finest) stand for the solid. Names start with `name`.

@@ -141,7 +141,7 @@ void TreeCheck::overlap_at(std::size_t lane, const std::vector<std::uint32_t>& n
     const double ra = home.r;
     const double along = (da * da + (ra - sa.r) * (double{ra} + sa.r)) / (2 * da);
     const double rho = std::sqrt(std::max(ra * ra - along * along, 0.0));
-    if (rho == 0) continue;  // one holds the other
+    if (rho == 0) continue;  // one contains the other
     const Eigen::Vector3d axis = to_a / da;
     const Eigen::Vector3d m = c + along * axis;
     const Eigen::Vector3d u = axis.unitOrthogonal();

@@ -25,7 +25,7 @@ class CheckedSolid {
   /// Winding number of a point off the surface: ≥ 1 inside.
   virtual int winding(const Eigen::Vector3d& p) const = 0;
 
-  virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< holds the whole solid
+  virtual const Eigen::AlignedBox3d& bounds() const = 0;  ///< contains the whole solid
 };
 
 /// A mesh's surface as `check` sees it: plain, in double, and of its own making, so that a mistake

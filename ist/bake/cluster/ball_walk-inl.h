@@ -53,7 +53,7 @@ struct Farthest {
   bool found = false;
 };
 
-/// Of lanes: which one reaches farther than `worst`, and farthest, which then becomes its reach.
+/// Finds the lane that reaches farthest beyond `worst`, which becomes its reach.
 HWY_INLINE Farthest farthest_from(const Ball& centre, const BallLanes& balls, double& worst) {
   const BallTag d;
   constexpr std::size_t kLanes = kWidth;
@@ -97,9 +97,9 @@ HWY_INLINE Ball ball_at(std::span<const Ball> balls, std::size_t place) { return
 HWY_INLINE std::size_t count_of(const BallLanes& balls) { return balls.count; }
 HWY_INLINE std::size_t count_of(std::span<const Ball> balls) { return balls.size(); }
 
-/// The smallest ball that holds the given ones. It grows with every one that joins the support, so
-/// the walk ends; the cap is for ties within rounding only. Where `enough(radius)` is true of a
-/// ball on the way, that one is the answer.
+/// The smallest ball that contains the given ones. It grows with every ball that joins the support,
+/// so the loop ends; the cap on it is only for ties within rounding. The first ball with
+/// enough(radius) is returned at once.
 template <class Balls, class Enough>
 Ball smallest_ball(const Balls& balls, const Enough& enough) {
   Support support;
@@ -115,7 +115,7 @@ Ball smallest_ball(const Balls& balls, const Enough& enough) {
     if (!farthest.found) return current;
     Ball next = current;
     if (!grow(support, ball_at(balls, farthest.place), next) || next.r <= current.r) {
-      current.r = worst;  // degenerate to rounding: hold it from where we stand
+      current.r = worst;  // degenerate to rounding: contain it from the present centre
       return current;
     }
     current = next;

@@ -10,11 +10,12 @@ struct Ball {
   double x = 0, y = 0, z = 0, r = 0;
 };
 
-/// The smallest ball that holds the given balls, to about 1e-9 of its radius. Deterministic; only
+/// The smallest ball that contains the given balls, to about 1e-9 of its radius. Deterministic;
+/// only
 /// + − × ÷ sqrt. The set must not be empty.
 Ball bounding_ball(std::span<const Ball> balls);
 
-/// Smallest radius about (x, y, z) that holds the ball, before rounding.
+/// Smallest radius about (x, y, z) that contains the ball, before rounding.
 inline double reach(double x, double y, double z, const Ball& ball) {
   const double dx = ball.x - x;
   const double dy = ball.y - y;

@@ -18,7 +18,7 @@ struct Prototypes {
   std::size_t count = 0;
 };
 
-/// What balls say to the prototypes: Σ weight · centre and Σ weight, for each.
+/// Σ weight · centre and Σ weight over the balls, for each prototype.
 struct GasPull {
   alignas(64) PrototypeValues x{}, y{}, z{}, total{};
 };

@@ -186,7 +186,7 @@ class OverlapBounds {
   OverlapBounds(std::span<const Ball> spheres, const std::vector<std::vector<Ball>>& balls)
       : spheres_(spheres), balls_(balls) {}
 
-  /// What one thread needs.
+  /// Scratch memory of a thread.
   struct Scratch {
     std::vector<std::size_t> larger;
     CoveringBalls others;

@@ -136,7 +136,8 @@ class SupportStep {
  public:
   SupportStep(const Support& support, const Ball& added) : support_(support), added_(added) {}
 
-  /// The smallest ball of the support and `added`, which it does not hold. False if there is none.
+  /// The smallest ball of the support and `added`, which it does not contain. False if there is
+  /// none.
   bool run() { return guess() || try_all(); }
 
   const Support& support() const { return best_support_; }
@@ -177,7 +178,7 @@ class SupportStep {
     return best_.r < std::numeric_limits<double>::infinity();
   }
 
-  /// What try_all() would find, wherever that is beyond doubt.
+  /// A fast path of try_all(): finds its result unless that is ambiguous.
   bool guess() {
     const unsigned all = (1u << support_.count) - 1;
     if (support_.count < kMaxSupport) return follow(all);
@@ -186,7 +187,7 @@ class SupportStep {
     return false;
   }
 
-  /// Leaves out what pulls the centre the wrong way, one after the other.
+  /// Leaves out balls that pull the centre in the wrong direction, one after the other.
   bool follow(unsigned subset) {
     for (;;) {
       const Support trial = chosen(subset);
@@ -206,9 +207,10 @@ class SupportStep {
     }
   }
 
-  /// A ball with its centre well within those that it touches is their smallest; one that holds the
-  /// others with room to spare is everybody's. Any subset that lacks one of the former, or has one
-  /// of the latter, has its centre elsewhere, by so much that its ball is larger or holds not all.
+  /// A ball whose centre lies well within those that it touches is their smallest; if it also
+  /// contains the others with a margin, it is the smallest of all. A subset that lacks one of the
+  /// former, or has one of the latter, has another centre, so far away that its ball is larger or
+  /// does not contain all.
   bool accept(const Support& trial, const TangentBall& tangent, unsigned subset) {
     const Ball& ball = tangent.ball;
     if (!(tangent.height2 >= kSureShare * kSureShare * ball.r * ball.r)) return false;

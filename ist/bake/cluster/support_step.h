@@ -17,7 +17,7 @@ struct Support {
 };
 
 /// The step from one smallest ball to the next: `ball` becomes the smallest one of the support and
-/// `added`, which `ball` does not hold, and `support` what that touches. False, and nothing is
+/// `added`, which `ball` does not contain, and `support` what that touches. False, and nothing is
 /// changed, if there is none.
 bool grow(Support& support, const Ball& added, Ball& ball);
 

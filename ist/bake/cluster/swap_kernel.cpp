@@ -25,7 +25,7 @@ void measure_group(SwapGroup& group) {
   for (std::size_t i = 0; i < members.count; ++i) {
     Ball& without = group.without[i];
     without = group.ball;
-    // Only a ball that touches the bounding ball from inside holds it at its size.
+    // Only a ball that touches the bounding ball from inside contains it at its size.
     if (members.count == 1) {
       without.r = 0;
     } else if (reach(group.ball.x, group.ball.y, group.ball.z, members.ball(i)) >=
@@ -43,7 +43,7 @@ void measure_group(SwapGroup& group) {
 
 /// Lower bounds of a group's radius once a ball joins it in place of a member.
 struct Fit {
-  double farthest = 0;  ///< half of the way across the ball and the member it is farthest from
+  double farthest = 0;  ///< half of the chord across the ball and the member it is farthest from
   double next = 0;      ///< and the member after that
   std::size_t member = 0;
 
@@ -78,13 +78,13 @@ struct Fit {
 };
 
 /// Lower bounds of a group's cost once a ball joins it in place of a member, for the members of
-/// another group. A ball of radius R that holds a set whose smallest ball has radius r has its
-/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it holds a ball, too, that
+/// another group. A ball of radius R that contains a set whose smallest ball has radius r has its
+/// centre within √(R² − r²) of that one's: so R ≥ (D + r²/D) / 2 if it contains a ball, too, that
 /// reaches D from there.
 class JoinCosts {
  public:
   JoinCosts(const SwapGroup& group, const BallLanes& added, double reach) : group_(group) {
-    if (group.members.count == 1) {  // nothing is left that would hold the centre near
+    if (group.members.count == 1) {  // no bound on the centre is left
       of_ball_.fill(0);
       return;
     }
@@ -100,7 +100,7 @@ class JoinCosts {
     return (group_.touching >> left_out & 1u) != 0 ? of_touching_[left_out] : of_ball_;
   }
 
-  /// Of one that joins, by the member whose place it takes.
+  /// Costs for a ball that joins, by the member whose place it takes.
   LaneValues column(std::size_t joining) const {
     LaneValues costs;
     costs.fill(of_ball_[joining]);
@@ -227,8 +227,8 @@ class SwapSearch {
     return bits;
   }
 
-  /// The cost of a group with another ball in place of a member. May be one on the way to it that
-  /// is too much already.
+  /// The cost of a group with another ball in place of a member, or an intermediate cost that is
+  /// too high already.
   template <class Gains>
   double cost_with(const SwapGroup& group, std::size_t left_out, const Ball& added,
                    const Gains& gains) const {

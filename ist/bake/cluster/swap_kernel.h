@@ -31,9 +31,9 @@ struct MemberSwap {
 
 inline constexpr std::size_t kNoMember = kWidth;
 
-/// What a swap of members makes of Σ (R + reach)³ over two groups: the one that takes most off,
-/// of equals the first, if it takes off more than a share `least_gain`. `pinned`: members that
-/// stay, or kNoMember.
+/// Finds the swap of members between two groups that reduces Σ (R + reach)³ most, the first of
+/// equals, if it reduces it by more than a share `least_gain`. `pinned`: members that stay, or
+/// kNoMember.
 MemberSwap best_swap(const SwapGroup& a, const SwapGroup& b, double reach, double least_gain,
                      std::size_t pinned_a, std::size_t pinned_b);
 

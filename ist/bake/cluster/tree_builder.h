@@ -11,8 +11,9 @@ namespace ist {
 
 /// Clusters spheres into an implicit 16-wide tree (asset_layout.h, docs/design.md 6). `covers` are
 /// the cover radii of disjoint inner spheres; it is empty for matched spheres, which may overlap,
-/// and κ is bounded for them. Every ball of the tree holds the spheres below it for certain: radii
-/// are rounded up. Same input, same tree, for any number of threads. The set must not be empty.
+/// and κ is bounded for them. Every ball of the tree contains the spheres below it for certain:
+/// radii are rounded up. Same input, same tree, for any number of threads. The set must not be
+/// empty.
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
                       bool swaps = true);
 
@@ -23,7 +24,7 @@ std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, bool sw
 /// those (refined_order(), tree_order.h).
 TreeArrays build_tree_like(std::span<const Sphere> spheres, std::vector<std::uint32_t> order);
 
-/// The tree whose leaves are the spheres in a given order: lane i holds spheres[order[i]].
+/// The tree whose leaves are the spheres in a given order: lane i is spheres[order[i]].
 TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const float> covers,
                            std::vector<std::uint32_t> order);
 

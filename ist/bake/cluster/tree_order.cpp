@@ -52,7 +52,7 @@ class GroupSwaps {
         pair.swap = best_swap(groups_[pair.a], groups_[pair.b], reach_, kLeastGain, pinned(pair.a),
                               pinned(pair.b));
       });
-      // Of the others none gains: each was carried out, or lost against one that touched it.
+      // No other pair gains: each was swapped, or lost against a neighbour that was.
       gaining.clear();
       for (const std::uint32_t p : stale)
         if (pairs_[p].swap.gain > 0) gaining.push_back(p);
@@ -166,10 +166,9 @@ void in_parts(std::size_t size, const Work& work) {
     tbb::parallel_for(std::size_t{0}, parts, part);
 }
 
-/// Shares out a range of balls, which come sorted, evenly among prototypes: first along the
-/// prototypes' order, nearest first, as far as there is room; then two groups at a time share out
-/// theirs anew, each ball to the prototype that it prefers, until nothing moves. Σ distance² falls
-/// every time.
+/// Distributes a range of sorted balls evenly among prototypes: first in the prototypes' order, the
+/// nearest balls up to the group's size; then two groups at a time redistribute theirs, each ball
+/// to the prototype that it prefers, until nothing moves. Σ distance² falls every time.
 class EvenShares {
  public:
   EvenShares(std::span<const Ball> balls, std::span<std::uint32_t> range, const Prototypes& at,
@@ -254,7 +253,7 @@ class EvenShares {
     const Entry last = *std::max_element(begin, middle);
     const Entry foremost = *std::min_element(middle, end);
     if (last < foremost) return false;
-    // What is before all of the second stays there, and what is behind all of the first.
+    // Entries before all of the second half stay, and so do those behind all of the first.
     Entry* const unsure =
         std::partition(begin, middle, [&](const Entry& entry) { return entry < foremost; });
     Entry* const sure =
@@ -391,7 +390,7 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
                                         bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
-  // A group that is not full comes last, and so does any that holds one that is not.
+  // A group that is not full comes last, and so does any that contains one that is not.
   const std::vector<std::uint32_t> groups =
       order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
   std::vector<std::uint32_t> sorted;

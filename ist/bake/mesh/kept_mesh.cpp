@@ -141,7 +141,7 @@ void find_neighbours(MeshArrays& arrays) {
                                 for (std::uint32_t i = 0; i < arrays.blocks[b].vertices; ++i)
                                   visit(arrays.blocks[b].vertex[i], b);
                             });
-  // Of each block: other block, place of the vertex.
+  // For each block: the other block and the place of the vertex.
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found_of(arrays.blocks.size());
   for_neighbours(arrays, around,
                  [&](const std::uint32_t b, const std::uint32_t other, const std::uint32_t place) {
@@ -224,7 +224,7 @@ void add_integrals(const double (&p)[3][3], BoxSums& sums, std::size_t lane) {
   sums.area[lane] += std::sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]) * (1 + 1e-12) + 1e-300;
 }
 
-/// Of each lane from the triangles themselves: sums of sums would round more.
+/// Sums the triangles of each lane directly: sums of sums would round more.
 void find_sums(MeshArrays& arrays) {
   std::size_t span = 1;  // blocks below a lane
   for (const std::vector<BoxBlock>& level : arrays.boxes) {
@@ -297,8 +297,8 @@ MeshArrays lay_out_mesh(const MeshView& mesh) {
   return arrays;
 }
 
-/// Of a mesh that may not be resolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as
-/// far as its signs are one. 0: the mesh is the boundary of its solid, but for faces that touch.
+/// For a mesh that may be unresolved. Unit frame: ∫ |w − [w ≥ 1]| of the winding number w, as far
+/// as its sign is the same everywhere. 0: the mesh bounds its solid, except for faces that touch.
 double estimate_counted_twice(const MeshSolid& solid) {
   constexpr double kNothing = 1e-9;  // of the volume: what rounding makes of faces that touch
   if (!solid.may_overlap()) return 0;

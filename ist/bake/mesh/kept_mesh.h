@@ -4,8 +4,8 @@
 
 #include <ist/asset.h>
 
-#include "base/aside.h"
 #include "bake/asset/asset_writer.h"
+#include "base/aside.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"
 
@@ -14,7 +14,7 @@ namespace ist {
 /// Blocks around a vertex: where there are more, a block names only some of the others.
 inline constexpr std::size_t kMostAround = 256;
 
-/// What an asset keeps of its solid's boundary.
+/// The boundary of a solid as an asset stores it.
 struct KeptMesh {
   std::shared_ptr<const MeshArrays> mesh;  ///< null: none, and `state` says why
   MeshState state = MeshState::none;

@@ -32,7 +32,7 @@ std::size_t longest_axis(std::span<const FloatPoint> points, std::span<const std
   return longest;
 }
 
-/// Of n > 16: about half, in whole groups of the largest size that leaves a choice.
+/// About half of n > 16, in whole groups of the largest size that leaves a choice.
 std::size_t first_half(std::size_t n) {
   std::size_t group = kWidth;
   while (group * kWidth < n) group *= kWidth;
@@ -148,8 +148,9 @@ class Growth {
   /// In the one that grows.
   bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
-  /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, those that
-  /// would be left alone counted less; then the one nearest to the patch's middle.
+  /// Among the triangles that touch the patch and fit, takes the one that adds fewest vertices,
+  /// with a bonus for triangles that would be left alone; then the one nearest to the patch's
+  /// middle.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
     FloatPoint middle = {};

@@ -96,7 +96,7 @@ using Eigen::Quaterniond;
 
 constexpr std::size_t kPoints = 100'000;
 constexpr std::uint32_t kTriesPerTrial = 6;
-// Of the solid's diagonal.
+// Fractions of the solid's diagonal.
 constexpr double kSmallest = 0.1, kLargest = 0.3;  // diameters and edges
 constexpr double kPlateThickness = 0.02;
 constexpr double kPlaneReach = 4;  // half extent of the box that the plane's truth is
@@ -169,12 +169,13 @@ TrialShape shape_of(TrialPartner partner, double diagonal, const Vector3d& direc
   }
 }
 
-/// How far from `target` along `direction` a body that comes from there first holds `wanted` of
+/// How far from `target` along `direction` a body that comes from there first contains `wanted` of
 /// the points, in lengths of `direction`.
-std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>& points,
-                             const Vector3d& target, const Vector3d& direction,
-                             std::size_t wanted) {
-  std::vector<std::pair<double, int>> events;  // on the way in: a point comes in, or is left behind
+std::optional<double> travel_of(const ConvexBody& body, const std::vector<Vector3d>& points,
+                                const Vector3d& target, const Vector3d& direction,
+                                std::size_t wanted) {
+  // during the approach: a point enters (1) or leaves (−1)
+  std::vector<std::pair<double, int>> events;
   for (const Vector3d& x : points)
     if (const auto part = body.part_of(x - target, -direction)) {
       events.emplace_back(part->to, 1);
@@ -182,11 +183,11 @@ std::optional<double> way_of(const ConvexBody& body, const std::vector<Vector3d>
     }
   std::sort(events.begin(), events.end(), std::greater<>());
   std::size_t held = 0;
-  for (const auto& [way, change] : events)
+  for (const auto& [travel, change] : events)
     if (change < 0) {
       --held;
     } else if (++held >= wanted) {
-      return way;
+      return travel;
     }
   return std::nullopt;
 }
@@ -299,9 +300,9 @@ std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overl
     const double share = volume / solid_.volume();
     const auto wanted =
         static_cast<std::size_t>(std::ceil(share * static_cast<double>(points_.size())));
-    const auto way = way_of(shape.body, points_, target, direction, wanted);
-    if (!way) continue;
-    const Vector3d place = target + *way * direction;
+    const auto travel = travel_of(shape.body, points_, target, direction, wanted);
+    if (!travel) continue;
+    const Vector3d place = target + *travel * direction;
     Pose pose = shape.pose;
     for (int k = 0; k < 3; ++k) pose.t[k] = place[k];
     double truth = 0;

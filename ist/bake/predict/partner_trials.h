@@ -28,7 +28,7 @@ struct PartnerTrial {
   double volume = 0;    ///< [u³] of the overlap
 };
 
-/// What the solid meets but a copy of itself.
+/// The partners of the trials, besides a copy of the solid.
 inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPartner::ball,
                                                   TrialPartner::edge, TrialPartner::corner,
                                                   TrialPartner::plate};
@@ -44,13 +44,12 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 /// caller's TBB threads.
 class PartnerTrials {
  public:
-  /// `mesh`: an asset that holds the solid's own triangles. Both must outlive this.
+  /// `mesh`: an asset that contains the solid's own triangles. Both must outlive this.
   PartnerTrials(const MeshSolid& solid, const AssetView& mesh);
 
-  /// About `count` with overlaps near `overlap` of the solid's volume; fewer or none where the
-  /// partner has no room for so much.
-  /// `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done; once it
-  /// says no, the trials so far are all.
+  /// About `count` trials with overlaps near `overlap` of the solid's volume; fewer or none if the
+  /// partner is too small for that. `go_on(part)`, if any, is called every few milliseconds with
+  /// the finished part of [0, 1]; once it returns false, the trials so far are returned.
   std::vector<PartnerTrial> find(TrialPartner partner, double overlap, std::uint32_t count,
                                  std::uint64_t seed,
                                  const std::function<bool(double)>& go_on = {}) const;

@@ -13,9 +13,9 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Of a class's poses, as many are tried again where no place or no truth was found.
+// Retries per pose if no place or no true volume was found.
 constexpr std::uint32_t kTriesPerPose = 4;
-// Size of a contained B over A's, if it finds room; half of it if not, and so on.
+// Size of a contained B over A's, halved until it fits.
 constexpr double kContainedSize = 0.15;
 constexpr std::uint32_t kContainedTries = 400;  // for each pose
 constexpr int kApproachSteps = 24;
@@ -52,14 +52,14 @@ class Trials {
     // From outside in, since solids may have holes in the middle.
     const double start = radius_a_ + radius_b_;
     double near = start, far = start;
-    const auto shares = [&](double way) {
-      const Pose pose = pose_of(q, centre_a_ + way * direction - q * centre_b_);
+    const auto shares = [&](double travel) {
+      const Pose pose = pose_of(q, centre_a_ + travel * direction - q * centre_b_);
       const double volume = shared_volume(pose, 1);
       if (!(volume >= fraction * smaller_)) {
-        far = way;
+        far = travel;
         return false;
       }
-      near = way;
+      near = travel;
       out.b_in_a = pose;
       out.volume = volume;
       return true;

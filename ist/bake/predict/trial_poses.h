@@ -26,7 +26,7 @@ struct TrialPose {
 inline constexpr std::array<const char*, kOverlapClasses> kOverlapClassNames = {
     "contained", "10–50 %", "1–10 %", "0.1–1 %", "0.01–0.1 %"};
 
-/// A solid, and an asset that holds its own triangles.
+/// A solid, and an asset that contains its own triangles.
 struct TrialBody {
   const MeshSolid& solid;
   AssetView mesh;
@@ -34,10 +34,9 @@ struct TrialBody {
 
 /// About `per_class` poses for each class of overlap: independent random rotations, directions of
 /// approach and overlaps, spread evenly over their logarithm (over 10–50 % over themselves);
-/// `contained` ones hold a smaller B whole. Volumes are exact. Same poses for the same seed, on any
-/// machine.
-/// `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done; once it says
-/// no, the poses so far are all.
+/// `contained` ones contain a smaller B whole. Volumes are exact. Same poses for the same seed, on
+/// any machine. `go_on(part)`, if any, is told every few milliseconds which part of [0, 1] is done;
+/// once it says no, the poses so far are all.
 std::vector<TrialPose> trial_poses(const TrialBody& a, const TrialBody& b, std::uint32_t per_class,
                                    std::uint64_t seed,
                                    const std::function<bool(double)>& go_on = {});

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kMostSpheres = 0x7fffffff;  // what the library takes
 
-// What follows makes a setting from the member that it sets: `of(settings)` is that member.
+// These functions make a setting from the member that it sets: `of(settings)` is that member.
 
 template <class Of>
 using Member = std::remove_reference_t<std::invoke_result_t<Of, BakeSettings&>>;

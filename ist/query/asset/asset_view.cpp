@@ -74,7 +74,7 @@ bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMax
   return std::memcmp(a, b, sizeof(a)) == 0;
 }
 
-/// As sound_sections, of the mesh, which is laid out too; `expected` has been without one.
+/// Like sound_sections() for the mesh, which is laid out too; `expected` had none so far.
 bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
                          DetailLevel* details) noexcept {
   if (header.mesh != expected.file_bytes ||
@@ -93,7 +93,7 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
          mesh.neighbours == found.neighbours;
 }
 
-/// An asset holds spheres, or a mesh alone.
+/// An asset contains spheres, or a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
   if (header.sphere_count == 0) return header.mesh != 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&

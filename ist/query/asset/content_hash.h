@@ -7,7 +7,7 @@
 namespace ist {
 
 /// XXH3-64 of an asset's bytes with the shape AssetHeader::content_hash taken as zero. `bytes` must
-/// hold at least the header. No allocation.
+/// contain at least the header. No allocation.
 std::uint64_t content_hash(std::span<const std::byte> bytes) noexcept;
 
 }  // namespace ist

@@ -16,7 +16,7 @@ inline constexpr double kFarthestPose = 1e60;
 /// Quaternions and normals of these lengths are normalised: their squares are neither 0 nor Inf.
 inline constexpr double kShortestDirection = 1e-150, kLongestDirection = 1e150;
 
-/// Of a shape's lengths and distances; their squares stay finite.
+/// Largest length or distance of a shape; its square stays finite.
 inline constexpr double kLongestLength = 1e150;
 
 /// From this ratio of sizes on all is in double. Float keeps a sum of lenses to 1e-5 while both
@@ -26,8 +26,8 @@ inline constexpr double kSingleRatio = 64;
 
 /// Solid angles smaller than this do not tell on which side a centre is.
 inline constexpr double kLeastAngle = 1e-6;
-/// Part of a ball's radius, squared, within which an edge is too near its centre: the angle under
-/// which the edge is seen is as wrong as the rounding of positions over the way to it.
+/// Squared fraction of a ball's radius within which an edge is too near the centre: the error of
+/// the angle under which the edge is seen is the rounding of positions over their distance.
 inline constexpr double kOnEdge2 = 0x1p-28;
 /// By this part of its radius such a ball is moved along an axis: in a direction in which no edge
 /// of a made thing lies.
@@ -56,11 +56,11 @@ inline constexpr double kAlikeVolume = 0.5;
 
 // Displacements of coincident instances, in mean radii: up to the first, unlike levels answer
 // alone; from the second on, like ones do. Equal spheres lose their correlation within half a
-// radius; the rest is room for a smooth change.
+// radius; the remaining interval makes the change smooth.
 inline constexpr double kCopyAlone = 0.4, kCopyApart = 1.6;
 
 // A quick look: the balls of nodes lie within kPokeOut root radii of the root's middle, because
-// each holds spheres of the root's ball and is itself no larger, or little. A solid smaller than
+// each contains spheres of the root's ball and is itself no larger, or little. A solid smaller than
 // kSpeck of the other overlaps by nothing.
 inline constexpr double kPokeOut = 3;
 inline constexpr double kSpeck = 1e-9;

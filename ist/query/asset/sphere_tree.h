@@ -12,7 +12,7 @@
 
 namespace ist {
 
-/// What is known of all spheres below a block.
+/// Sums over all spheres below a block.
 struct NodeSums {
   double volume = 0;   ///< Σ of sphere volumes, rounded up
   double overlap = 1;  ///< κ: no point lies in more spheres than this
@@ -64,7 +64,7 @@ struct SphereTree {
     return {static_cast<double>(n.volume[lane]), static_cast<double>(n.overlap[lane])};
   }
 
-  /// Inner tree: radius about the node's centre that holds every cover ball below it.
+  /// Inner tree: radius about the node's centre that contains every cover ball below it.
   double cover(int at_level, std::uint32_t block) const noexcept {
     if (at_level == top) return header->root_cover;
     return static_cast<double>(level[at_level + 1].nodes[block / kWidth].cover[block % kWidth]);

@@ -17,7 +17,7 @@ inline bool in_range(double value, double low, double high) noexcept {
 inline bool is_offset(double value) noexcept { return in_range(value, -kMaxExtent, kMaxExtent); }
 inline bool is_radius(double value) noexcept { return in_range(value, 0, kMaxExtent); }
 
-/// The first `used` lanes hold balls, the rest are marked empty.
+/// The first `used` lanes are balls, the rest are marked empty.
 inline bool sound_block(const BallBlock& block, std::uint64_t used) noexcept {
   bool sound = true;
   for (std::uint32_t l = 0; l < kWidth; ++l) {

@@ -30,8 +30,8 @@ bool sound_inertia(const AssetHeader& header) noexcept {
   return principal.eigenvalues()[0] >= -(kMassRounding * half_trace + 3 * header.inertia_error);
 }
 
-/// The box lies near the unit frame and holds the centres of ball and mass; the ball is as large as
-/// its longest side at least, and as its diagonal at most.
+/// The box lies near the unit frame and contains the centres of ball and mass; the ball is as large
+/// as its longest side at least, and as its diagonal at most.
 bool sound_bounds(const AssetHeader& header) noexcept {
   const double unit = std::ldexp(1.0, header.exponent);
   const double room = kMassRounding * unit;

@@ -8,8 +8,8 @@
 
 namespace ist {
 
-/// What the surface does to each of sixteen balls; all factors included. Valid for those that are
-/// met.
+/// The effect of the surface on each of sixteen balls, all factors included. Valid for balls that
+/// touch it.
 struct ProbeSums {
   double cones[kWidth];    ///< volume between the surface inside the ball and the ball's own
   double angle[kWidth];    ///< solid angle of that surface, seen from the centre: > 0 if it is seen

@@ -4,6 +4,7 @@
 #define HWY_TARGET_INCLUDE "query/ball_triangle/surface_patch.cpp"
 #include <hwy/foreach_target.h>
 
+#include "query/ball_triangle/disc_lanes-inl.h"
 #include "query/ball_triangle/feet-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -40,15 +41,14 @@ void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
 }
 
 void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
-  const LaneTag<double> d;
-  using V = hn::Vec<decltype(d)>;
-  const V zero = hn::Zero(d);
+  const DiscTag d;
+  const Real zero = hn::Zero(d), never = hn::Set(d, -1e300);
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    V e[3], f[3];
+    Real e[3], f[3];
     const auto take = [&](int k, const double(&of)[3][kWidth]) {
-      const V a = hn::Load(d, of[0] + lane);
-      const V b = hn::Load(d, of[1] + lane);
-      const V c = hn::Load(d, of[2] + lane);
+      const Real a = hn::Load(d, of[0] + lane);
+      const Real b = hn::Load(d, of[1] + lane);
+      const Real c = hn::Load(d, of[2] + lane);
       e[k] = b - a;
       f[k] = c - a;
       hn::Store(a, d, patch.corner[0][k] + lane);
@@ -56,43 +56,21 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
       hn::Store(c, d, patch.corner[2][k] + lane);
     };
     take(0, corners.x), take(1, corners.y), take(2, corners.z);
-    const V cross[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2],
-                        e[0] * f[1] - e[1] * f[0]};
-    const V area = hn::Sqrt((cross[0] * cross[0] + cross[1] * cross[1]) + cross[2] * cross[2]);
-    const V base = hn::Sqrt((e[0] * e[0] + e[1] * e[1]) + e[2] * e[2]);
-    const auto flat = hn::Not(area > zero);
-    const V one = hn::Set(d, 1.0);
-    const V per_area = one / hn::IfThenElse(flat, one, area);
-    const V per_base = one / hn::IfThenElse(flat, one, base);
-    V u[3], n[3];
+    PlaneFrame frame;
+    frame_of(e, f, frame);
     for (int k = 0; k < 3; ++k) {
-      u[k] = e[k] * per_base;
-      n[k] = cross[k] * per_area;
-      hn::Store(u[k], d, patch.u[k] + lane);
-      hn::Store(n[k], d, patch.n[k] + lane);
+      hn::Store(frame.u[k], d, patch.u[k] + lane);
+      hn::Store(frame.v[k], d, patch.v[k] + lane);
+      hn::Store(frame.n[k], d, patch.n[k] + lane);
+      hn::Store(frame.length[k], d, patch.length[k] + lane);
+      hn::Store(frame.edge_x[k], d, patch.edge_x[k] + lane);
+      hn::Store(frame.edge_y[k], d, patch.edge_y[k] + lane);
     }
-    for (int k = 0; k < 3; ++k) {
-      const int k1 = (k + 1) % 3, k2 = (k + 2) % 3;
-      hn::Store(n[k1] * u[k2] - n[k2] * u[k1], d, patch.v[k] + lane);
-    }
-    const V apex_x = (f[0] * u[0] + f[1] * u[1]) + f[2] * u[2];
-    const V apex_y = area * per_base;
-    hn::Store(hn::Set(d, 1.0), d, patch.edge_x[0] + lane);
-    hn::Store(zero, d, patch.edge_y[0] + lane);
-    hn::Store(base, d, patch.length[0] + lane);
-    const auto set_edge = [&](int k, V x, V y) {
-      const V length = hn::Sqrt(x * x + y * y);
-      const V per_length = one / hn::IfThenElse(flat, one, length);
-      hn::Store(length, d, patch.length[k] + lane);
-      hn::Store(x * per_length, d, patch.edge_x[k] + lane);
-      hn::Store(y * per_length, d, patch.edge_y[k] + lane);
-    };
-    set_edge(1, apex_x - base, apex_y);
-    set_edge(2, zero - apex_x, zero - apex_y);
-    const V never = hn::Set(d, -1e300);
-    hn::Store(hn::Min(zero, apex_x), d, patch.left + lane);
-    hn::Store(hn::IfThenElse(flat, never, hn::Max(base, apex_x)), d, patch.right + lane);
-    hn::Store(hn::IfThenElse(flat, never, apex_y), d, patch.top + lane);
+    const auto flat = hn::Not(frame.area > zero);
+    hn::Store(hn::Min(zero, frame.apex_x), d, patch.left + lane);
+    hn::Store(hn::IfThenElse(flat, never, hn::Max(frame.length[0], frame.apex_x)), d,
+              patch.right + lane);
+    hn::Store(hn::IfThenElse(flat, never, frame.apex_y), d, patch.top + lane);
   }
 }
 

@@ -47,7 +47,7 @@ void answer_all(std::size_t count, std::size_t workers, const ParallelFor& paral
   }
 }
 
-/// What nobody was there to find out.
+/// The answer of a batch that had no workspace.
 inline Penetration unknown_penetration() noexcept {
   Penetration unknown;
   unknown.volume_max = std::numeric_limits<double>::infinity();

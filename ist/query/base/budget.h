@@ -43,13 +43,6 @@ class Budget {
     return granted;
   }
 
-  /// The same for all of them or for none.
-  bool grant_all(std::size_t wanted) noexcept {
-    if (wanted > left()) return false;
-    visits_ += static_cast<std::uint32_t>(wanted);
-    return true;
-  }
-
   bool limited() const noexcept { return most_ != DescentLimits::kNoLimit; }
   std::uint32_t left() const noexcept { return most_ - visits_; }
   std::uint32_t visits() const noexcept { return visits_; }

@@ -59,7 +59,7 @@ Answer invalid_input() noexcept {
   return no_answer<Answer>(QueryStatus::invalid_input);
 }
 
-/// Of solids that are certain to be farther apart than the caller cares for.
+/// The answer for solids that are certainly farther apart than the caller's limit.
 inline Separation farther_than(double most) noexcept {
   Separation result = no_answer<Separation>(QueryStatus::ok);
   result.distance = result.distance_min = most;

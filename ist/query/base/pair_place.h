@@ -122,7 +122,7 @@ IST_HD inline bool usable(const Rotation& rotation, const double (&t)[3], double
          std::isfinite(t[2]) && scale > 0 && std::isfinite(scale);
 }
 
-/// What a pose needs to know of a solid.
+/// The data of a solid that a relative pose needs.
 struct AssetFrame {
   Vec3 centre;  ///< [u] origin of the unit frame
   double unit;  ///< [u]

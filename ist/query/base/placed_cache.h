@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What was placed most recently: slot n % kPlaces holds the last thing whose number has that
+/// The most recently placed blocks: slot n % kPlaces stores the last block whose number has that
 /// remainder. Call forget() before the first use.
 template <class T, std::uint32_t kPlaces>
 struct PlacedCache {
@@ -17,7 +17,7 @@ struct PlacedCache {
 
   void forget() noexcept { std::fill_n(number, kPlaces, kNoIndex); }
 
-  /// The slot of number n, and whether it holds what was placed under n.
+  /// The slot of number n, and whether it contains what was placed under n.
   std::pair<T&, bool> find(std::uint32_t n) noexcept {
     return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
   }

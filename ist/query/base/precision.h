@@ -29,7 +29,7 @@ IST_HD inline Precision precision_for(const RootBall& a, const RootBall& b, doub
                                                               : Precision::float64;
 }
 
-/// Length within which all of both trees and the way between them lie, A's unit frame.
+/// Diameter of a region that contains both trees, A's unit frame.
 IST_HD inline double span(const RootBall& a, const RootBall& b,
                           const Similarity& a_from_b) noexcept {
   double moved[3], sum = 0;
@@ -38,8 +38,8 @@ IST_HD inline double span(const RootBall& a, const RootBall& b,
   return sum + 2 * (a.reach() + a_from_b.scale * b.reach());
 }
 
-/// A gap is measured from block to block, and its rounding grows with the way between: float as
-/// long as that is no more than a few sizes of the objects.
+/// A gap is measured from block to block, and its rounding grows with their distance: float as long
+/// as that is no more than a few sizes of the objects.
 IST_HD inline Precision precision_for_gap(const RootBall& a, const RootBall& b,
                                           const Similarity& a_from_b) noexcept {
   const double sizes = a.r + a_from_b.scale * b.r;

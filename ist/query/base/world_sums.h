@@ -17,7 +17,7 @@ struct WorldSums {
   Vec3 translation_gradient;  ///< by a motion of B
   Vec3 rotation_gradient;     ///< likewise, about B's origin
 
-  /// Of sums in A's unit frame (Overlap, query/kernel/overlap.h).
+  /// From sums in A's unit frame (Overlap, query/kernel/overlap.h).
   IST_HD static WorldSums of(const PairPlace& place, double volume, const Vec3& force,
                              const Vec3& torque, const Vec3& moment) noexcept {
     const double unit = place.unit_a, unit3 = unit * unit * unit;

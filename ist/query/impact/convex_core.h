@@ -66,14 +66,14 @@ PlaneBetween plane_between(const Sampler& shape, const ConvexPiece& triangle) no
   const double radius = core_radius(shape);
   PlaneBetween best;
   best.apart = -std::numeric_limits<double>::infinity();
-  WayBetween between;
+  GjkDistance between;
   best.point = (triangle.corner[0] + triangle.corner[1] + triangle.corner[2]) / 3;
-  Eigen::Vector3d way = best.point;  // the core holds the origin
+  Eigen::Vector3d across = best.point;  // the core contains the origin
   for (int i = 0; i < kSteps; ++i) {
-    const double length = way.norm();
+    const double length = across.norm();
     best.distance = std::max(0.0, length - radius);
     if (!(best.distance > 0)) return best;
-    const Eigen::Vector3d n = way / length;
+    const Eigen::Vector3d n = across / length;
     int nearest = 0;
     for (int k = 1; k < 3; ++k)
       if (n.dot(triangle.corner[k]) < n.dot(triangle.corner[nearest])) nearest = k;
@@ -86,13 +86,13 @@ PlaneBetween plane_between(const Sampler& shape, const ConvexPiece& triangle) no
     if (best.apart >= kEnough * best.distance) break;
     const bool nearer = between.add(difference, triangle.corner[nearest]);
     if (!nearer && i > 0) break;
-    way = between.way();
+    across = between.shortest();
     best.point = between.point();
   }
   return best;
 }
 
-/// Of a half-space there is one plane.
+/// A half-space has one plane.
 inline PlaneBetween plane_between(const HalfSpaceSampler& shape,
                                   const ConvexPiece& triangle) noexcept {
   PlaneBetween between;

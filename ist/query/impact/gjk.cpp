@@ -43,8 +43,9 @@ bool same_side(const Vector3d& a, const Vector3d& b, const Vector3d& c,
 
 }  // namespace
 
-bool WayBetween::add(const Vector3d& difference, const Vector3d& of_b) noexcept {
-  const double before = count_ > 0 ? way_.squaredNorm() : std::numeric_limits<double>::infinity();
+bool GjkDistance::add(const Vector3d& difference, const Vector3d& of_b) noexcept {
+  const double before =
+      count_ > 0 ? shortest_.squaredNorm() : std::numeric_limits<double>::infinity();
   const Vector3d* const x = difference_;
   difference_[count_] = difference;
   of_b_[count_++] = of_b;
@@ -66,22 +67,22 @@ bool WayBetween::add(const Vector3d& difference, const Vector3d& of_b) noexcept 
       part[left_out] = 0;
     }
     if (around) {
-      way_.setZero();
+      shortest_.setZero();
       return true;
     }
   }
   int kept = 0;
-  way_.setZero();
+  shortest_.setZero();
   point_.setZero();
   for (int i = 0; i < count_; ++i) {
     if (!(part[i] > 0)) continue;
-    way_ += part[i] * x[i];
+    shortest_ += part[i] * x[i];
     point_ += part[i] * of_b_[i];
     difference_[kept] = x[i];
     of_b_[kept++] = of_b_[i];
   }
   count_ = kept;
-  return way_.squaredNorm() < (1 - 1e-12) * before;
+  return shortest_.squaredNorm() < (1 - 1e-12) * before;
 }
 
 }  // namespace ist

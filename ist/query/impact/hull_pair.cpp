@@ -26,18 +26,18 @@ HullPlane plane_between(const PointHull& a, const PointHull& b, const Vector3d& 
   constexpr int kSteps = 16;
   HullPlane best;
   best.apart = -std::numeric_limits<double>::infinity();
-  WayBetween between;
-  Vector3d way = guess;
+  GjkDistance between;
+  Vector3d across = guess;
   for (int i = 0; i < kSteps; ++i) {
-    const double length = way.norm();
+    const double length = across.norm();
     if (!(length > least)) break;
-    const Vector3d n = way / length;
+    const Vector3d n = across / length;
     const Vector3d difference = furthest(b, -n) - furthest(a, n);
     const double apart = n.dot(difference);
     if (apart > best.apart) best = {n, apart};
     if (i > 0 && best.apart >= kMostOfIt * length) break;
     if (!between.add(difference, Vector3d::Zero()) && i > 0) break;
-    way = between.way();
+    across = between.shortest();
   }
   return best;
 }

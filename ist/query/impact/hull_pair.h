@@ -15,8 +15,8 @@ struct HullPlane {
   double apart = 0;
 };
 
-/// Looks for a plane that shows most of the distance, from a first guess of the way from A to B on;
-/// in vain where they are no further apart than `least`.
+/// Looks for a plane that shows most of the distance, starting from a guess of the direction from A
+/// to B; finds none if they are no further apart than `least`.
 HullPlane plane_between(const PointHull& a, const PointHull& b, const Eigen::Vector3d& guess,
                         double least) noexcept;
 

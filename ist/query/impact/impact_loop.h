@@ -20,7 +20,7 @@ inline constexpr double kFarApart = 0.05;
 // too short to get on.
 inline constexpr double kReported = 0.75;
 
-/// What a pair was found to do, of the frame's lengths.
+/// The outcome of a pair, in lengths of the frame.
 struct ImpactFound {
   ImpactKind kind = ImpactKind::no_impact;
   double time = 0;

@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 // A little further, for the rounding of what is compared.
 constexpr double kMore = 1 + 1e-12;
 
-/// Whether A's mesh holds the centre of a sphere of B, which keeps no mesh.
+/// Whether A's mesh contains the centre of a sphere of B, which keeps no mesh.
 bool holds_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b, int level,
                   std::uint32_t number) noexcept {
   const NodeBall ball = b.ball(level, number);

@@ -15,8 +15,8 @@ struct ConvexPiece {
   Eigen::Vector3d corner[3];
   int corners = 1;    ///< 1 or 3
   double beyond = 0;  ///< ≥ 0: what the solid has here lies within this of the piece
-  /// Of two points, one of the piece, the solid has one whose distance to the other is more by no
-  /// more than this; it is less where this is negative.
+  /// For two points, one of them in the piece, the solid has a point whose distance to the other is
+  /// larger by at most this; smaller if this is negative.
   double behind = 0;
 };
 
@@ -26,11 +26,10 @@ struct PointHull {
   std::uint32_t count = 0;
 };
 
-/// What of a solid is looked at while it moves, as a tree of balls: the triangles of its mesh or,
-/// where its asset keeps none, the cover balls of its inner spheres. Unit frame.
-///
-/// A node is named by a level and a number, as in SphereTree; at kSphereLevel it is one triangle or
-/// sphere, and the node of the top level is the whole.
+/// A moving solid as a tree of balls: the triangles of its mesh or, if its asset has none, the
+/// cover balls of its inner spheres. Unit frame. A node is named by a level and a number, as in
+/// SphereTree; at kSphereLevel it is one triangle or sphere, and the node of the top level is the
+/// whole.
 class ImpactSide {
  public:
   explicit ImpactSide(const AssetView& view) noexcept;
@@ -49,12 +48,12 @@ class ImpactSide {
 
   /// Whether a node is known by more than its ball: blocks of triangles, single ones, spheres.
   bool has_hull(int level) const noexcept { return level <= (mesh_ ? 0 : kSphereLevel); }
-  /// What the solid has at a node lies within beyond(…) of this hull, the ball's centre if there is
+  /// The solid's part at a node lies within beyond(…) of this hull; the ball's centre if there is
   /// none.
   PointHull hull(int level, std::uint32_t number) const noexcept;
   double beyond(int level, std::uint32_t number) const noexcept;
 
-  /// Of a node of kSphereLevel.
+  /// The piece of a node of kSphereLevel.
   ConvexPiece piece(std::uint32_t number) const noexcept;
 
  private:

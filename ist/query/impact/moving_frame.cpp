@@ -12,9 +12,9 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// Of a straight way: a product, a sum and the rounded time.
-constexpr double kWayRounding = 6 * 0x1p-53;
-// Of what is turned: a polynomial's sine and the angle that it is of, three-term products and sums.
+// Rounding of a straight motion: a product, a sum and the rounded time.
+constexpr double kPathRounding = 6 * 0x1p-53;
+// Rounding of a rotation: a polynomial's sine and its angle, three-term products and sums.
 constexpr double kTurnRounding = 32 * 0x1p-53;
 
 Vector3d translation(const Pose& pose) noexcept { return {pose.t[0], pose.t[1], pose.t[2]}; }
@@ -115,11 +115,11 @@ Placement place(const MovingFrame& frame, double time) noexcept {
   at.a = frame.a.unit * frame.a.turning.at(time).toRotationMatrix();
   at.b = frame.b.unit * frame.b.turning.at(time).toRotationMatrix();
   at.between = frame.between + frame.velocity * time;
-  const double way = frame.between.norm() + frame.speed * time;
+  const double path = frame.between.norm() + frame.speed * time;
   // B's coordinates may be turned into A's frame too.
   const double around_a = frame.a.reach + at.between.norm() + frame.b.reach;
-  at.error = kWayRounding * way + kTurnRounding * (around_a * (1 + frame.a.spin_speed * time) +
-                                                   frame.b.reach * frame.b.spin_speed * time);
+  at.error = kPathRounding * path + kTurnRounding * (around_a * (1 + frame.a.spin_speed * time) +
+                                                     frame.b.reach * frame.b.spin_speed * time);
   return at;
 }
 

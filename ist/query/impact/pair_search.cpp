@@ -57,11 +57,11 @@ TurningPoint PairSearch::ball_b(NodeKey node, const Placement& at) const noexcep
 
 PairSearch::Approach PairSearch::approach(const TurningPoint& a, const TurningPoint& b,
                                           const Placement& at) const noexcept {
-  const Vector3d way = b.place - a.place;
-  const double length = way.norm();
+  const Vector3d across = b.place - a.place;
+  const double length = across.norm();
   const double gap = length - a.radius - b.radius - at.error - loop_.tolerance / 2;
   if (!(gap > 0)) return {gap, 0};
-  const Vector3d n = way / length;
+  const Vector3d n = across / length;
   return {gap, clear_step(frame_, n, gap, n.dot(a.velocity - b.velocity), a.velocity.norm(),
                           b.velocity.norm())};
 }
@@ -218,7 +218,7 @@ void PairSearch::look_at_pieces(NodeKey key_a, NodeKey key_b, const Placement& a
   found.gap = widest.gap;
   found.distance = nearest.distance + a.shape.behind + b.shape.behind + at.error;
   found.normal = widest.normal;
-  // What has an inside is left by the way to its points on it.
+  // A piece with an inside is left in the direction of its surface points.
   found.point_a = nearest.a - std::min(0.0, a.shape.behind) * found.normal;
   found.point_b = nearest.b + std::min(0.0, b.shape.behind) * found.normal;
   found.kind = found.distance <= loop_.tolerance ? ImpactKind::impact : ImpactKind::unresolved;

@@ -28,7 +28,7 @@ TurningPoint turning_point(const MovingBody& body, const Eigen::Matrix3d& turned
 double clear_step(const MovingFrame& frame, const Eigen::Vector3d& n, double gap, double turning,
                   double speed_a, double speed_b) noexcept;
 
-/// Two trees on their ways.
+/// The search for the impact of two moving trees.
 class PairSearch {
  public:
   PairSearch(const MovingFrame& frame, const ImpactSide& a, const ImpactSide& b,

@@ -38,7 +38,7 @@ struct TrianglePart {
   }
 };
 
-/// A shape and a tree on their ways.
+/// The search for the impact of a shape and a tree, both moving.
 template <class Sampler>
 class ShapeSearch {
  public:
@@ -83,10 +83,10 @@ class ShapeSearch {
   }
 
   /// For how long a part of B keeps a gap: in any direction.
-  double any_step(double gap, const TurningPoint& point, double way) const noexcept {
+  double any_step(double gap, const TurningPoint& point, double arm) const noexcept {
     const double speed = point.velocity.norm(), spin_a = frame_.a.spin_speed;
     const double most = (1 + 1e-12) * (frame_.speed + speed);
-    double step = safe_step(gap, most + spin_a * way, spin_a * most);
+    double step = safe_step(gap, most + spin_a * arm, spin_a * most);
     if (spin_a == 0) {
       const double now = (frame_.velocity + point.velocity).norm() + 1e-12 * most;
       step = std::max(step, safe_step(gap, now, frame_.b.spin_speed * speed));
@@ -130,7 +130,7 @@ class ShapeSearch {
       loop_.look_again(0, NodeKey{node.level - 1, kWidth * node.number + i}.bits());
   }
 
-  /// What is certain of a part of B, and what to do with it.
+  /// Proven bounds of a part of B, and the next step for it.
   struct Part {
     double gap;       ///< proven
     double distance;  ///< at most
@@ -177,12 +177,12 @@ class ShapeSearch {
     TurningPoint corner[3];
     ConvexPiece triangle = piece;  // in the shape's frame
     TurningPoint fastest{Vector3d::Zero(), Vector3d::Zero(), 0};
-    double way = 0;
+    double arm = 0;
     for (int k = 0; k < 3; ++k) {
       corner[k] = point_of_b(piece.corner[k], 0, at);
       triangle.corner[k] = at.a.transpose() * corner[k].place + frame_.a.centre;
       if (corner[k].velocity.norm() > fastest.velocity.norm()) fastest = corner[k];
-      way = std::max(way, corner[k].place.norm());
+      arm = std::max(arm, corner[k].place.norm());
     }
     const PlaneBetween plane = plane_between(shape_, triangle);
     const Vector3d point = at.a * (plane.point - frame_.a.centre);
@@ -198,7 +198,7 @@ class ShapeSearch {
     const double more = gap - half_left(gap);
     const double step = frame_.a.spin_speed == 0
                             ? clear_step(frame_, normal, more, turning, 0, fastest.velocity.norm())
-                            : any_step(more, fastest, way);
+                            : any_step(more, fastest, arm);
     decide({gap, plane.distance + error + lost(at), step, nearing, point, normal}, 0, node, at);
   }
 

@@ -17,7 +17,7 @@ inline constexpr auto kSetBits = [] {
   return rows;
 }();
 
-/// What Highway's Iota stores one by one at every call.
+/// Lane numbers; Highway's Iota stores them one by one at every call.
 alignas(64) inline constexpr std::uint32_t kLaneNumbers[16] = {0, 1, 2,  3,  4,  5,  6,  7,
                                                                8, 9, 10, 11, 12, 13, 14, 15};
 

@@ -136,7 +136,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   return result;
 }
 
-/// A limit that no rounding to T makes smaller, and that T holds.
+/// A limit that no rounding to T makes smaller, and that T can represent.
 template <class T>
 T rounded_up(double limit) {
   constexpr double kMost = sizeof(T) == sizeof(float) ? 1e38 : 1e300;

@@ -12,8 +12,8 @@ namespace ist {
 /// up.
 inline constexpr std::size_t kSumLanes = 8;
 
-/// What is summed of lenses, in A's unit frame, positions relative to B's unit-frame origin.
-/// Factors of π are left to the end.
+/// Sums over lenses, in A's unit frame, positions relative to B's unit-frame origin. Factors of π
+/// are applied at the end.
 template <class Sum>
 struct LensSums {
   Sum caps;       ///< 3/π · volume

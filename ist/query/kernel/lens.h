@@ -8,7 +8,7 @@
 namespace ist {
 
 /// Overlap of two balls. `circle` is the squared radius of the circle in which the two surfaces
-/// meet, so that dV/dd = −π · circle; it is 0 where one ball holds the other or they are apart.
+/// meet, so that dV/dd = −π · circle; it is 0 where one ball contains the other or they are apart.
 template <class T>
 struct Lens {
   T cap_a = 0;   ///< 3/π times the volume of ball A's cap, on B's side of the circle's plane

@@ -19,8 +19,8 @@ namespace ist::HWY_NAMESPACE {
 inline constexpr std::size_t kFullList = 8 * kWidth;
 inline constexpr std::size_t kListRoom = kFullList + 2 * kWidth;
 
-/// Pairs of spheres i, j that may meet, in A's axes. A store writes a whole vector and counts what
-/// is valid of it, so there is room beyond the last.
+/// Pairs of spheres i, j that may overlap, in A's axes. A store writes a whole vector and counts
+/// its valid lanes, so the arrays are longer than the list.
 template <class T>
 struct alignas(64) LensList {
   T dx[kListRoom], dy[kListRoom], dz[kListRoom];  ///< centre of j less centre of i
@@ -101,7 +101,7 @@ HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at
   const V circle = ha * (two * a - ha);
   const V cap_j = hn::IfThenElse(ri > rj, small, large);
   const V pull = hn::CopySignToAbs(circle * inverse, signed_error);
-  // Within rounding of tangency the circle says nothing; b² holds it at any distance. Else it
+  // Within rounding of tangency the circle says nothing; b² bounds it at any distance. Else it
   // is concave between the tangencies, so within ± error it is at most doubled.
   const V error = hn::Abs(signed_error);
   const V near = hn::Abs(hn::Min(g, f));

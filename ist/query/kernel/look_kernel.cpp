@@ -69,8 +69,8 @@ HWY_INLINE void place(const SphereTree& tree, const Similarity& map, const doubl
         const V moved = ((hn::Set(d, map.m[3 * k]) * x + hn::Set(d, map.m[3 * k + 1]) * y) +
                          hn::Set(d, map.m[3 * k + 2]) * z) +
                         hn::Set(d, shift[k]);
-        const V way = moved - hn::Set(d, middle[k] - about[k]);
-        square = square + way * way;
+        const V between = moved - hn::Set(d, middle[k] - about[k]);
+        square = square + between * between;
         hn::Store(hn::DemoteTo(df, moved), df, to[k] + out.count + lane);
       }
       const V placed_r = r * scale;
@@ -144,7 +144,7 @@ HWY_INLINE void add_lenses(const FilledBalls& a, const FilledBalls& b, const dou
         const V dz = bz - hn::Load(d, a.z + i);
         const V ar = hn::Load(d, a.r + i);
         const V reach = ar + br, step = hn::Abs(ar - br);
-        // A ball that the other holds overlaps as one that touches it from inside.
+        // A ball that the other contains overlaps as one that touches it from inside.
         const V distance = hn::Max(hn::Max(hn::Sqrt((dx * dx + dy * dy) + dz * dz), step), tiny);
         const V depth = hn::Max(reach - distance, zero);
         const V inverse = one / distance;
@@ -181,7 +181,7 @@ void look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b, 
           Looked& out) {
   const NodeBall root_a = a.ball(a.top, 0), root_b = b.ball(b.top, 0);
   const double reach_a = kPokeOut * root_a.r, reach_b = kPokeOut * (root_b.r * a_from_b.scale);
-  // Beside a speck nothing is dear, and floats could not hold both.
+  // A tiny partner costs little in double, and floats could not represent both.
   if (!(reach_a > kSpeck * reach_b && reach_b > kSpeck * reach_a)) return;
   double about[3], lever[3], square = 0;
   a_from_b.apply(root_b.centre, about);

@@ -5,7 +5,7 @@
 
 namespace ist {
 
-/// What two trees overlap by as a quick look sees them: each a few balls, evenly filled with the
+/// A coarse estimate of the overlap of two trees: each is a few balls, evenly filled with the
 /// volume of the spheres below. A smooth function of the pose. A's unit frame.
 struct QuickLook {
   double volume = 0;
@@ -17,8 +17,8 @@ struct Looked {
   double volume = 0, by_translation[3] = {}, by_rotation[3] = {};
 };
 
-/// Of the nodes of the lowest levels that have no more than 64. `slopes`: with the derivatives,
-/// which are 0 else.
+/// Uses the nodes of the lowest levels that have no more than 64. `slopes`: with the derivatives,
+/// which are 0 otherwise.
 QuickLook quick_look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b,
                      bool slopes) noexcept;
 

@@ -12,7 +12,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Appends the pairs of the chosen lanes and y to two lists, whose room ends a vector later.
+/// Appends the pairs of the chosen lanes and y to two lists, which have a spare vector at their
+/// ends.
 template <class T, class M>
 HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
                               std::uint32_t* out_x, std::uint32_t* out_y) {
@@ -22,8 +23,8 @@ HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::
   return append_lanes<T>(d, chosen, first, out_x);
 }
 
-/// What stands still while nodes are opened: the ball of node y of each pair, from the origin of
-/// the block that is opened.
+/// The balls that are not opened: the ball of node y of each pair, from the origin of the block
+/// that is opened.
 template <class T>
 struct alignas(64) StandingBalls {
   T x[kNodePairs], y[kNodePairs], z[kNodePairs];
@@ -128,31 +129,6 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
   return found;
 }
 
-template <class T>
-HWY_INLINE void masks_as(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                         std::size_t n, std::uint16_t* masks) {
-  const LaneTag<T> d;
-  const SphereTree::Level& opened = stage.x->level[stage.level_x];
-  StandingBalls<T> standing;
-  stand(stage, x, y, n, standing);
-  const std::uint32_t below = stage.x->count(stage.level_x - 1);
-  for (std::size_t i = 0; i < n; ++i) {
-    const BallBlock& block = opened.blocks[x[i]];
-    std::uint32_t near = 0;
-    hn::Vec<LaneTag<T>> d2, r;
-    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d))
-      near |= mask_bits(d, near_of(block, lane, standing, i, d2, r)) << lane;
-    const std::uint32_t used = std::min(kWidth, below - kWidth * x[i]);
-    masks[i] = static_cast<std::uint16_t>(near & ((1u << used) - 1));
-  }
-}
-
-void masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y, std::size_t n,
-           std::uint16_t* masks) {
-  stage.precision == Precision::float32 ? masks_as<float>(stage, x, y, n, masks)
-                                        : masks_as<double>(stage, x, y, n, masks);
-}
-
 template <bool kContained>
 HWY_INLINE std::size_t open_either(const NodeStage& stage, const std::uint32_t* x,
                                    const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
@@ -181,7 +157,6 @@ namespace ist {
 
 HWY_EXPORT(open);
 HWY_EXPORT(open_holding);
-HWY_EXPORT(masks);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
                        std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
@@ -192,11 +167,6 @@ std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
                                std::uint32_t* out_y, ContainedNodes& contained) noexcept {
   return HWY_DYNAMIC_DISPATCH(open_holding)(stage, x, y, n, out_x, out_y, contained);
-}
-
-void reach_masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                 std::size_t n, std::uint16_t* masks) noexcept {
-  HWY_DYNAMIC_DISPATCH(masks)(stage, x, y, n, masks);
 }
 
 }  // namespace ist

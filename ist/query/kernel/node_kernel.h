@@ -41,9 +41,4 @@ std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
                                std::uint32_t* out_y, ContainedNodes& contained) noexcept;
 
-/// Which children of node x[i] come within reach of node y[i], a bit a child, never losing one to
-/// rounding, for each of n ≤ kNodePairs pairs. Same output on every instruction set.
-void reach_masks(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                 std::size_t n, std::uint16_t* masks) noexcept;
-
 }  // namespace ist

@@ -40,8 +40,8 @@ HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&differe
     store_as(hn::Load(d, x + k) - hn::Load(d, y + k), d, difference + k);
 }
 
-/// What follows from where a block and its leaf ball are; `size` bounds the way from the block's
-/// origin to the end of any of its spheres.
+/// Derives the remaining members from the positions of a block and its leaf ball; `size` bounds the
+/// distance from the block's origin to the end of any of its spheres.
 template <class T>
 HWY_INLINE void finish_placing(double size, const TurnedAxes<T>& axes, PlacedBlock<T>& placed) {
   // Two blocks that touch have origins no further apart than both sizes. The sums that take errors
@@ -54,7 +54,7 @@ HWY_INLINE void finish_placing(double size, const TurnedAxes<T>& axes, PlacedBlo
 template <class T>
 inline constexpr T kFar = sizeof(T) == sizeof(float) ? static_cast<T>(1e18) : static_cast<T>(1e150);
 
-/// Makes points far away of the lanes of the last block that hold no sphere.
+/// Makes points far away of the lanes of the last block that contain no sphere.
 template <class T>
 HWY_INLINE void put_away_unused(const SphereTree& tree, std::uint32_t block, Spheres<T>& spheres) {
   if (block + 1 < tree.level[0].count) return;
@@ -121,7 +121,7 @@ HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Tu
   const FourDoubles d4;
   const Origin& o = tree.level[0].origins[block];
   const NodeBall ball = tree.ball(0, block);
-  alignas(32) double way[4];
+  alignas(32) double extent[4];
   for (std::size_t k = 0; k < 4; k += hn::Lanes(d4)) {
     const auto x = hn::Load(d4, axes.column[0] + k);
     const auto y = hn::Load(d4, axes.column[1] + k);
@@ -133,11 +133,11 @@ HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Tu
                         t;
     hn::Store(origin, d4, placed.origin + k);
     hn::Store(centre, d4, placed.centre + k);
-    hn::Store(hn::Abs(centre - origin), d4, way + k);
+    hn::Store(hn::Abs(centre - origin), d4, extent + k);
   }
   const double radius = ball.r * axes.scale;
   placed.radius = static_cast<T>(radius);
-  finish_placing(radius + ((way[0] + way[1]) + way[2]), axes, placed);
+  finish_placing(radius + ((extent[0] + extent[1]) + extent[2]), axes, placed);
 }
 
 }  // namespace ist::HWY_NAMESPACE

@@ -17,7 +17,7 @@ struct alignas(64) Spheres {
   T x[kWidth], y[kWidth], z[kWidth], r[kWidth];
 };
 
-/// A leaf block of either tree in A's unit frame. Four numbers, since vectors hold so many.
+/// A leaf block of either tree in A's unit frame. Four numbers, since vectors have so many.
 template <class T>
 struct alignas(64) PlacedBlock {
   double origin[4];  ///< of the spheres' coordinates
@@ -29,11 +29,11 @@ struct alignas(64) PlacedBlock {
   Spheres<T> room;  ///< for those that do not lie in the asset as they are needed
 };
 
-/// The leaf blocks of one tree that a query met lately: each meets several of the other tree.
+/// Recently placed leaf blocks of one tree: each is paired with several of the other tree.
 template <class T>
 struct BlockCache : PlacedCache<PlacedBlock<T>, 256> {
-  /// The block, which `place(block, placed)` makes if it is not there; null if its room is that of
-  /// one of the `held` blocks.
+  /// The block, which `place(block, placed)` makes if it is not cached; null if its slot is in use
+  /// by one of the `held` blocks.
   template <class Place>
   const PlacedBlock<T>* find(std::uint32_t block, const PlacedBlock<T>* const* held,
                              std::size_t count, const Place& place) {

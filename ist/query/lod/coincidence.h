@@ -7,17 +7,17 @@
 
 namespace ist {
 
-/// How nearly two copies of one asset coincide. Sphere upon equal sphere, the sum of lenses counts
-/// ∫ρ² where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 6 to 9 %
-/// too much (docs/design.md 5). A level of detail against the next coarser one has nothing of the
-/// kind: its spheres are others. So as copies come to coincide, such unlike levels take over: the
-/// mean of both ways round, which has no force where the copies coincide.
+/// How nearly two copies of one asset coincide. If each sphere lies on its copy, the sum of lenses
+/// is ∫ρ², where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 6 to 9 %
+/// too much (docs/design.md 5). A level of detail against the next coarser one has other spheres
+/// and no such excess. So as copies come to coincide, such unlike levels take over: the mean of
+/// both orders, which has no force where the copies coincide.
 struct CoincidenceWeight {
-  double weight = 0;  ///< [0, 1] part of the unlike levels; 0 from 1.6 mean radii of way on
+  double weight = 0;  ///< [0, 1] part of the unlike levels; 0 from a displacement of 1.6 mean radii
   PoseSlope slope;
 };
 
-/// The weight for two copies of a tree: smooth in the pose, by the root mean square way between
+/// The weight for two copies of a tree: smooth in the pose, by the root mean square displacement of
 /// equal points of the two, as if the tree filled its root ball.
 IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], double mean_radius,
                                                    const Similarity& a_from_b) noexcept {
@@ -26,12 +26,12 @@ IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], doub
   const double centre[3] = {root[0], root[1], root[2]};
   double moved[3];
   a_from_b.apply(centre, moved);
-  const Vec3 way = {moved[0] - centre[0], moved[1] - centre[1], moved[2] - centre[2]};
+  const Vec3 displacement = {moved[0] - centre[0], moved[1] - centre[1], moved[2] - centre[2]};
   const Vec3 lever = {moved[0] - t0[0], moved[1] - t0[1], moved[2] - t0[2]};
-  // Of a ball's points the mean square by each axis is r²/5.
+  // The mean square of each coordinate over a ball is r²/5.
   const double spread = root[3] * root[3] / 5, scale = a_from_b.scale;
   const double turned = 3 * (scale * scale + 1) - 2 * ((m[0] + m[4]) + m[8]);
-  const double square = dot(way, way) + spread * (turned > 0 ? turned : 0);
+  const double square = dot(displacement, displacement) + spread * (turned > 0 ? turned : 0);
   CoincidenceWeight result;
   if (!(square < (kCopyApart * kCopyApart) * (mean_radius * mean_radius))) return result;
   const double distance = std::sqrt(square);
@@ -39,9 +39,9 @@ IST_HD inline CoincidenceWeight coincidence_weight(const double (&root)[4], doub
   result.weight = smooth_step(part);
   if (part >= 1) return result;
   const double slope = -smooth_slope(part) / ((kCopyApart - kCopyAlone) * mean_radius) / distance;
-  result.slope.by_translation = slope * way;
+  result.slope.by_translation = slope * displacement;
   result.slope.by_rotation =
-      slope * (cross(lever, way) - spread * Vec3{m[5] - m[7], m[6] - m[2], m[1] - m[3]});
+      slope * (cross(lever, displacement) - spread * Vec3{m[5] - m[7], m[6] - m[2], m[1] - m[3]});
   return result;
 }
 

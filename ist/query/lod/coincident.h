@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// Whether both are the same bytes, and hold a coarser level.
+/// Whether both are the same bytes, and contain a coarser level.
 inline bool are_one_asset(const AssetHeader& a, const AssetHeader& b) noexcept {
   return a.detail_count > 0 &&
          (&a == &b || (a.content_hash == b.content_hash && a.file_bytes == b.file_bytes));

@@ -16,11 +16,11 @@ namespace ist {
 namespace {
 
 /// Asks pairs of levels one after another under the limits that they share.
-class DetailQueries {
+class LevelQueries {
  public:
-  DetailQueries(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-                const PenetrationSettings& settings, Workspace& workspace, ExactMeasure exact,
-                LargestPart* largest) noexcept
+  LevelQueries(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
+               const PenetrationSettings& settings, Workspace& workspace, ExactMeasure exact,
+               LargestPart* largest) noexcept
       : placed_a_(a),
         placed_b_(b),
         a_(a.asset.header()),
@@ -40,7 +40,7 @@ class DetailQueries {
 
   /// The whole sum of a pair of levels, rounded as it may be: where lenses graze they are few, and
   /// the finest level is taken anyway.
-  Penetration coarse_estimate(const DetailPair& pair) noexcept {
+  Penetration coarse_estimate(const LevelPair& pair) noexcept {
     DescentLimits limits = limits_left();
     limits.keep_rounding = true;
     return counted(sum(pair, limits));
@@ -48,10 +48,10 @@ class DetailQueries {
 
   /// The sum of a pair of levels; of copies of one asset that all but coincide, that of unlike
   /// levels instead, unless the exact measure answers there. `most`: its weight is the largest.
-  Penetration ask(const DetailPair& pair, bool most, bool keep_rounding = false) noexcept {
+  Penetration ask(const LevelPair& pair, bool most, bool keep_rounding = false) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
     if (coincidence.weight == 0 || has_exact_) return descend(pair, most, keep_rounding);
-    DetailPair unlike[2] = {pair, pair};
+    LevelPair unlike[2] = {pair, pair};
     unlike[0].b = unlike[1].a = pair.a < a_.detail_count ? pair.a + 1 : pair.a - 1;
     const bool mostly_unlike = coincidence.weight >= 0.5;
     Penetration other = mix(descend(unlike[0], most && mostly_unlike, keep_rounding),
@@ -64,7 +64,7 @@ class DetailQueries {
   }
 
   /// Whether asking a pair of levels is no more than its coarse estimate.
-  bool is_estimate(const DetailPair& pair, bool most) const noexcept {
+  bool is_estimate(const LevelPair& pair, bool most) const noexcept {
     return !(most && sorts()) && (has_exact_ || coincidence_weight_of(pair).weight == 0);
   }
 
@@ -80,12 +80,12 @@ class DetailQueries {
                              exact_(placed_a_, placed_b_, settings, pose_, workspace_), settings));
   }
 
-  QuickLook look(const DetailPair& pair, bool slopes) const noexcept {
+  QuickLook look(const LevelPair& pair, bool slopes) const noexcept {
     return quick_look({a_, matched_tree(a_, pair.a)}, {b_, matched_tree(b_, pair.b)},
                       pose_.a_from_b, slopes);
   }
 
-  CoincidenceWeight coincidence_weight_of(const DetailPair& pair) const noexcept {
+  CoincidenceWeight coincidence_weight_of(const LevelPair& pair) const noexcept {
     if (!same_asset_ || pair.a != pair.b) return {};
     const TreeHeader& tree = matched_tree(a_, pair.a);
     return coincidence_weight(tree.root, tree.mean_radius, pose_.a_from_b);
@@ -106,7 +106,7 @@ class DetailQueries {
     return limits;
   }
 
-  Penetration sum(const DetailPair& pair, const DescentLimits& limits) const noexcept {
+  Penetration sum(const LevelPair& pair, const DescentLimits& limits) const noexcept {
     return lens_sum(placed_a_, matched_tree(a_, pair.a), placed_b_, matched_tree(b_, pair.b), pose_,
                     limits, *workspace_.impl());
   }
@@ -117,7 +117,7 @@ class DetailQueries {
     return answer;
   }
 
-  Penetration descend(const DetailPair& pair, bool most, bool keep_rounding) noexcept {
+  Penetration descend(const LevelPair& pair, bool most, bool keep_rounding) noexcept {
     DescentLimits limits = limits_left();
     limits.keep_rounding = keep_rounding;
     return counted(most && sorts() ? largest_->level(pair, limits) : sum(pair, limits));
@@ -159,7 +159,7 @@ void add(double weight, const Penetration& part, Penetration& sum) {
 // The part of the accepted error by which volumes about the smaller solid's are kept within it.
 constexpr double kCapWidth = 0.1;
 
-/// What a level says, no more than `most`, the smaller solid's volume: smooth, with its slope.
+/// A level's answer, limited smoothly to `most`, the smaller solid's volume, with its slope.
 Penetration kept_within_solid(Penetration part, double most, double error) {
   const double width = kCapWidth * std::min(error, 1.0) * most;
   if (!(width > 0) || !std::isfinite(most) || !(part.volume_max > most - width)) return part;
@@ -176,9 +176,9 @@ Penetration kept_within_solid(Penetration part, double most, double error) {
   return part;
 }
 
-/// What is known where a limit stopped the coarse estimate: any level might have been meant.
-Penetration stopped_blend(DetailQueries& queries, const PlacedAsset& a, const PlacedAsset& b,
-                          const PenetrationSettings& settings, const DetailChain& chain,
+/// Bounds for a coarse estimate that a limit stopped: any level might have been chosen.
+Penetration stopped_blend(LevelQueries& queries, const PlacedAsset& a, const PlacedAsset& b,
+                          const PenetrationSettings& settings, const LevelChain& chain,
                           const Penetration& coarse) {
   Penetration result = coarse;
   if (queries.sorts()) queries.ask(chain.coarsest(), true);
@@ -193,13 +193,13 @@ Penetration stopped_blend(DetailQueries& queries, const PlacedAsset& a, const Pl
   return result;
 }
 
-/// Who gives which part of a blend.
+/// The shares of levels and measures in a blend.
 struct BlendShares {
   WantedError::Shares wanted;  ///< by errors; nothing is the exact measure's if it can't answer
-  DetailChain::Weights weights = {};  ///< of levels: what of `wanted` the pair budget affords
-  DetailWeight sure = {};             ///< the finest level's, whatever the coarse estimate is
-  bool missed = false;                ///< nothing is exact enough
-  std::size_t largest = 0;            ///< level
+  LevelChain::Weights weights = {};  ///< of levels: what of `wanted` the pair budget affords
+  LevelWeight sure = {};             ///< the finest level's, whatever the coarse estimate is
+  bool missed = false;               ///< nothing is exact enough
+  std::size_t largest = 0;           ///< level
   bool mostly_exact = false;
 
   double weight(std::size_t i) const {
@@ -207,13 +207,13 @@ struct BlendShares {
   }
 };
 
-BlendShares share_blend(const DetailChain& chain, const WantedError* wanted, bool has_exact,
-                        const DetailWeight& sure, double budget, double estimate) {
+BlendShares share_blend(const LevelChain& chain, const WantedError* wanted, bool has_exact,
+                        const LevelWeight& sure, double budget, double estimate) {
   BlendShares shares;
   shares.sure = sure;
   if (wanted != nullptr) shares.wanted = wanted->shares(estimate);
   // Where nothing is exact enough, the finest level is the best.
-  DetailWeight& finest = shares.wanted.levels[0];
+  LevelWeight& finest = shares.wanted.levels[0];
   shares.missed = wanted != nullptr && !has_exact && shares.wanted.rest.weight > 0;
   if (!has_exact) finest = finest + std::exchange(shares.wanted.rest, {});
   shares.weights =
@@ -228,7 +228,7 @@ BlendShares share_blend(const DetailChain& chain, const WantedError* wanted, boo
 class BlendSum {
  public:
   /// `wanted`: null without a wanted error. `most` [u³]: the smaller solid's volume.
-  BlendSum(DetailQueries& queries, const DetailChain& chain, const WantedError* wanted,
+  BlendSum(LevelQueries& queries, const LevelChain& chain, const WantedError* wanted,
            const BlendShares& shares, const Penetration& coarse,
            const PenetrationSettings& settings, double most, const RelativePose& pose) noexcept
       : queries_(queries),
@@ -247,7 +247,7 @@ class BlendSum {
   Penetration sum() noexcept {
     for (std::size_t i = chain_.size(); i-- > 0;)  // the coarse ones first: they are sure to end
       if (shares_.weight(i) > 0 || shares_.weights[i].slope != 0) add_level(i);
-    const DetailWeight& rest = shares_.wanted.rest;
+    const LevelWeight& rest = shares_.wanted.rest;
     exact_weight_.volume += rest.weight;
     if (rest.slope != 0) exact_slope_ += rest.slope / pose_.unit3();
     if (exact_weight_.volume > 0 || exact_slope_ != 0) add_exact();
@@ -270,7 +270,7 @@ class BlendSum {
  private:
   static double width(const Penetration& part) { return part.volume_max - part.volume_min; }
 
-  Penetration ask(const DetailPair& pair, bool most) {
+  Penetration ask(const LevelPair& pair, bool most) {
     if (pair.a == chain_.coarsest().a && pair.b == chain_.coarsest().b && !rough_ &&
         queries_.is_estimate(pair, most))
       return coarse_;
@@ -278,7 +278,7 @@ class BlendSum {
   }
 
   void add_level(std::size_t i) {
-    const DetailWeight &of_rest = shares_.weights[i], &sure = shares_.sure;
+    const LevelWeight &of_rest = shares_.weights[i], &sure = shares_.sure;
     const double weight = shares_.weight(i);
     const Penetration raw = ask(chain_[i], i == shares_.largest && !shares_.mostly_exact);
     const Penetration part =
@@ -344,8 +344,8 @@ class BlendSum {
     sum_.contact_normal = part.contact_normal;
   }
 
-  DetailQueries& queries_;
-  const DetailChain& chain_;
+  LevelQueries& queries_;
+  const LevelChain& chain_;
   const WantedError* const wanted_;
   const BlendShares& shares_;
   const Penetration& coarse_;
@@ -362,23 +362,23 @@ class BlendSum {
   double exact_slope_ = 0;    ///< … the coarse estimate
   double slope_ = 0;          ///< of the sum by the coarse estimate
   double sure_slope_ = 0;     ///< and by the quick look
-  // Of the sum and of the exact measure's weight, as volumes that decide weights are rounded:
+  // Rounding of the sum and of the exact measure's weight, since volumes decide weights:
   double doubt_ = 0, weight_doubt_ = 0;
   double largest_volume_ = 0;  ///< of levels
 };
 
 }  // namespace
 
-Penetration blend_details(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-                          const PenetrationSettings& settings, Workspace& workspace,
-                          ExactMeasure exact, LargestPart* largest) noexcept {
-  DetailQueries queries(a, b, pose, settings, workspace, exact, largest);
+Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
+                         const PenetrationSettings& settings, Workspace& workspace,
+                         ExactMeasure exact, LargestPart* largest) noexcept {
+  LevelQueries queries(a, b, pose, settings, workspace, exact, largest);
   const bool with_error = by_error(settings);
-  if (!with_error && settings.pair_budget == 0) return queries.ask(DetailPair(), true);
-  const DetailChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
+  if (!with_error && settings.pair_budget == 0) return queries.ask(LevelPair(), true);
+  const LevelChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
   // Nothing to choose, or nothing dear.
   if (!with_error && chain.size() == 1) return queries.ask(chain[0], true);
-  DetailWeight sure = {};
+  LevelWeight sure = {};
   if (!with_error) {
     sure = chain.quick_weight(queries.look(chain.coarsest(), false).volume, settings.pair_budget);
     if (sure.weight == 1) return queries.ask(chain[0], true);

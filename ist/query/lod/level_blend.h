@@ -12,7 +12,7 @@ namespace ist {
 class LargestPart {
  public:
   /// A pair of levels, in place of lens_sum().
-  virtual Penetration level(const DetailPair& pair, const DescentLimits& limits) noexcept = 0;
+  virtual Penetration level(const LevelPair& pair, const DescentLimits& limits) noexcept = 0;
   /// The exact measure, in place of ExactMeasure.
   virtual Penetration exact(const PenetrationSettings& settings) noexcept = 0;
 
@@ -26,12 +26,12 @@ using ExactMeasure = Penetration (*)(const PlacedAsset& a, const PlacedAsset& b,
                                      Workspace& workspace) noexcept;
 
 /// The penetration from levels of detail. Under a wanted error they and the exact measure are
-/// blended by what they err (WantedError), under a pair budget by what they need (DetailChain), and
+/// blended by what they err (WantedError), under a pair budget by what they need (LevelChain), and
 /// without either the finest answers; copies of one asset that all but coincide are asked as unlike
 /// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null
 /// where that part is summed as the others. No allocation, lock or exception.
-Penetration blend_details(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-                          const PenetrationSettings& settings, Workspace& workspace,
-                          ExactMeasure exact, LargestPart* largest = nullptr) noexcept;
+Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
+                         const PenetrationSettings& settings, Workspace& workspace,
+                         ExactMeasure exact, LargestPart* largest = nullptr) noexcept;
 
 }  // namespace ist

@@ -2,18 +2,18 @@
 
 namespace ist {
 
-DetailChain::DetailChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept {
+LevelChain::LevelChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept {
   plan(
       a.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(a, i)); },
       b.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(b, i)); }, scale);
 }
 
-DetailChain::Weights DetailChain::weights(double coarse, double budget,
-                                          const Weights& wanted) const noexcept {
+LevelChain::Weights LevelChain::weights(double coarse, double budget,
+                                        const Weights& wanted) const noexcept {
   Weights weights = {};
   share(
       coarse, budget, [&](std::size_t i) { return wanted[i]; },
-      [&](std::size_t i, const DetailWeight& weight) { weights[i] = weight; });
+      [&](std::size_t i, const LevelWeight& weight) { weights[i] = weight; });
   return weights;
 }
 

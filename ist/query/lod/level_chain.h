@@ -15,14 +15,14 @@ namespace ist {
 ///
 /// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
 /// *coarse estimate*: a smooth function of the pose, so that an answer may be blended by it.
-class DetailChain {
+class LevelChain {
  public:
   static constexpr std::size_t kMost = 2 * kMaxDetails + 1;
-  using Weights = std::array<DetailWeight, kMost>;
+  using Weights = std::array<LevelWeight, kMost>;
 
-  DetailChain() = default;  ///< not planned
+  LevelChain() = default;  ///< not planned
   /// `scale`: of B in A's unit frame.
-  DetailChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept;
+  LevelChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept;
 
   /// `level_…(i)`: level i of an asset, which has `coarser_…` levels after the finest.
   template <class LevelA, class LevelB>
@@ -39,13 +39,13 @@ class DetailChain {
   }
 
   IST_HD std::size_t size() const noexcept { return size_; }
-  IST_HD const DetailPair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
-  IST_HD const DetailPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
+  IST_HD const LevelPair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
+  IST_HD const LevelPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
 
   /// Part of the answer that the finest pair gives whatever a coarse estimate would say, by what a
   /// quick look sees (docs/design.md 5), with the slope: 1 while that needs no more than 0.35 of
   /// `budget`, 0 from a half on.
-  IST_HD DetailWeight quick_weight(double look, double budget) const noexcept {
+  IST_HD LevelWeight quick_weight(double look, double budget) const noexcept {
     return affordable(pairs_[0], look, budget, kLookAlone, kLookNone);
   }
 
@@ -58,9 +58,9 @@ class DetailChain {
   template <class Wanted, class Visit>
   IST_HD void share(double coarse, double budget, const Wanted& wanted,
                     const Visit& visit) const noexcept {
-    DetailWeight rest = {};
+    LevelWeight rest = {};
     for (std::uint32_t i = 0; i + 1 < size_; ++i) {
-      const DetailWeight part = affordable(pairs_[i], coarse, budget, kLevelAlone, kLevelNone);
+      const LevelWeight part = affordable(pairs_[i], coarse, budget, kLevelAlone, kLevelNone);
       rest = rest + wanted(i);
       visit(i, rest * part);
       rest = rest * complement(part);
@@ -69,10 +69,10 @@ class DetailChain {
   }
 
   Weights weights(double coarse, double budget,
-                  const Weights& wanted = {DetailWeight{1, 0}}) const noexcept;
+                  const Weights& wanted = {LevelWeight{1, 0}}) const noexcept;
 
  private:
-  DetailPair pairs_[kMost];
+  LevelPair pairs_[kMost];
   std::uint32_t size_;
 };
 

@@ -9,7 +9,7 @@
 #include "query/asset/shared_constants.h"
 #include "query/base/smooth_step.h"
 
-// What levels of detail cost and which part of an answer each gives, on the CPU and on the GPU.
+// Costs and weights of levels of detail, on the CPU and on the GPU.
 
 namespace ist {
 
@@ -25,33 +25,33 @@ struct LevelCost {
 };
 
 /// Levels of detail of two assets that are asked together.
-struct DetailPair {
+struct LevelPair {
   std::uint32_t a, b;  ///< 0: the finest
 
-  // What the expected number of sphere pairs is made of, A's unit frame.
+  // The parts of the expected number of sphere pairs, A's unit frame.
   double density;  ///< pairs over volume of overlap
   double skin;     ///< √volume: makes up for the rim of a shallow contact
 };
 
 /// Part of an answer that one pair of levels gives.
-struct DetailWeight {
+struct LevelWeight {
   double weight;  ///< [0, 1]
   double slope;   ///< d weight / d estimate of the overlap
 
-  IST_HD friend DetailWeight operator*(const DetailWeight& x, const DetailWeight& y) noexcept {
+  IST_HD friend LevelWeight operator*(const LevelWeight& x, const LevelWeight& y) noexcept {
     return {x.weight * y.weight, x.slope * y.weight + x.weight * y.slope};
   }
-  IST_HD friend DetailWeight operator+(const DetailWeight& x, const DetailWeight& y) noexcept {
+  IST_HD friend LevelWeight operator+(const LevelWeight& x, const LevelWeight& y) noexcept {
     return {x.weight + y.weight, x.slope + y.slope};
   }
 };
-IST_HD inline DetailWeight complement(const DetailWeight& x) noexcept {
+IST_HD inline LevelWeight complement(const LevelWeight& x) noexcept {
   return {1 - x.weight, -x.slope};
 }
 
 /// The levels a and b of two assets. `scale`: of B in A's unit frame.
-IST_HD inline DetailPair detail_pair(std::uint32_t a, const LevelCost& of_a, std::uint32_t b,
-                                     const LevelCost& of_b, double scale) noexcept {
+IST_HD inline LevelPair detail_pair(std::uint32_t a, const LevelCost& of_a, std::uint32_t b,
+                                    const LevelCost& of_b, double scale) noexcept {
   const double volume_b = of_b.volume_sum * (scale * scale * scale);
   const double reach = of_a.mean_radius + of_b.mean_radius * scale;
   const double size = of_b.reach * scale < of_a.reach ? of_b.reach * scale : of_a.reach;
@@ -61,7 +61,7 @@ IST_HD inline DetailPair detail_pair(std::uint32_t a, const LevelCost& of_a, std
           kPairRim * reach * std::sqrt(size)};
 }
 
-/// Goes on to the next coarser level of A, of B, or of both (DetailChain), as far as there are
+/// Goes on to the next coarser level of A, of B, or of both (LevelChain), as far as there are
 /// `more`. Radii are the levels' mean ones, A's unit frame.
 IST_HD inline void step_coarser(bool more_a, bool more_b, double radius_a, double radius_b,
                                 std::uint32_t& a, std::uint32_t& b) noexcept {
@@ -72,14 +72,14 @@ IST_HD inline void step_coarser(bool more_a, bool more_b, double radius_a, doubl
 }
 
 /// About how many sphere pairs a pair of levels needs for an overlap, A's unit frame.
-IST_HD inline double expected_pairs(const DetailPair& pair, double overlap) noexcept {
+IST_HD inline double expected_pairs(const LevelPair& pair, double overlap) noexcept {
   return pair.density * (overlap + pair.skin * std::sqrt(overlap));
 }
 
 /// 1 where a pair of levels needs no more than the part `alone` of the budget by an estimate of the
 /// overlap, 0 from `none` on, with its slope by the estimate.
-IST_HD inline DetailWeight affordable(const DetailPair& pair, double estimate, double budget,
-                                      double alone, double none) noexcept {
+IST_HD inline LevelWeight affordable(const LevelPair& pair, double estimate, double budget,
+                                     double alone, double none) noexcept {
   const double expected = expected_pairs(pair, estimate);
   // (written so that a damaged asset's NaN takes the coarsest level)
   const double t = expected < none * budget ? (none - expected / budget) / (none - alone) : 0;

@@ -84,7 +84,7 @@ PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
     return {};
   const PairMethod method =
       method_by_grains(a.asset.header(), b.asset.header(), pose->a_from_b.scale);
-  // Under a wanted error blend_details() has the exact measure for what spheres cannot do.
+  // Under a wanted error blend_levels() has the exact measure for what spheres cannot do.
   const bool has_own = by_error(settings) && settings.pair_budget == 0;
   return method.spheres && has_own ? PairMethod() : method;
 }

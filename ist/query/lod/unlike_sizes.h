@@ -45,7 +45,7 @@ ExactWeight exact_weight(const PairMethod& method, const Penetration& spheres,
 std::optional<PenetrationSettings> left_for_exact(PenetrationSettings settings,
                                                   std::uint32_t spent) noexcept;
 
-/// What spheres say where no visits are left for the exact query.
+/// The spheres' answer if no visits are left for the exact query.
 Penetration without_exact(const PlacedAsset& a, const PlacedAsset& b, Penetration spheres) noexcept;
 
 /// Both sums by weight, with the counts of both. `unit3`: volume of A's unit.

@@ -83,7 +83,7 @@ double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept {
 }
 
 WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-                         const PenetrationSettings& settings, const DetailChain& chain,
+                         const PenetrationSettings& settings, const LevelChain& chain,
                          bool exact) noexcept
     : error_(std::min(settings.relative_error, 1.0)), size_(chain.size()) {
   const AssetHeader& asset_a = a.asset.header();
@@ -116,8 +116,8 @@ WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const Relat
     double& from = from_[i];
     from = overlap_for(tree_a, tree_b, error_);
     if (wider_[i] >= kLeastWider) {
-      // What the coarser one does not confirm is answered twice. It does in half of the poses and
-      // more from where its median error is small enough for that.
+      // A level that the coarser one does not confirm costs two answers. It is confirmed in half of
+      // the poses and more once the coarser one's median error is small enough.
       from = std::max(from, overlap_for(wide_a, wide_b, kMostOverMedian * wider_[i] * error_));
     } else {
       from = std::numeric_limits<double>::infinity();
@@ -139,14 +139,14 @@ bool WantedError::by_spheres() const noexcept {
 
 WantedError::Shares WantedError::shares(double coarse) const noexcept {
   Shares shares;
-  DetailWeight& rest = shares.rest;
+  LevelWeight& rest = shares.rest;
   for (std::size_t i = size_; i-- > 0;) {
     const double from = from_[i];
     // (so that a damaged asset's NaN is never exact enough)
     const double t = coarse > kTooRough * from
                          ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0)
                          : 0;
-    const DetailWeight part{smooth_step(t), t < 1 ? smooth_slope(t) / ((1 - kTooRough) * from) : 0};
+    const LevelWeight part{smooth_step(t), t < 1 ? smooth_slope(t) / ((1 - kTooRough) * from) : 0};
     shares.levels[i] = rest * part;
     rest = rest * complement(part);
   }

@@ -29,7 +29,7 @@ inline Penetration with_error_status(Penetration exact,
 /// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
 double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept;
 
-/// What of an answer is left with a level after its comparison with a coarser one, and its slopes.
+/// The weight that a level keeps after its comparison with a coarser one, and its slopes.
 struct LevelTrust {
   double weight = 0;                ///< [0, 1]
   double by_own = 0, by_other = 0;  ///< [1/u³] by the level's volume, by the coarser one's
@@ -41,34 +41,34 @@ class WantedError {
  public:
   /// `exact`: the exact measure may answer.
   WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
-              const PenetrationSettings& settings, const DetailChain& chain, bool exact) noexcept;
+              const PenetrationSettings& settings, const LevelChain& chain, bool exact) noexcept;
 
   /// Some level is exact enough at some overlap.
   bool by_spheres() const noexcept;
 
   struct Shares {
-    DetailChain::Weights levels = {};  ///< of the chain
-    DetailWeight rest{1, 0};           ///< at which no level is exact enough
+    LevelChain::Weights levels = {};  ///< of the chain
+    LevelWeight rest{1, 0};           ///< at which no level is exact enough
   };
   /// Parts of the answer, which sum to 1: all of it is the coarsest pair's from the overlap on at
   /// which that is exact enough, none up to 0.7 of that; what is left goes to the next finer pair
   /// by the same rule. Continuous in the coarse estimate, A's unit frame, with the slope.
   Shares shares(double coarse) const noexcept;
 
-  /// What pair i is compared with: both sides a level coarser, as far as there is one.
-  const DetailPair& coarser(std::size_t i) const noexcept { return coarser_[i]; }
-  /// The prediction is of random poses. In others, such as of flush faces and solids in one place,
-  /// what spheres stick out and leave room adds up: an error in proportion to their radius, which
-  /// a coarser level tells. It is trusted where the error that follows is below the accepted one,
-  /// and where it says no more than `most`, the smaller solid's volume. [u³]
+  /// The partner of pair i in comparisons: both sides a level coarser, as far as there is one.
+  const LevelPair& coarser(std::size_t i) const noexcept { return coarser_[i]; }
+  /// The prediction is made from random poses. In others, such as flush faces and solids in one
+  /// place, the protrusions and gaps of spheres add up to an error in proportion to their radius,
+  /// which a coarser level reveals. The level is trusted if the error derived from that is below
+  /// the accepted one, and if it says no more than `most`, the smaller solid's volume. [u³]
   LevelTrust trust(std::size_t i, double own, double other, double most) const noexcept;
 
  private:
   const double error_;
   std::size_t size_;
-  std::array<DetailPair, DetailChain::kMost> coarser_;
-  std::array<double, DetailChain::kMost> wider_;  ///< radii of coarser_, less 1
-  std::array<double, DetailChain::kMost> from_;   ///< overlap, A's unit frame; infinity: never
+  std::array<LevelPair, LevelChain::kMost> coarser_;
+  std::array<double, LevelChain::kMost> wider_;  ///< radii of coarser_, less 1
+  std::array<double, LevelChain::kMost> from_;   ///< overlap, A's unit frame; infinity: never
 };
 
 }  // namespace ist

@@ -26,13 +26,9 @@ class ShapeMeetingSearch {
   }
 
   YesNo run() noexcept {
-    NodePair pair{0, 0, tree_.top, 0};
     if (gap(tree_.ball(tree_.top, 0).centre, tree_.header->root_cover) > error_) return YesNo::no;
-    do {
-      if (!waiting_.grant()) return YesNo::unknown;
-      if (open(pair)) return YesNo::yes;
-    } while (waiting_.take_best(covers_meet_, pair));
-    return covers_meet_ ? YesNo::unknown : YesNo::no;
+    return waiting_.search({0, 0, tree_.top, 0}, covers_meet_,
+                           [&](const NodePair& pair) { return open(pair); });
   }
 
  private:

@@ -23,7 +23,7 @@ struct PlainSample {
   double gradient[3];
 };
 
-/// What of a ball is inside a shape.
+/// The part of a ball inside a shape.
 struct BallPart {
   double volume;
   double area;         ///< of the surface in the ball
@@ -130,8 +130,8 @@ struct PlainCylinder {
   }
 };
 
-/// Linear interpolation in the grid's cells; outside, the nearest point of the grid and the way to
-/// it.
+/// Linear interpolation in the grid's cells; outside, the value at the nearest point of the grid
+/// plus the distance to it.
 struct PlainGrid {
   const float* distances;
   std::uint32_t size[3];
@@ -139,7 +139,7 @@ struct PlainGrid {
   double spacing;
   double error;
 
-  /// `sound` becomes false where the grid holds what is no number.
+  /// `sound` becomes false where the grid contains what is no number.
   IST_HD PlainSample sample(const double (&x)[3], bool& sound) const {
     const PlainSample at = interpolated(x);
     if (std::fabs(at.distance) <= kLongestLength && dot(at.gradient, at.gradient) <= 1e300)
@@ -235,7 +235,7 @@ struct PlainBox {
 
   /// Corners of a triangle, counter-clockwise from outside.
   IST_HD void corners(std::uint32_t triangle, double (&c)[3][3]) const {
-    // Of the faces, four bits each.
+    // The corners of the faces, four bits each.
     constexpr std::uint32_t kFaces[6] = {0x2640, 0x5731, 0x4510, 0x3762, 0x1320, 0x6754};
     const std::uint32_t face = kFaces[triangle / 2], first = 1 + triangle % 2;
     for (std::uint32_t k = 0; k < 3; ++k) {

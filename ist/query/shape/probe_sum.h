@@ -12,8 +12,8 @@
 
 namespace ist {
 
-/// What the parts of balls inside a shape add up to, in its frame; positions are relative to the
-/// probing tree's unit-frame origin.
+/// Sums over the parts of balls inside a shape, in its frame; positions are relative to the probing
+/// tree's unit-frame origin.
 struct ProbeTotal {
   Overlap overlap;     ///< its error is left to the descent
   double area = 0;     ///< of the shape's surface inside the balls

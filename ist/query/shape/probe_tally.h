@@ -13,16 +13,14 @@
 
 namespace ist {
 
-/// What a descent of a tree against a surface has found out: balls that were summed, nodes that are
-/// inside as a whole, nodes that were not opened, of which nobody knows. With bins all of it is
+/// The result of a descent of a tree against a surface: balls that were summed, nodes that are
+/// wholly inside, and nodes that were not opened, which may be either. With bins all of it is
 /// sorted into them too.
 class ProbeTally {
  public:
   /// All arguments must outlive the tally.
   ProbeTally(const SphereTree& probes, const RelativePose& pose, ContactBins* bins) noexcept
       : probes_(probes), pose_(pose), map_(pose.a_from_b), bins_(bins) {}
-
-  bool has_bins() const noexcept { return bins_ != nullptr; }
 
   /// A leaf block, its balls summed.
   void add(std::uint32_t block, const ProbeTotal& part) noexcept {
@@ -59,7 +57,7 @@ class ProbeTally {
     stopped_ = true;
   }
 
-  /// Of a node's spheres, the surface's unit frame.
+  /// The volume of a node's spheres, the surface's unit frame.
   double volume_of(int level, std::uint32_t block) const noexcept {
     return probes_.sums(level, block).volume * (map_.scale * map_.scale * map_.scale);
   }

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// An overlap in world units, its volume held within the bounds on it, A's unit frame.
+/// An overlap in world units, its volume limited to the bounds on it, A's unit frame.
 Penetration world_answer(const Overlap& overlap, double lowest, double highest,
                          const RelativePose& pose) noexcept;
 

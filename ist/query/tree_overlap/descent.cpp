@@ -178,7 +178,7 @@ void Descent::choose() {
   std::nth_element(ranked, last, ranked + now.size, before);
   std::size_t chosen = 0, others = left;
   for (std::size_t i = 0; i < now.size; ++i) {
-    // (both lists stay within their room even if a damaged asset's bounds are no numbers)
+    // (both lists stay within their capacity even if a damaged asset's bounds are NaN)
     const bool is_other =
         others < now.size && (chosen == left || before(*last, {bounds[i], now.a[i], now.b[i]}));
     std::size_t& to = is_other ? others : chosen;

@@ -43,20 +43,20 @@ class Descent {
   /// Best answer: what was summed and a guess of the rest.
   Overlap overlap() const;
 
-  /// What was summed, without guesses.
+  /// The summed part, without estimates.
   Overlap sure() const;
 
   /// Opens one side of every pair of the current list. False if the budget stopped it.
   bool open_level();
 
   /// Opens pairs [from, from + n) of the current list into the next. Nodes that a sphere of the
-  /// standing side holds are added up instead.
+  /// standing side contains are added up instead.
   void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
 
   /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
   void add_contained(bool of_a, int level, const ContainedNodes& contained);
 
-  /// What spheres of A, or of B, add that lie in one of the other side.
+  /// The part of spheres of A, or of B, that lie within a sphere of the other side.
   Overlap contained_overlap(bool of_a, const SubtreeSums& contained) const;
 
   void open_leaves();
@@ -68,7 +68,7 @@ class Descent {
   /// are more. Otherwise they stay in order, as neighbours share nodes.
   void choose();
 
-  /// What ranks the pairs of the current list, from the largest bound down.
+  /// Ranks the pairs of the current list, from the largest bound down.
   double bound(std::size_t i) const;
 
   /// Guesses the pairs from `from` on.

@@ -25,8 +25,17 @@ class OpenRuns {
         visits_left_(static_cast<std::uint32_t>(
             std::min<std::size_t>(kMostVisits, scratch.capacity / kWidth))) {}
 
-  /// Whether one more pair may be opened.
-  bool grant() noexcept { return visits_left_-- > 0; }
+  /// Opens pairs from `pair` on. open(pair): adds children and returns whether solids overlap for
+  /// certain. `covers_meet`: whether covers that touch were found so far; then the answer is not
+  /// no, and what only may_meet is left out.
+  template <class Open>
+  YesNo search(NodePair pair, const bool& covers_meet, const Open& open) noexcept {
+    do {
+      if (visits_left_-- == 0) return YesNo::unknown;
+      if (open(pair)) return YesNo::yes;
+    } while (take_best(covers_meet, pair));
+    return covers_meet ? YesNo::unknown : YesNo::no;
+  }
 
   /// Children of `parent` follow: of its node in A, or in B.
   void start(const NodePair& parent, bool of_a) noexcept {
@@ -55,6 +64,7 @@ class OpenRuns {
                      static_cast<std::int16_t>(parent_.level_b - (of_a_ ? 0 : 1))};
   }
 
+ private:
   /// Takes out the best; false if there is none, or only such as come last and `without_last`.
   bool take_best(bool without_last, NodePair& best) noexcept {
     if (runs_ == 0) return false;
@@ -74,8 +84,8 @@ class OpenRuns {
     return true;
   }
 
- private:
-  // Of the distance over the sum of radii, for a level further up (measured on the oracle's poses).
+  // Added to the distance over the sum of radii for each level further up (measured on the oracle's
+  // poses).
   static constexpr double kForALevel = 0.1;
   static constexpr double kLast = 1e6;
 

@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// What a pair of nodes that was not opened may hold, in A's unit frame.
+/// Bounds for a pair of nodes that was not opened, in A's unit frame.
 struct PairEstimate {
   double bound = 0;   ///< the sum over all sphere pairs below is at most this (docs/design.md 7)
   double volume = 0;  ///< best guess: both nodes as balls of uniform density

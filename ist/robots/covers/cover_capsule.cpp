@@ -31,7 +31,7 @@ double volume_of(const CoverCapsule& c) { return volume_of(c.radius, (c.end - c.
 using Axis = std::array<double, 5>;  ///< turns of the start axis about two others, offsets along
                                      ///< these, share by which the radius grows
 
-/// The shortest capsule of that axis that holds all points.
+/// The shortest capsule of that axis that contains all points.
 class Fit {
  public:
   Fit(std::span<const Vector3d> points, const Vector3d& middle, double size,
@@ -101,7 +101,8 @@ Eigen::Matrix3d principal_axes(std::span<const Vector3d> points) {
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors();
 }
 
-/// A capsule that holds all points, with about the least volume. `rough`: in a tenth of the time.
+/// A capsule that contains all points, with about the least volume. `rough`: in a tenth of the
+/// time.
 CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false) {
   Eigen::AlignedBox3d box;
   for (const Vector3d& p : points) box.extend(p);
@@ -121,8 +122,8 @@ CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false
       best = found;
       least = volume;
     }
-  // A capsule is convex: it holds what lies between the points if it holds these. What rounding may
-  // hide is a millionth part of the margin.
+  // A capsule is convex: it contains what lies between the points if it contains these. What
+  // rounding may hide is a millionth part of the margin.
   double most = 0;
   const Vector3d along = best.end - best.begin;
   for (const Vector3d& p : points) {
@@ -137,11 +138,10 @@ CoverCapsule capsule_around(std::span<const Vector3d> points, bool rough = false
 
 constexpr std::size_t kLayers = 12;
 
-/// Of each of the layers between equidistant planes across a direction: corners of triangles in it,
-/// and where planes cut sides of triangles.
-///
-/// The solid's part in a layer lies within the hull of these points: it is bounded by parts of
-/// triangles and by flat cuts, whose borders lie in triangles too.
+/// Points of each layer between equidistant planes across a direction: corners of triangles in it,
+/// and intersections of triangles' sides with planes. The solid's part in a layer lies within the
+/// hull of these points: its boundary consists of parts of triangles and of flat cuts, whose
+/// borders lie in triangles too.
 using Layers = std::array<std::vector<Vector3d>, kLayers>;
 
 Layers layers_across(const ClosedMesh& mesh, const Vector3d& along) {

@@ -66,10 +66,10 @@ struct Slopes {
         if (const double x = g.dot(one); x < least) least = x, u = &one;
       for (const Vector3d& one : down)
         if (const double x = g.dot(one); x > most) most = x, v = &one;
-      const Vector3d way = (*u - *v) - g;
-      const double slope = -g.dot(way);
+      const Vector3d change = (*u - *v) - g;
+      const double slope = -g.dot(change);
       if (slope <= 1e-3 * g.squaredNorm()) break;
-      g += std::min(1.0, slope / way.squaredNorm()) * way;
+      g += std::min(1.0, slope / change.squaredNorm()) * change;
     }
     return g;
   }
@@ -200,10 +200,10 @@ class CoverDescent::Round {
     surface_.walls(centre, radius + 2 * trust, walls_);
     const Recentred moved = recentre(centre, needed_, walls_, trust);
     const double next = surface_.radius(moved.centre);
-    const double way = std::sqrt((moved.centre - centre).squaredNorm());
-    trust = std::clamp(way > 0 ? 2 * way : 0.5 * trust, 0.02 * surface_.level(),
+    const double moved_by = std::sqrt((moved.centre - centre).squaredNorm());
+    trust = std::clamp(moved_by > 0 ? 2 * moved_by : 0.5 * trust, 0.02 * surface_.level(),
                        0.7 * surface_.level());
-    if (!(next > 0) || !(way > 0)) return false;
+    if (!(next > 0) || !(moved_by > 0)) return false;
     targets_.within(centre, radius, [&](std::uint32_t x, float) {
       if (--holders_[x] == 0) open_.push_back(x);
     });
@@ -214,15 +214,15 @@ class CoverDescent::Round {
   }
 
   /// Levels beyond its surface a ball looks at. Where it looks further, it lets go of what it
-  /// holds, for a target that it will not reach, and gaps grow.
+  /// contains, for a target that it will not reach, and gaps grow.
   static constexpr double kReach = 0.3;
 
   const PointGrid& targets_;
   const OffsetSurface& surface_;
   const double reach_;
   Balls& balls_;
-  std::vector<int> holders_;         ///< balls that hold a target
-  std::vector<std::uint32_t> open_;  ///< targets that none holds, and some that one does by now
+  std::vector<int> holders_;         ///< balls that contain a target
+  std::vector<std::uint32_t> open_;  ///< targets that none contains, and some that one does by now
   std::vector<Vector3d> needed_, walls_;
 };
 
@@ -249,7 +249,7 @@ double CoverDescent::add_rays(const OffsetSurface& surface, const std::vector<Co
   std::vector<double> further(balls.size(), 0);
   vouched_.resize(balls.size(), {Vector3d::Zero(), 0});
   tbb::parallel_for(std::size_t{0}, balls.size(), [&](std::size_t i) {
-    // What was seen there before needs no look.
+    // A place that was examined before needs no second look.
     CoverSphere& vouched = vouched_[i];
     if (vouched.centre == balls[i].centre && level <= vouched.radius &&
         level > kVouched * vouched.radius)
@@ -287,7 +287,7 @@ double CoverDescent::add_void(const std::vector<CoverSphere>& balls, double leve
 LookedCover CoverDescent::improve(LevelCover start, int rounds, const std::function<void()>& look) {
   LookedCover looked = {std::move(start), {}};
   LevelCover& cover = looked.cover;
-  // What the samples hold at is no level yet: the first look says what it is.
+  // The level of the samples is not yet proven: the first round measures it.
   for (double step = 0; rounds > 0 && (step == 0 || step > kLastStep);) {
     const bool first = step == 0;
     const double aim = cover.level * (1 - step);

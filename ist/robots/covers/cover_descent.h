@@ -13,8 +13,8 @@
 
 namespace ist {
 
-/// Centres, and the level at which the largest balls around them (OffsetSurface::radius) hold the
-/// surface.
+/// Centres, and the level at which the largest balls around them (OffsetSurface::radius) contain
+/// the surface.
 struct LevelCover {
   std::vector<Eigen::Vector3d> centres;  ///< unit frame
   double level = 0;                      ///< unit frame
@@ -27,7 +27,7 @@ struct LookedCover {
 };
 
 /// Moves centres so that the level falls. One ball at a time: of the targets that no other ball
-/// holds at a level a little lower, its farthest is brought as near as can be.
+/// contains at a level a little lower, its farthest is brought as near as can be.
 ///
 /// What samples do not tell is looked for as it goes on: places of the surface outside all balls
 /// become targets, and places that a ball reaches beyond the level become rays.
@@ -36,10 +36,10 @@ class [[gnu::visibility("hidden")]] CoverDescent {
   /// `sampled`: takes the targets and rays that are found.
   CoverDescent(const MeshSolid& solid, SampledSolid& sampled) : solid_(solid), sampled_(sampled) {}
 
-  /// Starts from centres that hold the samples, at about the level given, and ends when the level
-  /// falls by a few thousandths no more, or after so many rounds over all balls. The level that
-  /// comes back is about that of the surface itself (open_corners(), rays): a guess.
-  /// `look` is called now and then.
+  /// Starts from centres that contain the samples, at about the level given, and ends when the
+  /// level falls by a few thousandths no more, or after so many rounds over all balls. The level
+  /// that comes back is about that of the surface itself (open_corners(), rays): a guess. `look` is
+  /// called now and then.
   LookedCover improve(LevelCover start, int rounds, const std::function<void()>& look);
 
  private:

@@ -93,7 +93,7 @@ class VoidSearch {
     double half;
   };
 
-  /// The cube is settled, or is to be divided: then `kept` holds the balls that reach into it.
+  /// The cube is settled, or is to be divided: then `kept` contains the balls that reach into it.
   enum class Verdict { settled, divide, open };
   Verdict look(const Cube& cube, const BallList& from, BallList& kept, OpenPlace& open) const {
     double gap = std::numeric_limits<double>::infinity();
@@ -147,7 +147,7 @@ class VoidSearch {
   }
 
  private:
-  /// Whether every point of the cube that is on spheres can go a little way out of all of them and
+  /// Whether every point of the cube that is on spheres can move a little out of all of them and
   /// up, so that none is the highest of a void.
   bool may_rise(const Cube& cube, const BallList& crossing) const {
     const Vector3d up(0.36, 0.48, 0.8);
@@ -156,11 +156,11 @@ class VoidSearch {
       const Vector3d d = cube.middle - balls_[i].centre;
       out += d / std::max(std::sqrt(d.squaredNorm()), kDistanceMargin);
     }
-    Vector3d way = out - out.dot(up) * up;
-    way += 1e-3 * std::sqrt(way.squaredNorm()) * up;
-    const double slack = cube.half * way.cwiseAbs().sum() + kDistanceMargin;
-    return way.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
-             return way.dot(cube.middle - balls_[i].centre) > slack;
+    Vector3d climb = out - out.dot(up) * up;
+    climb += 1e-3 * std::sqrt(climb.squaredNorm()) * up;
+    const double slack = cube.half * climb.cwiseAbs().sum() + kDistanceMargin;
+    return climb.dot(up) > 0 && std::all_of(crossing.begin(), crossing.end(), [&](std::uint32_t i) {
+             return climb.dot(cube.middle - balls_[i].centre) > slack;
            });
   }
 
@@ -174,8 +174,8 @@ BallList all_of(std::size_t count) {
   return all;
 }
 
-/// Those that no other ball holds whole: the union is the same without the others, and coincident
-/// spheres would cross everywhere.
+/// Those that no other ball contains whole: the union is the same without the others, and
+/// coincident spheres would cross everywhere.
 BallList outermost(std::span<const CoverSphere> balls) {
   BallList list;
   for (std::uint32_t i = 0; i < balls.size(); ++i) {
@@ -236,7 +236,7 @@ OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls) 
 }
 
 void grow_to_cover(const MeshSolid& solid, std::vector<CoverSphere>& balls, double finest) {
-  // What a ball is grown by for one part often holds the next.
+  // A ball that was enlarged for one part often contains the next.
   const auto take = [&](const OpenPart& part) {
     double& radius = balls[part.ball].radius;
     radius = std::max(radius, part.radius);

@@ -11,23 +11,23 @@
 
 namespace ist {
 
-/// A part of the surface that no ball is shown to hold whole.
+/// A part of the surface that no ball is shown to contain whole.
 struct OpenPart {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< unit frame
-  std::uint32_t ball = 0;                            ///< that has to grow least to hold the part
+  std::uint32_t ball = 0;                            ///< that has to grow least to contain the part
   double radius = 0;                                 ///< unit frame: and then would
-  double gap = 0;  ///< unit frame, from the middle to the nearest ball; 0: the middle is held
+  double gap = 0;  ///< unit frame, from the middle to the nearest ball; 0: the middle is contained
 };
 
 /// Parts of the mesh's triangles that may stick out of the union of the balls, unit frame. Each is
 /// small: for its own parts a ball would have to grow almost as much, by `finest` less at most, or
 /// it is small beside its gap. What is not in the list is proven: a part all of whose corners one
-/// ball holds is held, for balls are convex; other parts are divided. `most`: of a triangle, then
-/// the rest of it is left unproven.
+/// ball contains is contained, for balls are convex; other parts are divided. `most`: of a
+/// triangle, then the rest of it is left unproven.
 std::vector<OpenPart> open_surface(const MeshView& mesh, std::span<const CoverSphere> balls,
                                    double finest, std::size_t most = SIZE_MAX);
 
-/// A place inside the solid that the balls do not hold, or that could not be proven, if there is
+/// A place inside the solid that the balls do not contain, or that could not be proven, if there is
 /// one.
 struct OpenPlace {
   bool found = false;
@@ -35,10 +35,10 @@ struct OpenPlace {
   double gap = 0;                                   ///< unit frame; 0: merely not proven
 };
 
-/// Proves that balls which hold the surface leave no void inside (docs/design.md 13): of a void
+/// Proves that balls which contain the surface leave no void inside (docs/design.md 13): of a void
 /// that touches no surface the hull's corners are points where three balls' surfaces meet, so it is
-/// enough to look where three do: at cubes, divided until a ball holds them whole, fewer than three
-/// surfaces cross them, or they lie outside the solid.
+/// enough to look where three do: at cubes, divided until a ball contains them whole, fewer than
+/// three surfaces cross them, or they lie outside the solid.
 OpenPlace open_void(const MeshSolid& solid, std::span<const CoverSphere> balls);
 
 /// Makes balls just so much larger that both proofs succeed: what sticks out goes to the ball that

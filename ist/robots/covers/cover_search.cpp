@@ -21,7 +21,7 @@ namespace {
 constexpr std::uint32_t kNone = UINT32_MAX;
 constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
 
-/// Which candidate holds which targets, both ways.
+/// Which candidate contains which targets, in both directions.
 struct Incidence {
   std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate
   std::vector<std::vector<std::uint32_t>> holders;  ///< candidates of a target, ascending
@@ -39,7 +39,7 @@ struct Incidence {
     }
   }
 
-  std::int64_t pairs = 0;  ///< of a candidate and a target it holds
+  std::int64_t pairs = 0;  ///< of a candidate and a target it contains
 };
 
 /// The state of the search: what a candidate would bring, and what a chosen one would be missed
@@ -72,7 +72,8 @@ class Choice {
     return best;
   }
 
-  /// Of those that hold the target, the one that brings most and has been out since before `now`.
+  /// Among the candidates that contain the target, the one with the largest gain that has been out
+  /// since before `now`.
   std::uint32_t most_helpful_for(std::uint32_t target, std::int64_t now) const {
     std::uint32_t best = kNone;
     for (const std::uint32_t j : incidence_.holders[target]) {
@@ -84,7 +85,7 @@ class Choice {
     return best;
   }
 
-  /// Of the chosen ones but `kept`, those that are free to go first.
+  /// Among the chosen ones except `kept`, the one whose removal costs least; free ones go first.
   std::uint32_t least_missed(std::int64_t now, std::uint32_t kept) const {
     std::uint32_t best = kNone;
     const auto before = [&](std::uint32_t j, std::uint32_t k) {
@@ -166,9 +167,9 @@ class Choice {
 
   const Incidence& incidence_;
   std::vector<std::int64_t> weight_;    ///< of a target
-  std::vector<std::uint32_t> holders_;  ///< how many chosen ones hold a target
-  std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate holds
-  std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone holds
+  std::vector<std::uint32_t> holders_;  ///< how many chosen ones contain a target
+  std::vector<std::int64_t> gain_;      ///< weight of the open targets a candidate contains
+  std::vector<std::int64_t> loss_;      ///< weight of the targets a chosen one alone contains
   std::vector<std::int64_t> since_;     ///< it stays as it is until this exchange
   std::vector<char> in_;
   std::int64_t steps_ = 0;
@@ -291,7 +292,8 @@ SampledSolid sampled_for(const MeshSolid& solid, std::size_t count, const LevelS
   return sampled;
 }
 
-/// Balls hold little of the surface where their share of the level is small: then more are tried.
+/// Balls contain little of the surface where their share of the level is small: then more are
+/// tried.
 std::size_t candidate_count(const SampledSolid& sampled, std::size_t usual, std::size_t count) {
   return sampled.share ? std::max(usual, kCandidatesABall * count) : usual;
 }
@@ -315,7 +317,7 @@ LevelCover greedy_cover(const MeshSolid& solid, const SampledSolid& sampled, std
       low = level;
     }
   }
-  // One ball around the cube of the frame holds anything.
+  // One ball around the cube of the frame contains anything.
   if (best.centres.empty()) best = {{Vector3d::Zero()}, 2};
   return best;
 }
@@ -338,7 +340,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   std::int64_t steps = sampled.share ? kTightSteps : kSteps;
   for (int k = 0; k < kLevels && factor < 0.99 && steps > 0; ++k) {
     const double level = cover.level * factor;
-    // Tight edges are held by balls for their level alone.
+    // Tight edges are contained by balls for their level alone.
     if (sampled.share) candidates = candidates_at(level);
     const std::vector<CoverSphere> balls =
         candidates.balls_at(OffsetSurface(solid, sampled, level));
@@ -353,7 +355,7 @@ LevelCover exchanged(const MeshSolid& solid, const SampledSolid& sampled, LevelC
   return cover;
 }
 
-/// Of the ball that reaches furthest; `enough` where none reaches so far.
+/// The protrusion of the ball that reaches furthest; `enough` if none reaches so far.
 double largest_protrusion(const MeshSolid& solid, const std::vector<CoverSphere>& balls,
                           double enough) {
   std::vector<double> most(balls.size());

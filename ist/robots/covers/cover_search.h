@@ -22,8 +22,8 @@ struct LeveledBalls {
   double level = 0;
 };
 
-/// Looks for few balls that hold a solid and protrude little; unit frame. What it finds is proven
-/// to hold the solid before it is handed out.
+/// Looks for few balls that contain a solid and protrude little; unit frame. What it finds is
+/// proven to contain the solid before it is handed out.
 class [[gnu::visibility("hidden")]] CoverSearch {
  public:
   /// `look`: called now and then, from any thread, with the share [0, 1] that is done at least;
@@ -47,14 +47,14 @@ class [[gnu::visibility("hidden")]] CoverSearch {
   const double most_;
 };
 
-/// A choice of `count` of the candidates that together hold all targets that any holds, if one is
-/// found within so many exchanges and steps; else empty, as where none holds more than one target
-/// in so many.
+/// A choice of `count` of the candidates that together contain all targets that any contains, if
+/// one is found within so many exchanges and steps; else empty, as where none contains more than
+/// one target in so many.
 ///
-/// It starts with the candidate that holds most of what is left, over and over, and goes on as a
+/// It starts with the candidate that contains most of what is left, over and over, and goes on as a
 /// tabu search: an open target is picked, the candidate that would help most comes in, the one that
-/// is missed least goes out, and targets that stay open weigh more. Where candidates hold much an
-/// exchange takes many steps. `steps`: what is left of them; those taken are subtracted, and it
+/// is missed least goes out, and targets that stay open weigh more. Where candidates contain much
+/// an exchange takes many steps. `steps`: what is left of them; those taken are subtracted, and it
 /// ends soon after none are left.
 std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
                                         std::span<const Eigen::Vector3d> targets, std::size_t count,

@@ -114,18 +114,19 @@ std::vector<std::size_t> shared_counts(
 
 using Eigen::Vector3d;
 
-constexpr int kMostTries = 8;    ///< counts that are tried for a protrusion; doubling goes on
-constexpr double kOfGuess = 1;   ///< with room: of a plain choice's balls, to begin with
-constexpr int kRoomTries = 2;    ///< with room: counts that are tried
-constexpr double kAbout = 1.25;  ///< with room: times the level that are good enough
+constexpr int kMostTries = 8;  ///< counts that are tried for a protrusion; doubling goes on
+/// with a margin: level at first, over that of a plain choice's balls
+constexpr double kOfGuess = 1;
+constexpr int kRoomTries = 2;    ///< with a margin: counts that are tried
+constexpr double kAbout = 1.25;  ///< with a margin: times the level that are good enough
 
-/// What several searches have done together, told by the thread that started them.
+/// The joint progress of several searches, reported by the thread that started them.
 class Watch {
  public:
   Watch(const ProgressCallback& progress, std::size_t searches)
       : stage_("spheres", progress), searches_(searches) {}
 
-  /// Of one search: its share that is done went from `before` to `now`. Throws WorkStop::Stopped.
+  /// Advances one search's share from `before` to `now`. Throws WorkStop::Stopped.
   void look(double before, double now) {
     double done = done_.load();
     while (!done_.compare_exchange_weak(done, done + (now - before))) {
@@ -199,10 +200,10 @@ SphereCover finished(const MeshSolid& solid, const std::vector<CoverSphere>& bal
   return cover;
 }
 
-constexpr double kLeastShare = 0.05;      ///< of the level: less room than that is given up
+constexpr double kLeastShare = 0.05;      ///< of the level: smaller margins are given up
 constexpr double kLeastEstimated = 1e-3;  ///< the same where spheres are only counted
 
-/// `room`: as shares of `most`, of at least `least`; null: none.
+/// `room`: the free distances, as fractions of `most`, of at least `least`; null: none.
 CoverSearch search_of(const MeshSolid& solid, std::uint64_t seed, std::function<void(double)> look,
                       double most, const ProtrusionRoom& room, double least) {
   if (!room) return {solid, seed, std::move(look)};
@@ -213,13 +214,14 @@ CoverSearch search_of(const MeshSolid& solid, std::uint64_t seed, std::function<
           most / solid.frame().scale()};
 }
 
-/// As few spheres as reach no further than asked: twice as many until it is enough, then halfway
-/// between too few and enough.
+/// The fewest spheres that reach no further than asked: doubles the count until it is enough, then
+/// bisects.
 SphereCover fewest(const MeshSolid& solid, const CoverSearch& search,
                    const SphereCoverSettings& settings, bool room) {
   int tries = 0;
   const double level = settings.max_protrusion / solid.frame().scale();
-  LeveledBalls nearest = {{}, std::numeric_limits<double>::infinity()};  // to the level, with room
+  // to the level, with a margin
+  LeveledBalls nearest = {{}, std::numeric_limits<double>::infinity()};
   const auto with = [&](std::size_t count) {
     ++tries;
     const LeveledBalls found = search.with_count(count);

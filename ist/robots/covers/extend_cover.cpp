@@ -31,7 +31,7 @@ double farthest(const Corners& t, const Vector3d& from) {
   return std::sqrt(square) + kMargin * (t[0].norm() + from.norm());
 }
 
-/// Finds the parts of a surface that no sphere holds whole.
+/// Finds the parts of a surface that no sphere contains whole.
 class OpenParts {
  public:
   OpenParts(std::vector<CoverSphere>& spheres, double growth, double finest)
@@ -76,7 +76,7 @@ class OpenParts {
   std::map<std::ptrdiff_t, double> grown_;
 };
 
-/// Parts that one sphere is to hold.
+/// Parts that one sphere is to contain.
 struct Cluster {
   std::vector<Corners> parts;
   Eigen::AlignedBox3d box;

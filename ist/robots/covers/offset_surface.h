@@ -29,13 +29,14 @@ class [[gnu::visibility("hidden")]] OffsetSurface {
   /// The same where depth_in() is known.
   double radius(const Eigen::Vector3d& centre, double depth) const;
 
-  /// What the distance to the surface alone vouches for; 0 for a centre further out.
+  /// The radius that the distance to the surface alone proves; 0 for a centre further out.
   double sure_radius(const Eigen::Vector3d& centre) const;
 
   /// Points within `reach`, appended.
   void walls(const Eigen::Vector3d& centre, double reach, std::vector<Eigen::Vector3d>& out) const;
 
-  /// Centres of largest balls: of the medial axis of what the surface holds. At most some `most`.
+  /// Centres of largest balls: of the medial axis of what the surface contains. At most some
+  /// `most`.
   std::vector<Eigen::Vector3d> medial_centres(std::size_t most) const;
 
  private:

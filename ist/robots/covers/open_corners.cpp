@@ -30,14 +30,14 @@ bool holds(const CoverSphere& ball, const Points& points) {
 
 class Cutter {
  public:
-  /// Of triangles within a box.
+  /// Cuts triangles within a box.
   Cutter(std::span<const CoverSphere> balls, const Eigen::AlignedBox3d& box) : balls_(balls) {
     for (std::uint32_t i = 0; i < balls.size(); ++i)
       if (box.squaredExteriorDistance(balls[i].centre) <= balls[i].radius * balls[i].radius)
         touching_.push_back(i);
   }
 
-  /// `holder`: tried first, and set to what holds the triangle whole.
+  /// `holder`: tried first, and set to what contains the triangle whole.
   void cut(const Corners& triangle, std::uint32_t& holder, std::vector<OpenCorner>& out) {
     if (holder < balls_.size() && holds(balls_[holder], triangle)) return;
     const Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3;
@@ -70,7 +70,7 @@ class Cutter {
   }
 
  private:
-  /// What of the piece lies in the ball's cell; false where nothing is left, or the ball holds it.
+  /// Clips the piece to the ball's cell; false if nothing is left, or the ball contains it.
   bool cut_to_cell(std::uint32_t i) {
     const CoverSphere& own = balls_[i];
     const double own_power = own.centre.squaredNorm() - own.radius * own.radius;

@@ -15,7 +15,7 @@
 
 namespace ist {
 
-/// A name for the cell of a grid that holds a point of the unit frame.
+/// A name for the cell of a grid that contains a point of the unit frame.
 inline std::uint64_t cell_key(const Eigen::Vector3d& p, double cell) {
   std::uint64_t key = 0;
   for (int k = 0; k < 3; ++k) {

@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 constexpr double kRounded = 1e-5;  ///< unit frame, by which the proof may end above what was seen
 constexpr double kTolerance = 0.01;
 
-/// Divides the cube around a ball until no part can hold a point further out than was seen.
+/// Divides the cube around a ball until no part can contain a point further out than was seen.
 class ProtrusionSearch {
  public:
   ProtrusionSearch(const MeshSolid& solid, const CoverSphere& ball, double tolerance, double enough,
@@ -104,9 +104,9 @@ class ProtrusionSearch {
     if (beyond_ != nullptr && distance > enough_) beyond_->push_back(point);
   }
 
-  /// Distance of the ball's points in the cube from the one point `near`, which is of the solid:
-  /// along the way from it to the middle they reach no further than the ball does, and across it
-  /// than the cube does.
+  /// Bounds the distance of the ball's points in the cube from the point `near` of the solid: along
+  /// the line from it to the middle they reach no further than the ball does, and across it no
+  /// further than the cube.
   double by_plane(const Vector3d& middle, double corner, const ClosestPoint& near) const {
     const Vector3d n = (middle - near.point) / near.distance;
     const double ahead =

@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// How far a ball reaches out of the solid: both ends of an interval that holds it, unit frame.
+/// How far a ball reaches out of the solid: both ends of an interval that contains it, unit frame.
 struct BallProtrusion {
   double least = 0, most = 0;
 };

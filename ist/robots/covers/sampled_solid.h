@@ -15,7 +15,7 @@ namespace ist {
 using LevelShare =
     std::function<double(const Eigen::Vector3d& place, const Eigen::Vector3d& outward)>;
 
-/// A way out of the solid that starts on its surface: foot + t · direction is t away from the
+/// A ray out of the solid that starts on its surface: foot + t · direction is t away from the
 /// solid, for every t in [0, reach].
 struct OutwardRay {
   Eigen::Vector3d foot, direction;  ///< unit frame, direction of unit length

@@ -18,7 +18,7 @@ Positions default_positions(const RobotModel& robot);
 /// The middle of all limits.
 Positions middle_positions(const RobotModel& robot);
 
-/// Of the joint's child in its parent's frame.
+/// The frame of the joint's child in its parent's frame.
 Eigen::Isometry3d joint_frame(const RobotModel& robot, std::size_t joint,
                               const Positions& positions);
 

@@ -58,7 +58,8 @@ TriangleMesh scaled_mesh(const LinkMesh& shape, const PackagePaths& paths) {
 
 ShapeMesh capsule_mesh(const CoverCapsule& capsule) {
   constexpr std::uint32_t kRings = 24, kAround = 48;  // without poles; two are the equator
-  const double across = std::numbers::pi / kRings;    // a facet at most spans it both ways
+  // the most that a facet spans in both directions
+  const double across = std::numbers::pi / kRings;
   const double radius = capsule.radius / std::cos(0.75 * across);
   const Vector3d axis = capsule.end - capsule.begin;
   const bool ball = axis.isZero(0);

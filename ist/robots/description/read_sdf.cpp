@@ -51,7 +51,7 @@ class SdfReader {
     return models.front();
   }
 
-  /// Of that name, or all.
+  /// The children of that name, or all.
   std::vector<std::uint32_t> children(std::uint32_t element, std::string_view name) const {
     std::vector<std::uint32_t> out;
     for (std::uint32_t e = xml_[element].first_child; e != kNoTag; e = xml_[e].next_sibling)
@@ -133,7 +133,7 @@ class SdfReader {
     return robot_.links.size() - 1;
   }
 
-  /// Of a link in the model's frame, its depth of relative poses counted.
+  /// The frame of a link in the model's frame; counts the depth of relative poses.
   Eigen::Isometry3d frame_of(std::size_t link, std::size_t depth = 0) const {
     if (link >= elements_.size()) return Eigen::Isometry3d::Identity();  // the world
     std::string to;

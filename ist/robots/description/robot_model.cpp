@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 
 constexpr std::uint32_t kNoElement = XmlDocument::kNone;
 
-/// What the five entities that every XML file may use stand for.
+/// Decodes the five entities that every XML file may use.
 std::string decoded(std::string_view text) {
   constexpr std::array<std::pair<std::string_view, char>, 5> kEntities{
       {{"&amp;", '&'}, {"&lt;", '<'}, {"&gt;", '>'}, {"&quot;", '"'}, {"&apos;", '\''}}};

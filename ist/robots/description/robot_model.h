@@ -98,9 +98,8 @@ struct RobotModel {
 
 /// Reads a URDF, or an MJCF or SDF as read_mjcf() and read_sdf() do. Strict where a mistake would
 /// move or lose a shape: numbers must be finite, lengths above 0, joints must make one tree of the
-/// links. A visual shape that is wrong becomes a LinkFault. What is neither a link's shape nor a
-/// joint is not looked at. Document types are refused, and with them entities. Throws Error (file,
-/// line, what, way out).
+/// links. A faulty visual shape becomes a LinkFault. Other elements are ignored. Document types are
+/// refused, and with them entities. Throws Error (file, line, fault, advice).
 RobotModel read_robot(const std::string& path);
 
 /// The same of a file already in memory.

@@ -69,7 +69,7 @@ Positions drawn(const RobotModel& robot, std::mt19937_64& random) {
 
 }  // namespace
 
-/// What sampling needs of two links.
+/// Data for sampling a pair of links.
 struct SelfCollisionStudy::Pair {
   enum class Truth : std::uint8_t { unknown, apart, overlapping };
 
@@ -102,7 +102,8 @@ SelfCollisionStudy::SelfCollisionStudy(const RobotModel& robot, std::vector<std:
     links.push_back(static_cast<std::size_t>(at - robot.links.begin()));
     compared[links.back()] = links.size() - 1;
   }
-  // Of each link, the compared one that it moves with or hangs from: its own, or the nearest above.
+  // For each link, the compared link that it moves with or hangs from: itself, or the nearest
+  // above.
   std::vector<std::size_t> holder = compared;
   for (const std::size_t link : robot.order)
     if (holder[link] == kNone && robot.joint_of[link] != kNone)
@@ -310,7 +311,7 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
 
 void SelfCollisionStudy::choose_pose(std::span<const SphereBody> bodies, bool cover,
                                      SelfCollision& out) const {
-  /// Of a pose: what overlaps.
+  /// Finds the pairs that overlap in a pose.
   const auto look = [&](const Positions& positions, DefaultPose& pose) {
     pose.positions = positions;
     pose.solids_free = true;

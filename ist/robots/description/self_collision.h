@@ -30,7 +30,7 @@ struct LinkPair {
   /// more. Excluded: the robot's file says so.
   std::string ignored;
   std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
-  // Of SelfCollision::samples other positions:
+  // Among SelfCollision::samples other positions:
   std::size_t colliding = 0;  ///< the solids overlap
   std::size_t missed = 0;     ///< the solids overlap, and no compared spheres of this pair do
   std::size_t falsely = 0;    ///< compared spheres overlap, and the solids do not
@@ -70,7 +70,7 @@ struct SelfCollision {
   }
 };
 
-/// What is asked of the default pose.
+/// The requested default pose.
 struct WantedPose {
   std::map<std::size_t, double> positions;                     ///< by joint; these are not searched
   std::vector<std::pair<std::string, Positions>> states = {};  ///< tried first, by name

@@ -79,7 +79,7 @@ std::string collisions(const LinkSpheres& link, const std::string& indent) {
   return out;
 }
 
-/// What stands before a byte on its line, if that is space alone.
+/// The text before a byte on its line, if that is white space alone.
 std::string indent_before(std::string_view text, std::size_t at) {
   std::size_t begin = at;
   while (begin > 0 && (text[begin - 1] == ' ' || text[begin - 1] == '\t')) --begin;
@@ -120,7 +120,7 @@ void append_buffers(std::span<const LinkSpheres> links, const std::string& key,
   for (const LinkSpheres& link : links) out += indent + "  " + yaml_text(link.link) + ": 0.0\n";
 }
 
-// What a URDF does not state, as cuRobo's own robots have it.
+// Values that a URDF does not state, as in cuRobo's own robots.
 constexpr double kAcceleration = 15;  // [rad/s², u/s²]
 constexpr double kJerk = 500;         // [rad/s³, u/s³]
 

@@ -24,7 +24,7 @@ class DisjointSets {
   std::uint32_t find(std::uint32_t i) {
     for (std::uint32_t above = parent(i).load(std::memory_order_relaxed); above != i;) {
       const std::uint32_t next = parent(above).load(std::memory_order_relaxed);
-      // Halves the way. Parents only ever fall, and stay in the set.
+      // Path halving. A parent only ever gets a smaller index, within the same set.
       if (next != above) parent(i).compare_exchange_weak(above, next, std::memory_order_relaxed);
       i = above = next;
       above = parent(i).load(std::memory_order_relaxed);

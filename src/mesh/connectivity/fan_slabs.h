@@ -16,8 +16,8 @@ namespace ist {
 
 using FloatPoint = std::array<float, 3>;
 
-/// What is known of the triangles under a node besides its box, where there are large fans or other
-/// needles: their triangles are long and thin, and their boxes meet nearly all others'.
+/// Bounds the triangles under a node where there are large fans or other needles: their triangles
+/// are long and thin, and their boxes overlap nearly all others'.
 struct Slab {
   std::uint32_t owner = kNoIndex;  ///< the vertex of many triangles that all of them have
   bool spread = false;             ///< its fan is spread: none of them meet

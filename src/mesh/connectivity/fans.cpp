@@ -17,7 +17,7 @@
 namespace ist {
 namespace {
 
-/// A vertex's fan, and room to look at it.
+/// The fan of a vertex, and memory to search it.
 struct Fan {
   std::vector<std::array<std::uint32_t, 2>> sides;  ///< opposite to the vertex: from, to
   std::vector<std::uint32_t> ring;

@@ -138,7 +138,7 @@ std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
   return result;
 }
 
-/// Fills in which shells hold which: all probes of the inner one lie inside.
+/// Fills in which shells contain which: all probes of the inner one lie inside.
 void find_containers(const std::vector<Eigen::Vector3d>& vertices,
                      const std::vector<Triangle>& triangles, const Shells& shells,
                      std::vector<Shell>& measured) {
@@ -169,7 +169,7 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
   std::vector<Shell> measured = measure(vertices, triangles, shells);
   if (shells.count > 1) find_containers(vertices, triangles, shells, measured);
 
-  // From the outside in: what holds a shell has fewer holders than it.
+  // From the outside in: a shell lies in more shells than those that contain it.
   std::vector<std::uint32_t> order(shells.count);
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
@@ -184,7 +184,7 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
       continue;
     }
     std::uint32_t outermost = s;
-    int around = 0;  // winding number of the shells that hold this one, as they are turned now
+    int around = 0;  // winding number of the shells that contain this one, as they are turned now
     for (const auto& [holder, number] : shell.containers) {
       around += turned[holder] ? -number : number;
       if (measured[holder].containers.size() < measured[outermost].containers.size())

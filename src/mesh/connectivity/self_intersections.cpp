@@ -144,10 +144,10 @@ class TriangleBoxes {
   std::vector<std::uint32_t> order_;
   std::size_t start_ = 0;                        ///< level
   std::vector<std::vector<EightBoxes>> levels_;  ///< [0]: boxes of triangles; the last has one node
-  /// Of the nodes up to the starting level, where there are large fans or needles; or none at all.
+  /// One for each node up to the starting level if there are large fans or needles, else empty.
   std::vector<std::vector<Slab>> slabs_;
   std::vector<Slice> slices_;  ///< of level 0, with slabs
-  /// [level][node] Bit k: box k holds a triangle that is not marked. Or none at all.
+  /// [level][node] Bit k: box k contains a triangle that is not marked. Or none at all.
   std::vector<std::vector<std::uint8_t>> wanted_;
 };
 
@@ -326,7 +326,7 @@ constexpr std::size_t most_candidates(const std::size_t triangles) {
   return std::max(std::size_t{100'000'000}, 1000 * triangles);
 }
 
-/// What the parts of a search add to. Integers only: their sums do not depend on the order.
+/// Sums over all parts of a search. They are integers, so their order does not matter.
 struct Sums {
   std::atomic<std::size_t> candidates{0}, met{0};
 };

@@ -27,9 +27,9 @@ using SidePartners = std::vector<std::uint32_t>;
 /// Partners at edges of exactly two sides.
 SidePartners manifold_partners(const EdgeTable& edges);
 
-/// Partners at edges of four, six … sides too: neighbours in the angle about the edge, chosen of
-/// the two ways to pair them so that more pairs agree about the outside, then so that the pairs
-/// enclose the smaller angles.
+/// Partners at edges of four, six … sides too: neighbours in the angle about the edge. Of the two
+/// possible pairings it takes the one in which more pairs agree about the outside, then the one
+/// whose pairs enclose the smaller angles.
 SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
                           const std::vector<Triangle>& triangles, const EdgeTable& edges);
 
@@ -66,7 +66,7 @@ struct SignedVolume {
   bool is_flat() const;
 };
 
-/// What orient_shells did and saw.
+/// The result of orient_shells().
 struct Nesting {
   std::size_t flipped = 0;        ///< shells turned
   std::size_t cavities = 0;       ///< inward shells within solid

@@ -171,7 +171,8 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
       groups.unite(other, s);
     }
 
-  // Two ways to reduce a group: how many copies of a stack are left, and how many odd edges.
+  // Two possible reductions of a group: how many copies of a stack stay, and how many edges are
+  // odd.
   const auto copies_left = [&](const Stack& stack, const bool one_copy) {
     return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
   };
@@ -199,7 +200,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
     const bool one_copy =
         odd[group][1] < odd[group][0] || (odd[group][1] == odd[group][0] && !cancels[group]);
     const std::uint32_t copies = copies_left(stack, one_copy);
-    // Those kept point the way that the sum does.
+    // The kept ones face in the direction of the sum.
     std::uint32_t kept = 0;
     for (const std::uint32_t t : stack.members) {
       const bool direction = same_direction(triangles[stack.members[0]], triangles[t]);

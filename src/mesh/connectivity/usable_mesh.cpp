@@ -39,8 +39,8 @@ void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& 
     }
 }
 
-/// What double cannot cube. Before anything is computed with it: exact signs of infinite products
-/// have no end. A mesh of one point has its own message.
+/// Refuses sizes whose cube overflows or underflows a double, before anything is computed: exact
+/// signs of infinite products do not terminate. A mesh of one point has its own message.
 void refuse_unusable_size(const TriangleMesh& mesh, const std::string& name) {
   constexpr double kSmallest = 1e-90, kLargest = 1e90, kFarthest = 1e100;
   const Eigen::AlignedBox3d bounds = bounds_of(mesh.vertices);

@@ -44,8 +44,8 @@ double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 /// The spacing of doubles at `size`.
 inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
 
-/// As close_mesh(), of a closed surface whose triangles face outward already: none is turned.
-/// Shells that face inward count as cavities. How its triangles meet is not looked for.
+/// Like close_mesh() for a closed surface whose triangles face outward already: turns none. Shells
+/// that face inward are cavities. Does not look for intersections.
 ClosedMesh close_oriented(TriangleMesh mesh, const std::string& name);
 
 }  // namespace ist

@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// Of a point by its coordinates' bits, −0 = 0.
+/// Hashes the bits of a point's coordinates; −0 counts as 0.
 inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
   std::uint64_t hash = 0;
   for (const double x : p)
@@ -30,10 +30,11 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
 /// order. Every referenced coordinate must be finite.
 TriangleMesh weld(TriangleMesh mesh, double tolerance);
 
-/// Of these the last step alone: unreferenced vertices are dropped.
+/// Drops unreferenced vertices, the last step of the two above.
 void drop_unused(TriangleMesh& mesh);
 
-/// As weld() with a tolerance above 0, but vertices that are not in `among` (by index) stay apart.
+/// Like weld() with a tolerance above 0, but keeps vertices that are not in `among` (by index)
+/// apart.
 TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 
 }  // namespace ist

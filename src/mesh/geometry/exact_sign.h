@@ -8,7 +8,7 @@
 // (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric
 // Predicates", 1997); else the determinant's exact terms are summed by S. M. Rump's extraction
 // ("Ultimately Fast Accurate Summation", 2009), which needs no memory: a GPU reserves what a
-// thread may need for all threads that it can hold.
+// thread may need for all threads that it can run.
 
 namespace ist {
 namespace exact_sign {

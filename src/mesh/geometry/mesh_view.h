@@ -9,7 +9,7 @@ constexpr std::uint32_t kBvhLeaf = 0x80000000u;   ///< flag of a child that is a
 constexpr std::uint32_t kBvhEmpty = 0xFFFFFFFFu;  ///< child that is not there
 constexpr std::uint32_t kNoTriangle = 0xFFFFFFFFu;
 
-/// Four child boxes of a bounding volume hierarchy. The boxes hold the exact and the float
+/// Four child boxes of a bounding volume hierarchy. The boxes contain the exact and the float
 /// vertices (rounded outward); an absent child has an empty, infinitely far box.
 struct alignas(64) BvhNode {
   float lower[3][kBvhWidth];

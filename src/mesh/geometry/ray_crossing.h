@@ -73,7 +73,7 @@ IST_HD inline bool lies_beyond(const Corners& t, int facing, const double p[3]) 
   return orient3d_sign(t.p[0], t.p[1], t.p[2], p) * facing > 0;
 }
 
-/// What a triangle adds to the winding number of p.
+/// The term of a triangle in the winding number of p.
 IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   if (facing == 0) return 0;
@@ -82,7 +82,7 @@ IST_HD inline int ray_winding(const Corners& t, const double p[3]) {
   return beyond ? facing : -facing;
 }
 
-/// The float interval that holds a double.
+/// The float interval that contains a double.
 struct FloatInterval {
   float lower, upper;
 
@@ -90,7 +90,7 @@ struct FloatInterval {
       : lower(rounded_down(value)), upper(rounded_up(value)) {}
 };
 
-/// A box that holds the ray from p, or a whole line; rounded outward.
+/// A box that contains the ray from p, or a whole line; rounded outward.
 struct RayBox {
   float lower[3], upper[3];
 

@@ -99,7 +99,7 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   return f;
 }
 
-/// Of a lane without a triangle: far from everything.
+/// The frame of a lane without a triangle: far from everything.
 IST_HD inline TriangleFrame<double> absent_frame() {
   return {{1e18, 1e18, 1e18}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0, 0, 0};
 }

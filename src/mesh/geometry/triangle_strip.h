@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// The strip of a plane along a triangle's edge from its lowest to its highest corner that holds
+/// The strip of a plane along a triangle's edge from its lowest to its highest corner that contains
 /// the triangle: narrow where its box is wide, if it is a needle.
 struct TriangleStrip {
   double at0, slope;   ///< the edge's x at y = 0, and how it grows with y

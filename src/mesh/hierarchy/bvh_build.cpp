@@ -58,9 +58,9 @@ struct GrowingBox {
   }
 };
 
-/// A triangle, or a cell of triangles, on its way to a leaf. The lanes that are
-/// left over hold two numbers below 2^30, as bits of floats between 1e-38 and
-/// 8: arithmetic with subnormal ones is slow, with infinite ones it traps.
+/// A triangle or a cell of triangles that is being sorted into a leaf. The spare lanes store two
+/// numbers below 2^30, as bits of floats between 1e-38 and 8: arithmetic with subnormal floats is
+/// slow, and with infinite ones it traps.
 struct Item {
   Lanes lower, upper;
 
@@ -87,7 +87,7 @@ float longest_side(const GrowingBox& box) {
   return std::max({size[0], size[1], size[2]});
 }
 
-/// What is known of items: their box, and that of their centres.
+/// Bounds of items and of their centres.
 struct SortExtent {
   GrowingBox box, centres;
   std::uint32_t count = 0;  ///< triangles
@@ -238,9 +238,8 @@ struct Tree {
   std::uint32_t root = kBvhEmpty;
 };
 
-/// Makes the node over a range, the children of largest area opened while there
-/// is room. `is_leaf(range)`; child(range): what stands for a range, node or
-/// leaf.
+/// Makes the node of a range and opens the children of largest area while it has free slots.
+/// `is_leaf(range)`; child(range): the number of the node or leaf of a range.
 template <class IsLeaf, class Child>
 std::uint32_t add_node(const Range& range, std::vector<BvhNode>& nodes, const IsLeaf& is_leaf,
                        const Child& child) {
@@ -398,7 +397,7 @@ class CellTree {
     });
   }
 
-  /// of_chunk_ holds the places where a chunk's items of a cell begin.
+  /// of_chunk_ contains the places where a chunk's items of a cell begin.
   void sort_into(std::span<Item> sorted) {
     tbb::parallel_for(std::size_t{0}, chunks_of(range_.items.size()), [&](std::size_t c) {
       for (const Item& item : chunk_of(range_.items, c))

@@ -24,7 +24,7 @@ struct LineLattice {
   double shift = 0;               ///< of every row against the one before, over the step
   std::uint32_t ny = 0, nz = 0;   ///< lines in a row, rows
 
-  /// Of the first line of row j from the lower corner, over the step.
+  /// Shift of row j's first line from the lower corner, in steps.
   IST_HD double turned(std::uint32_t j) const {
     const double all = offset + j * shift;
     return shift == 0 ? all : all - static_cast<double>(static_cast<std::int64_t>(all));
@@ -34,7 +34,7 @@ struct LineLattice {
   IST_HD std::uint64_t lines() const { return std::uint64_t{ny} * nz; }
 };
 
-/// The places among 0 … count − 1 in [low, high], with room for rounding.
+/// The numbers among 0 … count − 1 whose lines may lie in [low, high], rounding included.
 struct LatticeRange {
   std::uint32_t first, last;  ///< [first, last)
 

@@ -23,7 +23,7 @@ void gather(const MeshView& mesh, std::uint32_t child, std::vector<std::uint32_t
   }
 }
 
-/// Of many triangles, or none: a box that keeps nothing out.
+/// For many triangles or none the box excludes nothing.
 WideOrientedBox box_around(const MeshView& mesh, const std::vector<std::uint32_t>& triangles) {
   WideMoments moments;
   if (triangles.empty() || triangles.size() > kMost) {

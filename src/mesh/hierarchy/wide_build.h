@@ -10,12 +10,12 @@
 
 namespace ist {
 
-/// A box in float that holds what is in it, rounding included. Empty by default.
+/// A box in float that contains what is in it, rounding included. Empty by default.
 struct WideBox {
   float lower[3] = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
   float upper[3] = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
 
-  /// Takes a point in; the box then holds its exact and its rounded coordinates.
+  /// Takes a point in; the box then contains its exact and its rounded coordinates.
   IST_HD void extend(const double point[3]) {
     for (int k = 0; k < 3; ++k) {
       const float below = rounded_down(point[k]), above = rounded_up(point[k]);

@@ -76,7 +76,7 @@ struct WideBall {
 };
 
 /// `kLoosely`: also visits every triangle that is no further than the closest one plus two errors,
-/// and knows whether a lane met more than one of these.
+/// and records whether a lane saw more than one of them.
 template <class Team, bool kLoosely = false>
 struct WideNearestQuery : WideBall {
   const Team& team;
@@ -243,8 +243,8 @@ IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const dou
                                double limit) {
   const ExactReach reach(p);
   WideExactQuery<Team> query(team, tree, p, reach, limit * limit);
-  // The float answer first. What may be closer in double has been met on the way to it, and is
-  // hardly ever more than one triangle a lane.
+  // The float answer first. Its traversal visits all that may be closer in double, hardly ever more
+  // than one triangle a lane.
   WideNearestQuery<Team, true> coarse(team, tree, reach.p, reach.error, query.radius2);
   traverse(team, tree, coarse);
   const float candidate2 = coarse.reach2();

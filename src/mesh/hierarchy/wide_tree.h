@@ -17,7 +17,7 @@ namespace ist {
 constexpr int kWideWidth = 32;
 constexpr int kWideDepth = 5;  ///< levels of nodes for 2^30 triangles
 
-/// 32 child boxes side by side, rounded outward: they hold the exact and the float vertices. The
+/// 32 child boxes side by side, rounded outward: they contain the exact and the float vertices. The
 /// box of a child that is not there is empty: lower = ∞, upper = −∞.
 struct alignas(128) WideNode {
   float lower[3][kWideWidth];

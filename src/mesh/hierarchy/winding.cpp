@@ -7,18 +7,78 @@
 #include <cmath>
 #include <utility>
 
+#include "mesh/geometry/closest_point.h"
+#include "mesh/geometry/exact_triangle.h"
+#include "mesh/geometry/mesh_view.h"
 #include "mesh/hierarchy/line_lattice.h"
-#include "mesh/hierarchy/triangles_in_box.h"
 
 namespace ist {
+namespace {
+
+/// Clears hit[i] where, seen along x, oriented box i is apart from a box.
+void leave_out_apart(const OrientedBoxes<kBvhWidth>& boxes, const float low[3], const float high[3],
+                     int hit[kBvhWidth]) {
+  const float y = (low[1] + high[1]) / 2, z = (low[2] + high[2]) / 2;
+  const float half_y = (high[1] - low[1]) / 2, half_z = (high[2] - low[2]) / 2;
+  const auto size = [](FloatLanes x) { return x < FloatLanes{} ? -x : x; };
+  for (int i = 0; i < kBvhWidth; i += kFloatLanes) {
+    FloatLanes axis[3][3], centre_y{}, centre_z{}, apart{};
+    load_axes(boxes, i, axis);
+    for (int k = 0; k < 3; ++k) {
+      const FloatLanes middle = load_lanes(boxes.middle[k] + i);
+      centre_y += middle * axis[k][1];
+      centre_z += middle * axis[k][2];
+    }
+    // Across each of the box's edges, as they are seen.
+    for (int k = 0; k < 3; ++k) {
+      const FloatLanes across_y = -axis[k][2], across_z = axis[k][1];
+      FloatLanes reach =
+          size(across_y) * half_y + size(across_z) * half_z + 8 * float_distance_error(1);
+      for (int j = 0; j < 3; ++j)
+        reach +=
+            load_lanes(boxes.half[j] + i) * size(across_y * axis[j][1] + across_z * axis[j][2]);
+      const FloatLanes off = size(across_y * (centre_y - y) + across_z * (centre_z - z)) - reach;
+      apart = off > apart ? off : apart;
+    }
+    float gap[kFloatLanes];
+    store_lanes(apart, gap);
+    for (int lane = 0; lane < kFloatLanes; ++lane) hit[i + lane] &= gap[lane] > 0 ? 0 : 1;
+  }
+}
+
+/// Calls visit(corners) for all triangles whose boxes meet a box, and for some others.
+template <class Visit>
+void visit_about_box(const MeshView& mesh, const float low[3], const float high[3],
+                     const Visit& visit) {
+  if (mesh.root == kBvhEmpty) return;
+  std::uint32_t stack[kBvhStackSize];
+  int top = 0;
+  stack[top++] = mesh.root;
+  while (top > 0) {
+    const std::uint32_t at = stack[--top];
+    if ((at & kBvhLeaf) != 0) {
+      for (const std::uint32_t triangle : mesh.blocks[at & ~kBvhLeaf].triangle)
+        if (triangle != kNoTriangle) visit(corners_of(mesh, triangle));
+      continue;
+    }
+    const BvhNode& node = mesh.nodes[at];
+    int hit[kBvhWidth] = {1, 1, 1, 1};
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < kBvhWidth; ++i)
+        hit[i] &= (node.lower[k][i] <= high[k]) & (node.upper[k][i] >= low[k]);
+    if (mesh.oriented != nullptr) leave_out_apart(mesh.oriented[at], low, high, hit);
+    for (int i = 0; i < kBvhWidth; ++i)
+      if (hit[i] != 0) stack[top++] = node.child[i];
+  }
+}
+
+}  // namespace
 
 int winding_number(const MeshView& mesh, const double p[3]) {
   int winding = 0;
   const RayBox box = RayBox::ray(p);
-  none_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
-    winding += ray_winding(t, p);
-    return false;
-  });
+  visit_about_box(mesh, box.lower, box.upper,
+                  [&](const Corners& t) { winding += ray_winding(t, p); });
   return winding;
 }
 
@@ -26,10 +86,9 @@ void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossi
   out.clear();
   const double yz[2] = {y, z};
   const RayBox box = RayBox::line(y, z);
-  none_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
+  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
     const int facing = pierced(t, yz);
     if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
-    return false;
   });
   std::sort(out.begin(), out.end(), comes_before);
 }

@@ -54,8 +54,7 @@ class Winding {
       const Vector adjacent = ((la * lb * lc + dot(a, b) * lc) + dot(b, c) * la) + dot(c, a) * lb;
       const Vector re = hn::Load(d, re_ + i), im = hn::Load(d, im_ + i);
       const Vector new_im = re * opposite + im * adjacent;
-      // A turn of less than a half that begins above the negative real axis and ends below it, or
-      // the other way.
+      // A turn of less than a half across the negative real axis, in either direction.
       const Vector zero = hn::Zero(d), one = hn::Set(d, 1);
       const auto above = im >= zero, now_above = new_im >= zero;
       const Vector on =

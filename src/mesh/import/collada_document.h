@@ -33,8 +33,8 @@ class ColladaDocument {
   std::vector<double> reals(Index element, std::size_t count) const;
   std::vector<std::uint64_t> wholes(Index element) const;
 
-  /// What one file may come to, in corners or in numbers read: a small file can ask for many copies
-  /// of its meshes, and more than this is no accident.
+  /// The most corners or numbers that one file may expand to: a small file can instance its meshes
+  /// many times, and more than this is no accident.
   std::size_t most() const { return most_; }
 
  private:

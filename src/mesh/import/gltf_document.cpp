@@ -35,7 +35,7 @@ bool is_harmless(const std::string_view extension) {
   return starts_with_any(extension, kHarmless);
 }
 
-/// Where it is not required, a file holds the same numbers without it.
+/// Where it is not required, a file contains the same numbers without it.
 bool is_compression(const std::string_view extension) {
   constexpr std::array<std::string_view, 3> kCompressions{
       "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};
@@ -313,7 +313,7 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
   if (accessor.contains("bufferView")) {
     values = numbers(accessor, accessor, type, count, name);
   } else {
-    // As many zeros as the file has bytes: other attributes of as many vertices take more.
+    // Adds no more zeros than the file has bytes: other attributes of as many vertices take more.
     std::size_t stored = file_.bytes.size();
     for (const std::string_view buffer : buffers_) stored += buffer.size();
     if (count > stored) fail(name + ": " + std::to_string(count) + " elements without data");

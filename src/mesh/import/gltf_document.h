@@ -38,7 +38,7 @@ class GltfDocument {
                     std::optional<std::size_t> fallback = std::nullopt) const;
   /// Whole numbers ≥ 0 under `key`; none if it is missing.
   std::vector<std::size_t> whole_list(const Json& object, const std::string& key) const;
-  /// A number that float32 can hold, as all of glTF's are; `where` it stands, for messages.
+  /// A number that float32 can represent, as all of glTF's are; `where` it stands, for messages.
   double real(const Json& value, const std::string& where) const;
 
   /// All components of an accessor, one after the other. `type` is "SCALAR", "VEC3", "VEC4" or

@@ -15,8 +15,7 @@
 
 namespace ist {
 
-/// What a mesh file says: polygons over vertices. Corner indices are within the vertices; the
-/// coordinates may still be infinite or not a number.
+/// The polygons of a mesh file. Corner indices are valid; coordinates may still be infinite or NaN.
 struct PolygonMesh {
   std::vector<Eigen::Vector3d> vertices;  ///< [u]
   std::vector<std::uint32_t> corners;     ///< of all polygons, one after the other

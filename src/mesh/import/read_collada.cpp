@@ -118,7 +118,7 @@ class SceneReader {
     return transform;
   }
 
-  /// Of a node, read once however often it is visited.
+  /// The transform of a node, read once however often the node is visited.
   const Transform& local_transform(const Index node) {
     const auto [found, is_new] = transforms_.try_emplace(node, Transform::Identity());
     if (!is_new) return found->second;

@@ -7,7 +7,7 @@
 namespace ist {
 namespace {
 
-/// Lines that hold anything but comment, from here to the end.
+/// Lines that contain anything but comment, from here to the end.
 std::size_t count_lines_with_words(TextScanner scanner) {
   std::size_t count = 0;
   while (scanner.next_line()) count += scanner.word().empty() ? 0 : 1;

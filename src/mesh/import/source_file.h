@@ -30,7 +30,7 @@ void refuse_other_format(const SourceFile& file);
 [[noreturn]] void fail(const SourceFile& file, const std::string& what);
 [[noreturn]] void fail_at_line(const SourceFile& file, std::size_t line, const std::string& what);
 
-/// What a file name ends in, in small letters: ".csv" of "A.CSV".
+/// The ending of a file name in small letters: ".csv" for "A.CSV".
 std::string ending_of(const std::string& path);
 
 /// Words of a file as they may appear in a message: printable, short, in quotes.

@@ -21,7 +21,7 @@ TextScanner::TextScanner(const SourceFile& file, const char comment, const std::
                          const std::size_t line)
     : file_(file), text_(file.bytes), position_(start), line_number_(line - 1), comment_(comment) {
   if (start == 0) position_ = text_.size() - without_byte_order_mark(text_).size();
-  // As the first line ends, all do: by a carriage return alone in old files.
+  // All lines end like the first: in old files with a carriage return alone.
   const std::size_t end = text_.find_first_of("\r\n");
   const std::size_t beyond = text_.find_first_not_of('\r', end);
   if (end != beyond && (beyond == std::string_view::npos || text_[beyond] != '\n')) end_ = '\r';
@@ -85,7 +85,7 @@ std::optional<double> parse_real(const std::string_view word) {
   if (end != last) return std::nullopt;
   if (error == std::errc()) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // from_chars does not say which way a number is out of range: its exponent does, for the
+  // from_chars does not say whether a number is too large or too small. The exponent does, for the
   // mantissas that people write.
   const std::size_t exponent = digits.find_first_of("eE");
   const bool tiny = exponent != std::string_view::npos && digits.substr(exponent + 1, 1) == "-";

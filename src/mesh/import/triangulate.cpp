@@ -23,7 +23,7 @@ double turn(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vec
   return (b - a).cross(c - a).dot(normal);
 }
 
-/// Of a triangle: 1 for an equilateral one, 0 for a flat one, negative if it turns the wrong way.
+/// 1 for an equilateral triangle, 0 for a flat one, negative if it turns against the normal.
 double roundness(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                  const Eigen::Vector3d& normal) {
   const double sides = (b - a).squaredNorm() + (c - b).squaredNorm() + (a - c).squaredNorm();
@@ -125,7 +125,7 @@ void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices,
   bool fan_is_valid = true;
   for (std::size_t i = 1; fan_is_valid && i + 1 < count; ++i)
     fan_is_valid = turn(points[0], points[i], points[i + 1], normal) > 0;
-  // Without a normal (a flat or unreadable polygon) one way is as good as another.
+  // Without a normal (a flat or unreadable polygon) any diagonal is as good.
   const bool has_normal = normal.squaredNorm() > 0;
   // Cutting ears takes the square of the number of corners: a huge polygon is fanned.
   constexpr std::size_t kMostCorners = 2000;

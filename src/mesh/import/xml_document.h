@@ -11,7 +11,7 @@
 
 namespace ist {
 
-/// As text or an attribute of an XML or HTML file. Control characters, which XML has not, become
+/// Escapes text for an XML or HTML file or attribute. Control characters, which XML lacks, become
 /// '?'.
 std::string xml_text(std::string_view text);
 

@@ -22,7 +22,7 @@ struct IntegratedVolume {
 constexpr int kMaxLevel = 20;
 constexpr std::uint64_t kMaxUndecided = 1'000'000;
 
-/// What an octree's levels make of the volume, in units of the root cell.
+/// The volume by levels of an octree, in units of the root cell.
 struct Levels {
   int finest = 0;
   std::array<double, kMaxLevel + 1> volume{};  ///< if refinement ended at this level
@@ -53,10 +53,10 @@ void visit(const Solid& solid, const Eigen::Vector3d& centre, double half, int l
   }
 }
 
-/// Volume of a solid of which only a signed distance is known. Cells of an octree that the distance
-/// decides count whole or not at all, the rest by how deep their centres lie. The error falls about
-/// fourfold a level; the stated one is the larger of twice the last level's change and the change
-/// of the level before, plus what chance may hide there. An estimate with room, not a proof.
+/// The volume of a solid that gives only a signed distance. Octree cells that the distance decides
+/// count whole or not at all, others by the depth of their centres. The error falls about fourfold
+/// a level. The stated error is the larger of twice the last level's change and the change of the
+/// level before, plus an allowance for chance: a generous estimate, not a proof.
 IntegratedVolume integrate_volume(const Solid& solid) {
   const Eigen::AlignedBox3d bounds = solid.bounds();
   const double half = (bounds.max() / 2 - bounds.min() / 2).maxCoeff();

@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// What mesh_level_set() makes, without a proof of how near it is to the level set, which would
+/// The mesh of mesh_level_set(), without the proof of its distance from the level set, which would
 /// take most of the time. Throws Error likewise.
 ClosedMesh level_set_surface(const DistanceGrid& distances, const std::string& name);
 

@@ -8,7 +8,8 @@ namespace ist {
 
 /// A mesh in place of a solid.
 struct Polygonised {
-  TriangleMesh mesh;  ///< [u] a closed, oriented surface: every edge is run both ways equally often
+  /// [u] a closed, oriented surface: every edge is used equally often in both directions
+  TriangleMesh mesh;
   /// [u] proven: every point of the mesh is this near to the solid's surface, and the reverse.
   double error = 0;
 };

@@ -85,18 +85,18 @@ class TriangleError {
     return best;
   }
 
-  /// Length of a way at whose ends the signs differ: along the normal, or across it.
+  /// A distance at which the sign changes, along the normal or across it.
   double to_change(const Vector3d& middle) const {
     const double here = solid_.signed_distance(middle);
-    const auto changes = [&](const Vector3d& way) {
-      return (solid_.signed_distance(middle + way) < 0) != (here < 0);
+    const auto changes = [&](const Vector3d& offset) {
+      return (solid_.signed_distance(middle + offset) < 0) != (here < 0);
     };
     for (double s = std::max(kMargin * std::abs(here), 0x1p-20 * edge_); s < edge_; s *= 1.5) {
       if (changes(s * normal_) || changes(-s * normal_)) return s;
       for (int k = 0; k < 3; ++k) {
-        Vector3d way = Vector3d::Zero();
-        way[k] = s;
-        if (changes(way) || changes(-way)) return s;
+        Vector3d offset = Vector3d::Zero();
+        offset[k] = s;
+        if (changes(offset) || changes(-offset)) return s;
       }
       for (int i = 0; i < 8; ++i) {
         const double part = 0.5773502691896257 * s;  // of the diagonal
@@ -123,7 +123,7 @@ class CellError {
             std::vector<TriangleFrame<double>> triangles)
       : solid_(solid), grid_(grid), near_(near), triangles_(std::move(triangles)) {}
 
-  /// Of the cell around `middle`; infinite if there may be surface, and there are no triangles.
+  /// An error bound for the cell around `middle`; infinite if it may have surface and no triangles.
   double bound(const Vector3d& middle) const {
     std::vector<Vector3d> open = {middle}, next;
     double half = 0.5 * grid_.edge, most = 0;

@@ -68,13 +68,13 @@ class PairOfTriangles {
     }
   }
 
-  /// Whether a closed triangle holds a vertex in its plane.
+  /// Whether a closed triangle contains a vertex in its plane.
   bool holds(const Triangle& t, const std::uint32_t p) const {
     if (p == t[0] || p == t[1] || p == t[2]) return true;
     int k = 0;
     while (k < 2 && points_.turn(k, t[0], t[1], t[2]) == 0) ++k;
-    return same_way(points_.turn(k, t[0], t[1], p), points_.turn(k, t[1], t[2], p),
-                    points_.turn(k, t[2], t[0], p));
+    return same_turn(points_.turn(k, t[0], t[1], p), points_.turn(k, t[1], t[2], p),
+                     points_.turn(k, t[2], t[0], p));
   }
 
   /// Whether the line pq, which crosses the plane of t, meets the closed triangle.
@@ -82,10 +82,10 @@ class PairOfTriangles {
     const auto around = [&](const std::uint32_t a, const std::uint32_t b) {
       return a == p || a == q || b == p || b == q ? 0 : points_.side({p, q, a}, points_.view(b));
     };
-    return same_way(around(t[0], t[1]), around(t[1], t[2]), around(t[2], t[0]));
+    return same_turn(around(t[0], t[1]), around(t[1], t[2]), around(t[2], t[0]));
   }
 
-  static bool same_way(const int a, const int b, const int c) {
+  static bool same_turn(const int a, const int b, const int c) {
     return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
   }
 
@@ -202,7 +202,7 @@ class ClusterWork {
     }
   }
 
-  /// Puts points on the segments that hold them and finds where segments cross.
+  /// Puts points on the segments that contain them and finds where segments cross.
   /// `crossings`: how many all clusters have so far.
   void meet(std::atomic<std::size_t>& crossings) {
     std::vector<Segment>& segments = cluster_.segments;

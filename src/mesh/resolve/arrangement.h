@@ -53,9 +53,9 @@ struct Arrangement {
   std::vector<std::uint32_t> walls;   ///< by `plane`: where pieces cancelled each other
 };
 
-/// Triangles on a line are left out, and pieces that others, which face the other way, cancel.
-/// `pairs`: those that meet. The same for any number of threads. Throws Unresolvable, and as `work`
-/// does.
+/// Leaves out triangles on a line, and pieces that others cancel by facing the other side. `pairs`:
+/// the intersecting ones. Independent of the number of threads. Throws Unresolvable, and whatever
+/// `work` throws.
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
                     std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work);

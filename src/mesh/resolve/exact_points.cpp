@@ -189,7 +189,7 @@ int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
   const bool given = a.exact == nullptr && b.exact == nullptr && c.exact == nullptr;
   if (given && (ax == 0 || by == 0) && (ay == 0 || bx == 0)) return 0;
   const double left = ax * by, right = ay * bx, area = left - right;
-  // What the corners were rounded by, what the differences are.
+  // Bounds on the rounding of the corners, coordinate by coordinate.
   const double corner_x = error_of(a, x) + error_of(b, x) + error_of(c, x);
   const double corner_y = error_of(a, y) + error_of(b, y) + error_of(c, y);
   const double bound = exact_sign::kOrient2dBound * (std::abs(left) + std::abs(right)) +

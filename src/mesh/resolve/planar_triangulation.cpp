@@ -35,7 +35,7 @@ void PlanarTriangulation::hand_over(const std::uint32_t cell, const std::uint32_
   std::replace(cells_[cell].beyond.begin(), cells_[cell].beyond.end(), from, to);
 }
 
-/// The cell that holds p, by a walk that turns at random and so comes to an end.
+/// The cell that contains p, by a walk that turns at random and so comes to an end.
 std::uint32_t PlanarTriangulation::cell_of(const std::uint32_t p) {
   for (auto at = static_cast<std::uint32_t>(cells_.size() - 1);;) {
     random_ = random_ * 6364136223846793005 + 1442695040888963407;

@@ -9,8 +9,8 @@
 
 namespace ist {
 
-/// A triangulation of points of a plane, seen against a coordinate axis, that holds given segments.
-/// Exact, whatever lies on one line.
+/// A triangulation of points of a plane, seen against a coordinate axis, that contains given
+/// segments. Exact, whatever lies on one line.
 class PlanarTriangulation {
  public:
   /// `frame`: three points around all others. `inner`: the points, none twice.
@@ -68,7 +68,7 @@ class PlanarTriangulation {
   std::array<std::uint32_t, 3> frame_;
   std::vector<Cell> cells_;
   std::unordered_map<std::uint32_t, std::uint32_t> cell_at_;  ///< [point]
-  /// Of segments, from the smaller number.
+  /// Steps along segments, keyed by the smaller number.
   std::unordered_map<std::uint64_t, std::array<int, 2>> steps_;
   std::uint64_t random_ = 1;
 };

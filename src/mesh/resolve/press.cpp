@@ -23,7 +23,8 @@ namespace {
 using Point = Eigen::Vector3d;
 using Polygon = std::vector<Point>;  ///< convex
 
-/// Of what is near: no face that touches another is smaller, nor the part that does.
+/// In units of the near distance: a face that touches another, and the part that does, is at least
+/// this large.
 constexpr double kNarrowest = 16;
 
 class Faces {
@@ -91,25 +92,25 @@ class Faces {
   std::vector<Point> normals_;
 };
 
-/// The shortest way, nearly, that goes one step along each normal; at an edge as sharp as a knife
-/// it ends early. No way where faces on both sides have the vertex.
-Point way_along(const std::vector<Point>& normals) {
+/// Nearly the shortest displacement that moves one step along each normal; at a knife-sharp edge it
+/// is cut short. Zero if faces on both sides share the vertex.
+Point displacement_along(const std::vector<Point>& normals) {
   constexpr double kFarthest = 8;
   constexpr int kRounds = 64;
-  Point way = Point::Zero();
+  Point displacement = Point::Zero();
   for (int round = 0; round < kRounds; ++round) {
     double missing = 0;
     for (const Point& n : normals) {
-      const double short_of = 1 - n.dot(way);
-      if (short_of > 0) way += short_of * n;
+      const double short_of = 1 - n.dot(displacement);
+      if (short_of > 0) displacement += short_of * n;
       missing = std::max(missing, short_of);
     }
     if (missing < 1e-3) break;
   }
-  if (way.norm() > kFarthest) way *= kFarthest / way.norm();
-  const bool is_way = std::all_of(normals.begin(), normals.end(),
-                                  [&](const Point& n) { return n.dot(way) > 0.05; });
-  return is_way ? way : Point(Point::Zero());
+  if (displacement.norm() > kFarthest) displacement *= kFarthest / displacement.norm();
+  const bool is_valid = std::all_of(normals.begin(), normals.end(),
+                                    [&](const Point& n) { return n.dot(displacement) > 0.05; });
+  return is_valid ? displacement : Point(Point::Zero());
 }
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
@@ -165,7 +166,7 @@ Pressed press_together(const TriangleMesh& mesh) {
     if (touched[v].empty()) continue;
     normals.clear();
     for (const std::uint32_t t : touched[v]) normals.push_back(faces.normal(t));
-    pressed.vertices[v] += near * way_along(normals);
+    pressed.vertices[v] += near * displacement_along(normals);
     pressed.moved =
         std::max(pressed.moved, (pressed.vertices[v] - pressed.mesh.vertices[v]).norm());
   }

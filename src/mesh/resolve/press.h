@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// Of the spacing of doubles at a mesh's largest coordinate: what turning, scaling and moving may
-/// do to coordinates by rounding.
+/// In spacings of doubles at the mesh's largest coordinate: the most that turning, scaling and
+/// moving may change coordinates by rounding.
 constexpr double kNearSteps = 64;
 
 /// A closed mesh whose parts touch, changed by rounding's size.

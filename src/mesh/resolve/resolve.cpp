@@ -276,7 +276,7 @@ class Resolver {
       if (std::binary_search(arrangement_.walls.begin(), arrangement_.walls.end(),
                              arrangement_.plane[t]))
         any = changed[groups[t]] = true;
-    // What differs by less is one vertex, near the origin too.
+    // Points that differ by less become one vertex, near the origin too.
     const double step = spacing_at(largest_coordinate(bounds_of(vertices_)));
     TriangleMesh made;
     if (!any && pressed_.moved == 0) {
@@ -310,7 +310,7 @@ class Resolver {
     return made;
   }
 
-  /// Closes the surface and holds its volume against what the mesh counts.
+  /// Closes the surface and compares its volume with what the mesh counts.
   ClosedMesh close(TriangleMesh surface, Resolution& resolution) const {
     ClosedMesh result = close_oriented(std::move(surface), closed_.name);
     if (find_unbalanced_edge(result.mesh.triangles, EdgeTable(result.mesh.triangles)))

@@ -7,7 +7,8 @@
 
 namespace ist {
 
-/// What a mesh counts more than once, and what was done about it. w is its winding number.
+/// The volume that a mesh counts more than once, and how that was resolved. w is its winding
+/// number.
 struct Resolution {
   enum class How {
     as_it_is,   ///< the mesh is the boundary of where w ≥ 1: nothing was changed

@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// A closed ring of vertices, counter-clockwise seen from +z (or along the way it is swept).
+/// A closed ring of vertices, counter-clockwise seen from +z (or along the direction of the sweep).
 using Ring = std::vector<std::uint32_t>;
 
 /// Puts meshes together from rings. Coordinates are rounded to multiples of 2^-30, so that a sample

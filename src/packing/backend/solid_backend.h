@@ -39,9 +39,8 @@ class SolidBackend {
   /// A backend of the same kind for another solid, which must outlive it.
   virtual std::unique_ptr<SolidBackend> with(const MeshSolid& other) const = 0;
 
-  /// What makes a backend of the same solid for another thread, which calls it and works at the
-  /// same time as this one's does. It uses what this one has and must not outlive it. Empty: there
-  /// is none.
+  /// Makes a backend of the same solid for another thread, which works at the same time as this
+  /// one. It uses this backend's data and must not outlive it. Empty if there is none.
   virtual std::function<std::unique_ptr<SolidBackend>()> beside() { return {}; }
 
   /// Whether the caller's threads have nothing to do while this one works.

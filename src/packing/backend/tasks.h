@@ -5,8 +5,7 @@
 
 #include "mesh/hierarchy/line_lattice.h"
 
-// What a backend is asked besides packing, and what it answers: plain data in the solid's unit
-// frame.
+// Tasks for a backend besides packing, and their results: plain data in the solid's unit frame.
 
 namespace ist {
 
@@ -46,7 +45,7 @@ struct CoverBall {
   double radius = 0;  ///< unit frame, before extension
 };
 
-/// What is to be covered by which balls.
+/// Balls that are to cover the solid.
 struct CoverTask {
   std::span<const CoverBall> balls;  ///< radius: of the sphere, before it is enlarged
   double slack = 0;                  ///< by which every ball is enlarged, unit frame

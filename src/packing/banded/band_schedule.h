@@ -9,7 +9,7 @@
 
 namespace ist::packing {
 
-/// What comes next.
+/// The next step of a band.
 enum class BandStep : std::uint32_t {
   work,     ///< a band: work on the cells whose bound reaches the margin
   restart,  ///< forget all cells and begin at the root; spheres and grid stay
@@ -108,7 +108,7 @@ struct BandSchedule {
       threshold = smallest_wanted();
       slack = kLastSlack;
     }
-    // A cell with a half-diagonal below a quarter of the margin settles or holds a candidate, for
+    // A cell with a half-diagonal below a quarter of the margin settles or gets a candidate, for
     // its bound exceeds its prototype's radius by no more than the half-diagonal.
     margin = threshold * (1 + 0.5f * slack);
     spheres_before_band = spheres;
@@ -150,8 +150,8 @@ struct BandSchedule {
     return true;
   }
 
-  /// A winner's certified radius is worth inserting. Where not, float saw more room than there is:
-  /// its cell loses its prototype and gets refused_bound().
+  /// Whether a winner's certified radius is worth inserting. If not, float overestimated the
+  /// clearance: the cell loses its prototype and gets refused_bound().
   IST_HD bool accepts(float r) const {
     if (r >= threshold) return true;
     return !strict() && r >= 0.99f * threshold && r >= kSmallestRadius / 2 &&

@@ -102,7 +102,7 @@ class BandedPacker {
     }
   }
 
-  /// Works on the cells until each has settled or holds a candidate; leaves the latter in `active`.
+  /// Works on the cells until each has settled or has a candidate; leaves the latter in `active`.
   void resolve(Indices& active) {
     const Spheres spheres(result_.spheres, grid_);
     const Shape field(surface_, spheres);

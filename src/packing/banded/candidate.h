@@ -44,7 +44,7 @@ struct CandidateBuckets {
   float inverse_width = 1;
   std::uint32_t mask = 63;  ///< count − 1, count a power of two
 
-  /// Bucket of the cube at (dx, dy, dz), each −1 … 1, from the one that holds p; |p| ≤ 2.
+  /// Bucket of the cube at (dx, dy, dz), each −1 … 1, from the one that contains p; |p| ≤ 2.
   IST_HD std::uint32_t bucket_of(Float3 p, int dx, int dy, int dz) const {
     const std::uint64_t cube = index(p.x, dx) | index(p.y, dy) << 21 | index(p.z, dz) << 42;
     return static_cast<std::uint32_t>(mixed(cube)) & mask;

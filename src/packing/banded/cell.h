@@ -24,7 +24,7 @@ struct Cell {
 };
 
 /// The last few surface features that were closest somewhere near a cell. Children inherit their
-/// parent's. Each gives a constraint without a search; the oldest makes room for a new one.
+/// parent's. Each gives a constraint without a search; a new one replaces the oldest.
 constexpr int kRingCapacity = 8;
 
 /// A cell as it is kept.

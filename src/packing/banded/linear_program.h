@@ -14,7 +14,7 @@ constexpr int kMostPivots = 24;
 constexpr float kTolerance = 1e-5f;   ///< of a violation, in half-edges of the box
 constexpr float kLeastPivot = 1e-5f;  ///< below it an element of the basis counts as 0
 
-/// What the multipliers prove: `sums` of λ, λb, λ·gradient; z the vertex (t, y).
+/// The bound that the multipliers prove. `sums`: of λ, λb, λ·gradient; z: the vertex (t, y).
 IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5], const float z[4],
                                           float a) {
   ClearanceOptimum optimum;
@@ -30,10 +30,10 @@ IST_HD inline ClearanceOptimum optimum_of(float first_value, const float sums[5]
 }
 
 /// maximise_clearance() by a team of at least 32 lanes, the same arithmetic: a row a lane, in
-/// registers, and lane 4 i + k of every 16 holds element (i, k) of the basis' inverse and what
+/// registers, and lane 4 i + k of every 16 has element (i, k) of the basis' inverse and what
 /// belongs to slot k (SimplexBasis). All lanes know the vertex z. Rows are named by numbers:
-/// constraints from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes hold
-/// the sides.
+/// constraints from 0 on, side +y_k of the box −6 + 2 k, side −y_k one more; the first lanes
+/// have the sides.
 template <class Team>
 IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMemory* sample,
                                                int count, float a, float h2) {
@@ -101,10 +101,10 @@ IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMem
     const bool may_leave = w > kLeastPivot;
     const float inverse_w = 1 / (may_leave ? w : 1);
     const float ratio = lambda * inverse_w + 0.f;  // no −0
-    const std::uint32_t way = may_leave && ratio < kFarAway ? bits_of(ratio) : 0xFFFFFFFFu;
-    const std::uint32_t shortest = team.min(way);
+    const std::uint32_t travel = may_leave && ratio < kFarAway ? bits_of(ratio) : 0xFFFFFFFFu;
+    const std::uint32_t shortest = team.min(travel);
     if (shortest == 0xFFFFFFFFu) break;
-    const int leaving = team.first(way == shortest, holders);
+    const int leaving = team.first(travel == shortest, holders);
     const float theta = float_of(shortest);
     const float column =
         team.broadcast(inverse, (team.lane() & ~3) | leaving) * team.broadcast(inverse_w, leaving);
@@ -212,11 +212,11 @@ struct SimplexBasis {
 /// the linear model that the ascent follows.
 ///
 /// A linear program in (t, y): max t, t − gradient_i·y ≤ b_i, ±y_k ≤ a. Dual simplex from the
-/// constraint that alone is tightest; every basis on the way is dual feasible, so stopping early
+/// constraint that alone is tightest; every basis in between is dual feasible, so stopping early
 /// still gives a bound. The value is formed at the end from the multipliers by weak duality,
-/// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the pivots
-/// can only loosen it. Ties go to the smallest tag, so the result is a function of the set of
-/// constraints. `sample`: its constraints.
+/// Σλ_i b_i + a‖Σλ_i gradient_i‖₁ with Σλ_i = 1, which holds for any λ ≥ 0: rounding in the
+/// pivots can only loosen it. Ties go to the smallest tag, so the result is a function of the set
+/// of constraints. `sample`: its constraints.
 template <class Team>
 IST_HD ClearanceOptimum maximise_clearance(const Team& team, const SampleMemory* sample, int count,
                                            float a, float h2) {

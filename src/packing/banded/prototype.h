@@ -16,7 +16,7 @@ enum class CellState : std::uint8_t {
 
 constexpr int kMostPlaneTriangles = 32;  ///< of a convex neighbourhood
 
-/// What a team needs beside registers while it works on one cell; its lanes share it.
+/// Memory that a team's lanes share while they work on one cell, besides their registers.
 template <class Feature>
 struct CellScratch {
   SampleMemory sample[2];
@@ -78,9 +78,9 @@ class PrototypeField {
     return state;
   }
 
-  /// The first part of work(), which needs spheres and remembered features alone: `open` if the
-  /// rest is to follow, with what was seen. The three parts may be done one after another or in
-  /// steps of their own, for many cells at once. `at`: room to work in.
+  /// The first part of work(), which uses only spheres and remembered features. Returns `open`,
+  /// with the sample, if the other parts must follow. The three parts may be done one after another
+  /// or in separate passes over many cells. `at`: scratch memory.
   template <class Team>
   IST_HD CellState refresh(const Team& team, Cell& cell, const Feature* ring, SampleMemory* at,
                            float threshold, float margin, Bounded& seen) const {
@@ -97,7 +97,7 @@ class PrototypeField {
     return CellState::open;
   }
 
-  /// What refresh() saw from an open cell, where only `y` was kept of it.
+  /// Restores the sample of refresh() for an open cell of which only `y` was kept.
   template <class Team>
   IST_HD_ONCE Bounded look_again(const Team& team, const Cell& cell, Scratch& scratch,
                                  Float3 y) const {
@@ -148,9 +148,9 @@ class PrototypeField {
     return CellState::open;
   }
 
-  /// The last part: an ascent from where the cell's bound is attained, if that is sure to be inside
-  /// and better than the centre. From a centre outside the solid, from just behind the nearest
-  /// surface point, the last one remembered: the only way into a wall much thinner than the cell.
+  /// The last part: an ascent from the point that attains the cell's bound, if that is certainly
+  /// inside and better than the centre. If the centre is outside the solid, it starts just behind
+  /// the last remembered surface point: walls much thinner than the cell are reached only so.
   template <class Team>
   IST_HD CellState climb(const Team& team, Cell& cell, Scratch& scratch, float threshold) const {
     SampleMemory* const at = &scratch.sample[0];
@@ -162,10 +162,10 @@ class PrototypeField {
     if (cell.inside) {
       const float window = kWindow * cell.half;
       const Float3 there = x + cell.prototype;
-      const float way = norm(cell.prototype);
-      bool better = way < 0.99f * cell.surface_at_least;
+      const float moved_by = norm(cell.prototype);
+      bool better = moved_by < 0.99f * cell.surface_at_least;
       if (better) {
-        view = look(team, there, window, cell.surface_at_least - way, cell, scratch, at);
+        view = look(team, there, window, cell.surface_at_least - moved_by, cell, scratch, at);
         better = view.sample.clearance > clearance;
       }
       if (better)
@@ -190,7 +190,7 @@ class PrototypeField {
   }
 
   /// The k-th child of a cell, bounded by the spheres and the features that it inherits: `ring`,
-  /// the parent's, stays as it is and is the child's too. `at`: room to work in.
+  /// the parent's, is unchanged and is the child's too. `at`: scratch memory.
   template <class Team>
   IST_HD Cell child(const Team& team, const Cell& parent, int k, const Feature* ring,
                     SampleMemory* at, float margin) const {
@@ -210,9 +210,9 @@ class PrototypeField {
   static constexpr int kSpare = kRingCapacity + 1;
   static constexpr float kSmallestHalfEdge = 0x1p-23f;
 
-  // What the steps hand to each other goes by value: the device keeps it in registers.
+  // The steps pass their results by value: the device keeps them in registers.
 
-  /// What is seen from a point, of spheres and surface.
+  /// Spheres and surface as sampled from a point.
   struct View {
     Sample sample;
     float surface_at_least = 0;  ///< lower bound of the point's distance to the surface

@@ -8,8 +8,9 @@
 #include "base/hashing.h"
 #include "base/team.h"
 
-// What is seen from a point. Written for a team (base/team.h) whose lanes share a SampleMemory;
-// everything here is a function of the *set* of features, in whatever order a team meets them.
+// Samples of the surroundings of a point. Written for a team (base/team.h) whose lanes share a
+// SampleMemory. Every result is a function of the *set* of features, in whatever order a team finds
+// them.
 
 namespace ist::packing {
 
@@ -36,7 +37,7 @@ struct FeatureOffset {
   std::uint32_t tag = 0;
 };
 
-/// What a search of a surface finds within a limit.
+/// The result of a surface search within a limit.
 template <class Feature>
 struct NearestFeature {
   Feature feature{};
@@ -115,7 +116,7 @@ IST_HD int index_of_least(const Team& team, float& value, std::uint32_t tag, int
   return team.broadcast(index, lane);
 }
 
-/// Adds a constraint that all lanes know, if there is room.
+/// Adds a constraint that all lanes know, unless the sample is full.
 template <class Team>
 IST_HD void add(const Team& team, const Constraint& c, Sample& s) {
   if (c.distance < s.clearance) s.clearance = c.distance;
@@ -151,8 +152,8 @@ IST_HD_ONCE Sample keep_near(const Team& team, float window, Sample s) {
   return s;
 }
 
-/// Adds one constraint to a sample that is full at `room`: the farthest, by (distance, tag), is
-/// left out. All lanes know `c`.
+/// Adds one constraint to a sample that has `room` of them already, and drops the farthest by
+/// (distance, tag). All lanes know `c`.
 template <class Team>
 IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sample& s) {
   const SampleMemory& memory = *team.memory(s.at);
@@ -175,8 +176,7 @@ IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sa
   team.sync();
 }
 
-/// Adds the lanes' constraints, of those that have one, to a sample with too little room for them
-/// all: the nearest ones stay.
+/// Adds the constraints of the lanes that have one, and keeps the nearest if not all fit.
 template <class Team>
 IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& mine, int room,
                                Sample s) {
@@ -199,8 +199,8 @@ IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& min
   return s;
 }
 
-/// The sample at x of the spheres near it: those no further than the nearest + window, the nearest
-/// ones if they leave no room for `spare` more constraints. Sees no further than the grid's reach.
+/// Samples the spheres near x: those no further than the nearest + window, and only the nearest of
+/// them if fewer than `spare` places would stay free. The grid's reach limits the search.
 template <class Team, class Spheres>
 IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& spheres, float window,
                                   int spare, SampleMemory* at) {

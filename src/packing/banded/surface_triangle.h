@@ -87,9 +87,9 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
   return written;
 }
 
-/// What MeshSurface and WideMeshSurface have in common. Features are triangles, named by their
-/// places in the hierarchy's blocks; no answer depends on the hierarchy. A surface's functions that
-/// take a team are called by all its lanes and answer the same to each.
+/// Base of MeshSurface and WideMeshSurface. Features are triangles, named by their places in the
+/// hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its functions,
+/// and all get the same answer.
 template <class Surface>
 class TriangleSurface {
  public:
@@ -106,7 +106,7 @@ class TriangleSurface {
     return self().winding_number(team, x) >= 1;
   }
 
-  /// Inside by a winding number of 1: no other shell of the solid holds x.
+  /// Inside by a winding number of 1: no other shell of the solid contains x.
   template <class Team>
   IST_HD bool inside_once(const Team& team, Float3 x) const {
     return self().winding_number(team, x) == 1;

@@ -32,10 +32,9 @@ IST_HD inline double gap_to_sphere(Float3 centre, const Sphere& s) {
 IST_HD inline double gap_to_surface(double clearance) { return clearance - kGap; }
 IST_HD inline double clearance_limit(float radius) { return 1.001 * double{radius}; }
 
-/// Certified radius of a candidate: no more than its own radius and all its gaps; ≤ 0 if there is
-/// no room. `gap`: least of those to the surface and to the winners of the same round that go
-/// before it, each taken with its candidate's radius. The grid's reach must not be less than
-/// `radius`.
+/// Certified radius of a candidate: no more than its own radius and all its gaps; ≤ 0 if it does
+/// not fit. `gap`: the least of those to the surface and to the winners of the same round that
+/// outrank it, each taken with its candidate's radius. The grid's reach must be at least `radius`.
 template <class Team, class Spheres>
 IST_HD float certified_radius(const Team& team, Float3 centre, float radius, double gap,
                               const Spheres& spheres) {

@@ -9,7 +9,7 @@ namespace ist::packing {
 /// Throws Error, naming the setting, its value and its range, unless every setting is in range.
 void check_settings(const PackingSettings& settings);
 
-/// What the settings mean in the unit frame of a solid; `scale`: [u] of one unit-frame unit. Throws
+/// Converts the settings to the unit frame of a solid; `scale`: [u] of one unit-frame unit. Throws
 /// Error if the solid has no volume.
 PackingLimits packing_limits(const Solid& solid, double scale, const PackingSettings& settings);
 

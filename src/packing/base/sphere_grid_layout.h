@@ -10,9 +10,9 @@ namespace ist::packing {
 
 /// Spheres by place: cubes of the unit frame, and what each of them lists. A sphere is listed where
 /// its surface is within `reach`, so what is no further than `reach` from a point stands in the one
-/// cell that holds the point. Cells come in blocks of 8³. A cell wholly inside a sphere lists that
-/// sphere alone (there is at most one: spheres do not overlap). What a cell lists is a set and a
-/// function of layout and spheres.
+/// cell that contains the point. Cells come in blocks of 8³. A cell wholly inside a sphere lists
+/// that sphere alone (there is at most one: spheres do not overlap). What a cell lists is a set and
+/// a function of layout and spheres.
 struct SphereGridLayout {
   float reach = 2;     ///< > 0, unit frame
   float size = 0.25f;  ///< edge of a cell
@@ -54,7 +54,7 @@ IST_HD inline SphereGridLayout sphere_grid_layout(std::uint64_t spheres, float r
   return layout;
 }
 
-/// Of the cell that holds the coordinate x, or the nearest one; |x| < 2^20.
+/// The coordinate of the cell that contains x, or of the nearest cell; |x| < 2^20.
 IST_HD inline int grid_coordinate(const SphereGridLayout& layout, float x) {
   const int i = static_cast<int>((x + kGridHalfExtent) * layout.inverse_size);
   return i < 0 ? 0 : (i >= layout.cells_per_side ? layout.cells_per_side - 1 : i);
@@ -79,7 +79,7 @@ IST_HD inline GridRange grid_range(const SphereGridLayout& layout, const Sphere&
            grid_coordinate(layout, s.z + outer)}};
 }
 
-/// What a sphere is to a cell or a block.
+/// How a sphere lies to a cell or a block.
 enum class GridRelation : std::uint8_t {
   away,    ///< not listed
   near,    ///< listed, if nothing covers it
@@ -116,8 +116,8 @@ IST_HD inline GridRelation block_relation(const SphereGridLayout& layout, const 
                        axis_span(layout, 8 * j, 8, s.y), axis_span(layout, 8 * k, 8, s.z));
 }
 
-/// Cell (i, j, k) of a block that the sphere is near; where it is away from the block or covers it,
-/// that holds for all of the block's cells.
+/// Cell (i, j, k) of a block that the sphere is near. If it is away from the block or covers it, so
+/// it is for all of the block's cells.
 IST_HD inline GridRelation cell_relation(const SphereGridLayout& layout, const Sphere& s, int i,
                                          int j, int k) {
   return grid_relation(layout, s, axis_span(layout, i, 1, s.x), axis_span(layout, j, 1, s.y),

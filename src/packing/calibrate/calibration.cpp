@@ -170,7 +170,7 @@ std::vector<double> inflated_shares(std::span<const Sphere> inner) {
   return shares;
 }
 
-/// Calibrates prefixes of a packing; holds what is made of the solid for all of them.
+/// Calibrates prefixes of a packing; keeps the data of the solid that all of them use.
 class Calibrator {
  public:
   Calibrator(const MeshSolid& solid, SolidBackend& backend)

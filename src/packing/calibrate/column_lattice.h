@@ -10,9 +10,9 @@
 
 namespace ist {
 
-/// Columns about `step` apart, closer or wider where fewer than `min_columns` or more than
-/// `max_columns` would cross the solid, with at least 16 either way however thin the box. Same
-/// bytes for any number of threads.
+/// Plans columns about `step` apart, closer or wider if fewer than `min_columns` or more than
+/// `max_columns` would cross the solid, and at least 16 in both directions however thin the box.
+/// Same bytes for any number of threads.
 ColumnPlan plan_columns(const MeshSolid& solid, double step, double min_columns,
                         double max_columns);
 

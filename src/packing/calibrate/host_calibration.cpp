@@ -39,7 +39,7 @@ class SiteLists {
     powers_.resize(2 * room);
   }
 
-  void resize(std::size_t size) { size_ = size; }  ///< to no more than there is room for
+  void resize(std::size_t size) { size_ = size; }  ///< at most the capacity
 
   void append(const SiteArrays& sites, std::size_t count) {
     make_room(count);

@@ -91,13 +91,13 @@ constexpr std::uint32_t kPowerLeafSites = 8;  ///< few enough to walk columns am
 constexpr int kFlagLevel = 2;                 ///< finest level whose cells know if they are empty
 constexpr int kMostPowerLevels = 24;
 
-/// Plain arrays of a solid's columns and of an octree over them. A cell of level l holds 2^l
+/// Plain arrays of a solid's columns and of an octree over them. A cell of level l contains 2^l
 /// columns along y, as many rows and as many steps along x; cells beyond the columns are empty.
 struct PowerGrid {
   LineLattice columns;
   double x0 = 0, x1 = 0, step_x = 0;     ///< extent of the solid, steps along x; unit frame
   std::uint32_t nx = 0;                  ///< steps
-  int levels = 0;                        ///< the one cell of level levels − 1 holds everything
+  int levels = 0;                        ///< the one cell of level levels − 1 contains everything
   double to_fixed = 1;                   ///< scale of the integer sums
   const std::uint32_t* first = nullptr;  ///< spans of column (i, j) start at first[j ny + i]
   const ColumnSpan* spans = nullptr;
@@ -147,7 +147,7 @@ struct PowerBlock {
         j0(cell.j << cell.level),
         j1(least((cell.j + 1) << cell.level, grid.columns.nz)) {}
 
-  /// What lies within; x0 ≥ x1 if nothing does.
+  /// The part of a span within this one; x0 ≥ x1 if there is none.
   IST_HD ColumnSpan part_of(const ColumnSpan& span) const {
     return {span.x0 > x0 ? span.x0 : x0, span.x1 < x1 ? span.x1 : x1};
   }
@@ -272,7 +272,7 @@ struct PowerSums {
   }
 };
 
-/// What a piece adds to its site's sums.
+/// The terms of a piece in its site's sums.
 IST_HD inline PowerSums piece_sums(const PowerGrid& grid, double x0, double x1, double y,
                                    double z) {
   const double length = (x1 - x0) * grid.to_fixed;

@@ -146,7 +146,7 @@ class CellWalk {
     return hn::GetLane(hn::MinOfLanes(d, first));
   }
 
-  /// Of the sites of this value the one furthest along x, of twins the first.
+  /// Among the sites of this value the one furthest along x; among twins the first.
   std::size_t foremost(const double* values, double value) const {
     const Tag d;
     std::uint32_t equal = 0;

@@ -5,8 +5,8 @@
 
 #include "packing/calibrate/power_grid.h"
 
-// What the host does with the sites of a cell, in vectors: the arithmetic of PowerFilter and
-// walk_column, the same bits on every instruction set.
+// The host's vectors over the sites of a cell: the arithmetic of PowerFilter and walk_column, with
+// the same bits on every instruction set.
 
 namespace ist {
 
@@ -25,8 +25,8 @@ struct SiteArrays {
   }
 };
 
-/// Copies those of `count` sites that may own a part of the cell to `kept`, which may follow them
-/// without a gap; returns how many. `powers`: room for count + kMostPowerLanes.
+/// Copies those of `count` sites that may own a part of the cell to `kept`, which may directly
+/// follow them; returns how many. `powers`: count + kMostPowerLanes elements.
 std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t count,
                        const SiteArrays& kept, double* powers);
 

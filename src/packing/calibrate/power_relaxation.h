@@ -31,7 +31,7 @@ IST_HD inline double radius_of(double volume) {
   return cube_root(3 * volume / (4 * std::numbers::pi));
 }
 
-/// Part of the solid's volume that a cell holds, [0, 1]; `total`: the length of all cells.
+/// Part of the solid's volume in a cell, [0, 1]; `total`: the length of all cells.
 IST_HD inline double share_of(const PowerSums& sums, std::int64_t total) {
   return sums.length > 0 ? static_cast<double>(sums.length) / static_cast<double>(total) : 0;
 }

@@ -13,12 +13,12 @@
 namespace ist {
 
 /// Cover radii of a packing (docs/design.md 5), unit frame, rounded up: c_i ≥ r_i, and every point
-/// of the solid is within c_i of the centre of some inner sphere i. Proven by subdivision: a cell
-/// is left out only where its middle is further outside than its corners reach, or where one ball
-/// holds all of it. Balls are enlarged for points of the solid found on the way, level by level, so
-/// that few cells come down to the smallest size. `backend`: the solid's. Same bytes for any
-/// backend and number of threads, which are those of the current arena. Throws Error if there are
-/// no spheres or progress cancels.
+/// of the solid is within c_i of the centre of some inner sphere i. Subdivision proves it: a cell
+/// is dropped only if its middle is further outside than its corners reach, or if one ball contains
+/// all of it. Balls are enlarged level by level for points of the solid that are found, so that few
+/// cells reach the smallest size. `backend`: the solid's. Same bytes for any backend and any number
+/// of threads, which are those of the current arena. Throws Error if there are no spheres or
+/// progress cancels.
 std::vector<float> cover_radii(const MeshSolid& solid, SolidBackend& backend,
                                std::span<const Sphere> inner, const ProgressCallback& progress);
 

@@ -14,7 +14,7 @@
 namespace ist {
 
 // Every ball starts this much larger than it need be, over the mean leaf radius: cells that it
-// holds then need not be divided down to the surface.
+// contains then need not be divided down to the surface.
 constexpr double kCoverSlack = 0.1;
 // A cell is small enough once its half-diagonal is this part of the extension that it asks for.
 constexpr double kCoverRefinement = 0.2;
@@ -60,7 +60,7 @@ struct CoverDemand {
   IST_HD bool asks() const { return ball != 0xFFFFFFFFu; }
 };
 
-/// What became of a cell.
+/// The outcome for a cell.
 struct CoverVerdict {
   bool divide = false;  ///< it has to be divided; `count` balls were kept
   std::uint32_t count = 0;
@@ -92,10 +92,10 @@ IST_HD CoverBest best_ball(const Team& team, const CoverLevel& level, const std:
   return {all, team.min(least == all ? ball : 0xFFFFFFFFu)};
 }
 
-/// Looks at one cell with its parent's list. `keep` (room for the whole list) takes the balls that
-/// may be nearest somewhere in the cell's circumsphere. `surface` answers, for the team:
-/// nearest(point, radius, q): false only if the surface is certainly further away than `radius`,
-/// else q is about its closest point; inside(point): the winding number is ≥ 1.
+/// Examines one cell with its parent's list. `keep` (as long as the whole list) gets the balls that
+/// may be nearest somewhere in the cell's circumsphere. `surface` answers the team: nearest(point,
+/// radius, q): false only if the surface is certainly further away than `radius`, else q is about
+/// its closest point; inside(point): the winding number is ≥ 1.
 template <class Team, class Surface>
 IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const Surface& surface,
                                const CoverCell& cell, const std::uint32_t* list,
@@ -136,7 +136,7 @@ IST_HD CoverVerdict cover_cell(const Team& team, const CoverLevel& level, const 
     return farthest_from(ball, cell.x, cell.y, cell.z, level.half);
   };
   const CoverBest whole = best_ball(team, level, keep, kept, farthest);
-  if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball holds the cell
+  if (whole.lacks + kDistanceMargin <= 0) return verdict;  // one ball contains the cell
 
   // A point of the solid in the cell or beside it: its middle, or the surface's nearest.
   double point[3] = {cell.x, cell.y, cell.z};

@@ -53,7 +53,7 @@ class TriangleCells {
 
   IST_HD const CellRange& range() const { return range_; }
 
-  /// Of a cell in range().
+  /// Whether a triangle overlaps a cell in range().
   IST_HD bool meets(const GridLayout& g, int i, int j, int k) const {
     const double margin = double{kListMargin};
     const double size = double{g.size} + 2 * margin;
@@ -125,9 +125,9 @@ IST_HD inline SphereCell sphere_cell(const GridLayout& g, const Sphere& s, int i
 template <class Visit>
 IST_HD void for_sphere_row(const GridLayout& g, const Sphere& s, const CellRange& range, int j,
                            int k, bool covered_too, Visit&& visit) {
-  // What is covered is one run of cells.
+  // The covered cells are consecutive.
   bool inside = false;
-  int last = range.lo[0] - 1;  // last one met from the left
+  int last = range.lo[0] - 1;  // the last covered one so far
   for (int i = range.lo[0]; i <= range.hi[0]; ++i) {
     const SphereCell relation = sphere_cell(g, s, i, j, k);
     last = i;

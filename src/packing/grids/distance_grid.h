@@ -14,7 +14,7 @@ namespace ist::packing {
 constexpr std::uint32_t kTriangleTag = 0x80000000u;
 constexpr std::uint32_t kNoTag = 0xFFFFFFFFu;
 
-/// What an *active* cell of the distance grid stores: the primitives that meet it.
+/// The record of an *active* cell of the distance grid: the primitives that overlap it.
 struct CellRecord {
   std::uint32_t cell = 0;  ///< its id in the layout
   std::uint32_t triangles = 0, triangle_count = 0;
@@ -45,7 +45,7 @@ IST_HD inline GridTriangle make_grid_triangle(const double* a, const double* b, 
 
 /// The paper's adaptive storage (§4.3), to be read by anyone: words for all cells of the grid lead
 /// to the records of the active ones, those that are neither outside nor covered by one sphere. A
-/// word holds the place of the record and the *discrete distance* (§3): how many cells away, in
+/// word contains the place of the record and the *discrete distance* (§3): how many cells away, in
 /// Manhattan distance, the closest cell with a primitive is, or less; 255 where it is more. Once
 /// few cells are active, the words stand in a hash table.
 struct DistanceGrid {

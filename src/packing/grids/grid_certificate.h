@@ -7,9 +7,8 @@
 
 namespace ist::packing {
 
-/// The radius that a candidate may keep next to surface and spheres, in double
-/// (docs/design.md 3.2); 0 if its centre is not in the solid. Other winners of its round leave it
-/// its room (overlap()).
+/// The radius that surface and spheres leave to a candidate, in double (docs/design.md 3.2); 0 if
+/// its centre is not in the solid. Other winners of its round are checked by overlap().
 template <class Team>
 IST_HD double certified_room(const Team& team, const GridScene& scene,
                              const GridCandidate& candidate) {

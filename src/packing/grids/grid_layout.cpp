@@ -11,7 +11,7 @@ GridLayout make_grid_layout(const double lower[3], const double upper[3], int st
   double longest = 0;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, upper[k] - lower[k] + 4 * margin);
   // Edges of 8 significant bits and an origin that is a multiple of their last bit at the finest
-  // level: 24 bits then hold every border exactly.
+  // level: 24 bits then represent every border exactly.
   int exponent = 0;
   std::frexp(longest / start, &exponent);
   const double unit = std::ldexp(1.0, exponent - 8);

@@ -9,7 +9,7 @@ namespace ist::packing {
 
 /// Nothing is decided closer than this to a cell's border, unit frame: it covers the rounding of
 /// float coordinates and of float distances (float_distance_error), so that what is listed and
-/// what is searched always holds what counts.
+/// what is searched always covers what counts.
 constexpr float kListMargin = 2e-6f;
 constexpr float kSearchMargin = 8e-6f;
 
@@ -43,7 +43,7 @@ struct GridLayout {
   IST_HD float low_z(int k) const { return origin.z + static_cast<float>(k) * size; }
   IST_HD Float3 low(int i, int j, int k) const { return {low_x(i), low_y(j), low_z(k)}; }
 
-  /// The cell along one axis that holds the coordinate, clamped; off by rounding near a border.
+  /// The cell along one axis that contains the coordinate, clamped; off by rounding near a border.
   IST_HD static int along(float x, float from, float inverse_size, int count) {
     const auto i = static_cast<int>((x - from) * inverse_size);
     return i < 0 ? 0 : (i >= count ? count - 1 : i);

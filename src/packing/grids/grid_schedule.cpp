@@ -9,7 +9,7 @@
 namespace ist::packing {
 namespace {
 
-/// Of a grid's words and records while it is built, active cells being a third of all.
+/// Words and records of a grid under construction, with a third of its cells active.
 constexpr double kBytesPerCell = 24;
 
 double cell_count(const GridLayout& g) { return double(g.n[0]) * double(g.n[1]) * double(g.n[2]); }

@@ -8,7 +8,7 @@
 
 namespace ist::packing {
 
-/// What automatic grid sizes are picked from.
+/// The data from which automatic grid sizes are derived.
 struct GridFigures {
   double lower[3] = {}, upper[3] = {};  ///< bounds of the solid, unit frame
   double volume = 0;                    ///< unit frame³

@@ -26,7 +26,7 @@ std::vector<GridCandidate> filtered(const std::vector<GridCandidate>& candidates
   return out;
 }
 
-/// Candidates by size class and place: class c holds radii in [2^(c−1), 2^c) · 2^−kClasses, in
+/// Candidates by size class and place: class c contains radii in [2^(c−1), 2^c) · 2^−kClasses, in
 /// cells wide enough that a smaller candidate overlaps none beyond the neighbours of its own cell.
 class SizeClasses {
  public:

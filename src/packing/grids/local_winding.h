@@ -28,15 +28,15 @@ IST_HD inline int first_in_row(const GridLayout& g, const TriangleCells& cells, 
   return kNoCell;
 }
 
-/// What a triangle adds to the winding number along the centre line of a row, towards +x.
+/// The term of a triangle in the winding number along the centre line of a row, towards +x.
 IST_HD inline int row_crossing(const GridLayout& g, const Corners& t, int j, int k) {
   const double yz[2] = {double{g.low_y(j)} + 0.5 * double{g.size},
                         double{g.low_z(k)} + 0.5 * double{g.size}};
   return -pierced(t, yz);
 }
 
-/// What crossing the triangle on the line through p towards +x, between −∞ and p, adds to the
-/// winding number.
+/// The term in the winding number of crossing the triangle on the line through p towards +x,
+/// between −∞ and p.
 IST_HD inline int winding_before(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   return facing == 0 || lies_beyond(t, facing, p) ? 0 : -facing;

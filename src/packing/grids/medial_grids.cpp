@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "packing/grids/host_rounds.h"
 #include "packing/grids/pack_grids.h"
 
 namespace ist::packing {
@@ -40,6 +41,11 @@ std::vector<MedialNode> medial_nodes_of(std::vector<GridCandidate> converged,
     nodes.push_back({frame.from_unit({c.centre.x, c.centre.y, c.centre.z}),
                      double{c.radius} * frame.scale(), c.contacts});
   return nodes;
+}
+
+std::vector<MedialNode> medial_nodes_on_host(const MeshSolid& mesh,
+                                             const MedialSettings& settings) {
+  return medial_nodes_by(HostRounds(mesh.arrays()), mesh, settings);
 }
 
 }  // namespace ist::packing

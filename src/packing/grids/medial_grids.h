@@ -33,4 +33,7 @@ std::vector<MedialNode> medial_nodes_by(Rounds&& rounds, const MeshSolid& mesh,
   return medial_nodes_of(rounds.converged(ascent, [] { return true; }), mesh.frame());
 }
 
+/// The same with the threads of the current arena.
+std::vector<MedialNode> medial_nodes_on_host(const MeshSolid& mesh, const MedialSettings& settings);
+
 }  // namespace ist::packing

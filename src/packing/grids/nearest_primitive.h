@@ -6,9 +6,10 @@
 #include "packing/grids/cell_listing.h"
 
 // The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete
-// distance says that the Manhattan ball of that radius around it holds no primitive, and how far a
-// row of cells may be skipped. The answer is the minimum of one float formula over all primitives,
-// the smallest tag among equals; it depends neither on the grid nor on the order of the search.
+// distance says that the Manhattan ball of that radius around it contains no primitive, and how far
+// a row of cells may be skipped. The answer is the minimum of one float formula over all
+// primitives, the smallest tag among equals; it depends neither on the grid nor on the order of the
+// search.
 
 namespace ist::packing {
 
@@ -139,20 +140,20 @@ IST_HD void for_primitives_near(const Team& team, const DistanceGrid& grid, Floa
       const float gap2 = gap_y * gap_y + gap_z * gap_z;
       const int beside = (dj < 0 ? -dj : dj) + (dk < 0 ? -dk : dk);
       const int skip = empty > beside ? empty - beside : 0;
-      for (int way = 1; way >= -1; way -= 2) {
-        int i = way > 0 ? ci + skip : ci - (skip > 1 ? skip : 1);
+      for (int direction = 1; direction >= -1; direction -= 2) {
+        int i = direction > 0 ? ci + skip : ci - (skip > 1 ? skip : 1);
         bool done = !exists;
         while (team.any(!done)) {
           std::uint32_t slot = DistanceGrid::kInactive;
           const float reach = bound() * (1 + 1e-6f) + kSearchMargin;
           while (!done) {
-            float gap_x = way > 0 ? g.low_x(i) - p.x : p.x - g.low_x(i + 1);
+            float gap_x = direction > 0 ? g.low_x(i) - p.x : p.x - g.low_x(i + 1);
             gap_x = gap_x > 0 ? gap_x : 0;
             done = i < 0 || i >= g.n[0] || gap2 + gap_x * gap_x > reach * reach;
             if (done) break;
             const std::uint32_t word = grid.word(i, j, k);
             const int distance = word == DistanceGrid::kInactive ? 1 : DistanceGrid::distance(word);
-            i += distance == 0 ? way : way * distance;
+            i += distance == 0 ? direction : direction * distance;
             if (distance != 0) continue;
             slot = DistanceGrid::slot(word);
             break;

@@ -133,7 +133,7 @@ class GridPacker {
   StopReason reason_ = StopReason::exhausted;
 };
 
-/// What grid sizes are picked from; `memory` [bytes] for the grids.
+/// The data from which grid sizes are derived; `memory` [bytes] for the grids.
 GridFigures grid_figures(const MeshSolid& solid, std::size_t memory);
 
 /// Packs a mesh on the paper's grids (settings.grid, not banded) by the rounds of a host or a

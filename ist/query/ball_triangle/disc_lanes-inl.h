@@ -1,10 +1,10 @@
-// The angle of a vector of points: included once a target.
+// The formulas of a ball and a triangle for lanes of doubles: included once a target.
 
-#if defined(IST_QUERY_ANGLE_INL_H_) == defined(HWY_TARGET_TOGGLE)
-#ifdef IST_QUERY_ANGLE_INL_H_
-#undef IST_QUERY_ANGLE_INL_H_
+#if defined(IST_QUERY_DISC_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef IST_QUERY_DISC_LANES_INL_H_
+#undef IST_QUERY_DISC_LANES_INL_H_
 #else
-#define IST_QUERY_ANGLE_INL_H_
+#define IST_QUERY_DISC_LANES_INL_H_
 #endif
 
 #include <hwy/highway.h>
@@ -14,10 +14,21 @@ namespace ist::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+using DiscTag = hn::CappedTag<double, 8>;
+using Real = hn::Vec<DiscTag>;
+HWY_INLINE Real constant(double x) { return hn::Set(DiscTag(), x); }
+HWY_INLINE Real negated(Real x) { return hn::Zero(DiscTag()) - x; }
+HWY_INLINE Real root(Real x) { return hn::Sqrt(x); }
+HWY_INLINE Real lesser(Real x, Real y) { return hn::Min(x, y); }
+HWY_INLINE Real greater(Real x, Real y) { return hn::Max(x, y); }
+HWY_INLINE Real where_positive(Real x, Real y) {
+  return hn::IfThenElse(x > hn::Zero(DiscTag()), y, constant(1.0));
+}
+
 /// atan2(y, x) in (−π, π], within a few units in the last place; 0 for the origin. Products and
 /// sums alone, in this order, so that every instruction set has the same bits.
 template <class D, class V = hn::Vec<D>>
-HWY_INLINE V angle_of(D d, V x, V y) {
+HWY_INLINE V angle_of(D d, V y, V x) {
   // atan(t)/t as a polynomial in t² for 0 ≤ t ≤ tan(π/8), within 4e-17: interpolated at Chebyshev's
   // points with sixty digits.
   constexpr double kTerms[11] = {
@@ -53,6 +64,10 @@ HWY_INLINE V angle_of(D d, V x, V y) {
   angle = hn::IfThenElse(x < zero, hn::Set(d, 4 * kQuarter) - angle, angle);
   return hn::CopySignToAbs(angle, y);
 }
+
+#define IST_FORMULA HWY_INLINE
+#include "query/ball_triangle/disc_formulas-inl.h"
+#undef IST_FORMULA
 
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
