@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 namespace ist {
 
@@ -54,7 +53,7 @@ std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) co
 
 std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& crossed,
                                            std::uint32_t t) const noexcept {
-  const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
+  const std::uint32_t edge = 3 * t + opposite_edge(crossed, t);
   if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
   return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
@@ -111,12 +110,23 @@ void ExactParts::join_holes(Side& own) noexcept {
     return scratch_.crossings.triangle(own.is_b ? 1 : 0, i);
   };
   CurveExtent* const curves = scratch_.curves.get();
+  std::uint32_t alone = 0;  // curves in one triangle
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    std::uint32_t& triangle = curves[root(i)].triangle;
+    if (root(i) == i) {
+      triangle = triangle_of(i);
+      ++alone;
+    } else if (triangle != kNoIndex && triangle != triangle_of(i)) {
+      triangle = kNoIndex;
+      --alone;
+    }
+  }
+  if (alone == 0) return;
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     CurveExtent& curve = curves[root(i)];
     Point from, to;
     segment(i, from, to);
-    if (root(i) == i) curve = {triangle_of(i), from, from, {}};
-    if (curve.triangle != triangle_of(i)) curve.triangle = kNoIndex;
+    if (root(i) == i) curve = {curve.triangle, from, from, {}};
     curve.low = {std::min(curve.low.x, from.x), std::min(curve.low.y, from.y),
                  std::min(curve.low.z, from.z)};
     curve.high = {std::max(curve.high.x, from.x), std::max(curve.high.y, from.y),
@@ -177,7 +187,13 @@ void ExactParts::join_edges() noexcept {
   for (Side& own : sides_)
     for (std::uint32_t c = 0; c < own.marks.count; ++c) {
       const CrossedBlock& crossed = own.marks.blocks[c];
+      const MeshBlock& mesh = own.mesh.blocks[crossed.block];
       for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
+        // The triangle on its other side has the same ends.
+        const std::uint32_t t = edge / 3;
+        if (edge % 3 != opposite_edge(crossed, t) &&
+            mesh.vertex[mesh.corner[edge % 3][t]] > mesh.vertex[mesh.corner[(edge + 1) % 3][t]])
+          return;
         std::uint32_t& middle = scratch_.middles[first_middle(own, crossed) + edge];
         middle = join_edge(own, crossed, edge, middle);
       });
@@ -196,8 +212,9 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
                      i / 2, (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
   }
   std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
-    return std::tuple((x.other & 2) == 0, x.t, x.crossing) <
-           std::tuple((y.other & 2) == 0, y.t, y.crossing);
+    const bool first_half = (x.other & 2) != 0;
+    if (first_half != ((y.other & 2) != 0)) return first_half;
+    return x.t < y.t || (x.t == y.t && x.crossing < y.crossing);
   });
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
   const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
@@ -224,7 +241,7 @@ void ExactParts::join_vertices(Side& own) noexcept {
   std::uint32_t count = 0;
   for (std::uint32_t c = 0; c < own.marks.count; ++c) {
     const CrossedBlock& crossed = own.marks.blocks[c];
-    if (crossed.pierced == 0) continue;
+    if (crossed.pierced == 0 || crossed.inside == 0) continue;
     const MeshBlock& mesh = own.mesh.blocks[crossed.block];
     for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
       const std::uint32_t p = mesh.corner[edge % 3][edge / 3],

@@ -24,6 +24,9 @@ class ExactParts : public ExactQuery {
  protected:
   std::uint32_t part_of(std::uint32_t element) noexcept;
 
+  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
+  std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
+                               std::uint32_t vertex) const noexcept;
   std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
   /// What a triangle of a crossed block hangs together with, where it counts as a whole.
   std::uint32_t triangle_element(const Side& side, const CrossedBlock& crossed,
@@ -32,9 +35,6 @@ class ExactParts : public ExactQuery {
  private:
   std::uint32_t root(std::uint32_t element) noexcept;
   void unite(std::uint32_t x, std::uint32_t y) noexcept;
-  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
-  std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
-                               std::uint32_t vertex) const noexcept;
   std::uint32_t first_middle(const Side& side, const CrossedBlock& crossed) const noexcept;
 
   void begin() noexcept;
