@@ -271,6 +271,17 @@ TEST_F(ExactOctants, AThreadHoldsAllAround) {
   }
 }
 
+TEST_F(ExactOctants, AThinContactIsNotCutAlongItsFace) {
+  // Aslant, so that what is above the middle is not over what is below it.
+  const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
+  const Asset foot = surface(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)));
+  for (int k = 0; k < 12; ++k) {
+    const double way = 0.1 + k * std::numbers::pi / 6;
+    const Pose pose = turned(Point(std::cos(way), std::sin(way), 0), 1e-3, {0, 0, -2e-3});
+    EXPECT_EQ(ask({table.view(), {}, 1}, {foot.view(), pose, 1}).size(), 4u) << way;
+  }
+}
+
 TEST_F(ExactOctants, ASmallFootKeepsItsPatchWhereRoomIsShort) {
   const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
   const Asset feet = surface(testing::joined(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)),

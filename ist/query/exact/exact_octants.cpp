@@ -36,7 +36,7 @@ void move(OctantSums& from, double share, OctantSums& to) {
 double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
 
 /// How far two octants are one: where one is a sliver of the other, or where they are near to each
-/// other, as those above and below the middle of a thin contact are.
+/// other, as those above and below the middle of a contact that is thin aslant are.
 double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = std::min(x.six_volumes, y.six_volumes),
                more = std::max(x.six_volumes, y.six_volumes);
@@ -46,15 +46,29 @@ double oneness(const OctantSums& x, const OctantSums& y, double near) {
   return std::max(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
+/// How far the octants above and below the middle of a part are one, as it is thin along an axis.
+double thinness(const OctantSums& box, int axis, double near) {
+  return falls(box.high[axis] - box.low[axis], near);
+}
+
+bool is_thick(const OctantSums& box, double near) {
+  return thinness(box, 0, near) == 0 && thinness(box, 1, near) == 0 && thinness(box, 2, near) == 0;
+}
+
 /// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for
 /// lack of room.
 void join_octants(OctantSums (&octants)[8], double near, double small) {
-  for (int k = 0; k < 3; ++k)
+  const auto join = [&](int k, const auto& share) {
     for (int i = 0; i < 8; ++i)
-      if ((i >> k & 1) == 0) {
-        OctantSums &x = octants[i], &y = octants[i | 1 << k];
-        move(y, oneness(x, y, near), x);
-      }
+      if ((i >> k & 1) == 0)
+        move(octants[i | 1 << k], share(octants[i], octants[i | 1 << k]), octants[i]);
+  };
+  for (int k = 0; k < 3; ++k) {
+    const double thin = thinness(octants[0], k, near);
+    join(k, [&](const auto&, const auto&) { return thin; });
+  }
+  for (int k = 0; k < 3; ++k)
+    join(k, [&](const auto& x, const auto& y) { return oneness(x, y, near); });
   double different = 0, areas = 0;
   for (const OctantSums& sums : octants) {
     different += length(sums.area[0] + sums.area[1]);
@@ -66,11 +80,16 @@ void join_octants(OctantSums (&octants)[8], double near, double small) {
 
 }  // namespace
 
+Point ExactOctants::in_axes(const Point& x) const noexcept {
+  return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
+}
+
 ExactOctants::Corner ExactOctants::corner(const OctantSums* octants,
                                           const Point& x) const noexcept {
-  const Point from = x - octants->centre;
-  Corner out = {{dot(axis_[0], from), dot(axis_[1], from), dot(axis_[2], from)}, 0};
+  const Point from = in_axes(x - octants->centre);
+  Corner out = {{from.x, from.y, from.z}, 0};
   for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
+  out.octant &= octants->planes;
   return out;
 }
 
@@ -124,6 +143,47 @@ OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
   const ExactPart& part = scratch_.parts[part_of(element)];
   const std::uint32_t slot = scratch_.parts[part.kept].slot;
   return slot == kNoIndex ? nullptr : &scratch_.octant_sums[8 * slot];
+}
+
+/// The boxes of parts, and the planes that cut them: those across which octants are not one anyway.
+/// Whether there are any.
+bool ExactOctants::find_planes(std::span<ExactPart> parts, double near) noexcept {
+  const auto reach = [&](OctantSums& sums, const Point& x) {
+    const Point from = in_axes(x - sums.centre);
+    for (int k = 0; k < 3; ++k) {
+      sums.low[k] = std::min(sums.low[k], from[k]);
+      sums.high[k] = std::max(sums.high[k], from[k]);
+    }
+  };
+  // The surface between its curves may reach further than these.
+  for (std::uint32_t i = 0; i < out_.crossings; ++i)
+    if (OctantSums* const sums = octants_of(i))
+      reach(*sums, scratch_.crossings.place_of(i, 0, out_.origin));
+  for (Side& own : sides_) {
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      for (std::uint32_t v = 0; v < own.mesh.blocks[b].vertices; ++v)
+        if (crossed.inside >> v & 1)
+          if (OctantSums* const sums = octants_of(vertex_element(own, crossed, v)))
+            reach(*sums, crossed.at(v));
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
+      OctantSums* const sums = octants_of(block_element(own, b));
+      if (sums == nullptr || is_thick(*sums, near)) return;
+      const MeshBlock& mesh = own.mesh.blocks[b];
+      for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+        reach(*sums, place(own, mesh.vertex[v]) - out_.origin);
+    });
+  }
+  bool any = false;
+  for (ExactPart& part : parts) {
+    if (part.slot == kNoIndex) continue;
+    OctantSums& sums = scratch_.octant_sums[8 * part.slot];
+    for (int k = 0; k < 3; ++k) sums.planes |= (thinness(sums, k, near) < 1 ? 1 : 0) << k;
+    if (sums.planes == 0) part.slot = kNoIndex;
+    any = any || sums.planes != 0;
+  }
+  return any;
 }
 
 /// The pieces that parts are summed of: see ExactTerms.
@@ -182,9 +242,6 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
   }
   if (all == any) {
     const LaneSums found = lane_sums(own, 1, b / kWidth, b % kWidth, out_.origin + octants->centre);
-    const auto in_axes = [&](const Point& v) -> Point {
-      return {dot(axis_[0], v), dot(axis_[1], v), dot(axis_[2], v)};
-    };
     OctantSums& sums = octants[all];
     sums.six_volumes += found.six_volumes;
     sums.moment = sums.moment + in_axes(found.moment);
@@ -197,7 +254,7 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
                  vertex[mesh.corner[2][t]]);
 }
 
-std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
+std::uint32_t ExactOctants::split(std::span<ExactPart> parts, bool by_b, double near,
                                   std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
     axis_[k] =
@@ -206,8 +263,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
   std::uint32_t slots = 0, count = 0;
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
-    ExactPart& part = scratch_.parts[p];
-    part.slot = kNoIndex;
+    ExactPart& part = parts[p];
     if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
         slots == ExactScratch::kMostSplit)
       continue;
@@ -216,7 +272,7 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
     std::fill_n(octants, 8, OctantSums{});
     octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
   }
-  if (slots > 0) sum_octants();
+  if (slots > 0 && find_planes(parts, near)) sum_octants();
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
     const std::uint32_t first = count;
