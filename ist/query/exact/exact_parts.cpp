@@ -293,16 +293,45 @@ std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
   return part;
 }
 
-void ExactParts::sum_parts() noexcept {
-  ExactTerms terms;
+void ExactParts::name_parts() noexcept {
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
     ExactPart& part = scratch_.parts[part_of(i)];
     const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << kTriangleBits |
                               scratch_.crossings.triangle(1, i)) +
                              1;
     part.id = part.id == 0 ? id : std::min(part.id, id);
-    add_crossing_term(terms, i % 8, part.sums);
+  }
+}
+
+bool ExactParts::are_one() noexcept {
+  bool one = parts_ == 1;
+  for (Side& own : sides_) {
+    if (!one) return false;
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      std::int8_t whole[kWidth];
+      count_triangles(own.mesh.blocks[b], crossed, whole);
+      for (std::uint32_t t = 0; one && t < kWidth; ++t) {
+        if (whole[t] == 0) continue;
+        const std::uint32_t element = triangle_element(own, crossed, t);
+        one = element != kNoIndex && part_of(element) == 0;
+      }
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count,
+                   [&](std::uint32_t b) { one = one && part_of(block_element(own, b)) == 0; });
+  }
+  return one;
+}
+
+void ExactParts::sum_parts() noexcept {
+  if (are_one() && out_.sums.volume() > 0) {
+    scratch_.parts[0].sums = out_.sums;
+    return;
+  }
+  ExactTerms terms;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
+    add_crossing_term(terms, i % 8, scratch_.parts[part_of(i)].sums);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -342,6 +371,7 @@ std::uint32_t ExactParts::divide() noexcept {
   join_edges();
   for (Side& own : sides_) join_vertices(own);
   for (Side& own : sides_) join_blocks(own);
+  name_parts();
   sum_parts();
   join_cavities();
   return parts_;

@@ -45,6 +45,9 @@ class ExactParts : public ExactQuery {
                           std::uint32_t first) noexcept;
   void join_vertices(Side& side) noexcept;
   void join_blocks(Side& side) noexcept;
+  void name_parts() noexcept;
+  /// Whether all that counts is in one part: its sums are the whole's.
+  bool are_one() noexcept;
   void sum_parts() noexcept;
   void join_cavities() noexcept;
 
