@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "query/base/smooth_step.h"
+#include "query/exact/overlap_formulas.h"
 
 namespace ist {
 namespace {
@@ -31,6 +32,13 @@ void move(OctantSums& from, double share, OctantSums& to) {
   give(from.moment, to.moment);
   give(from.torque, to.torque);
   for (int s = 0; s < 2; ++s) give(from.area[s], to.area[s]);
+}
+
+void add(OctantSums& sums, bool of_b, const exact::OctantTerms& terms) {
+  sums.six_volumes += terms.six_volumes;
+  sums.moment = sums.moment + terms.moment;
+  sums.area[of_b] = sums.area[of_b] + terms.area;
+  sums.torque = sums.torque + terms.torque;
 }
 
 double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
@@ -112,15 +120,8 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
                                 const Corner& q, const Corner& r) noexcept {
   const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
   if (unlike == 0) {
-    OctantSums& sums = octants[p.octant];
-    const Point first = p.point(), second = q.point(), third = r.point();
-    const Point area = (0.5 * times) * cross(second - first, third - first);
-    const Point three = first + (second + third);
-    const double six = 2 * dot(first, area);
-    sums.six_volumes += six;
-    sums.moment = sums.moment + six * three;
-    sums.area[of_b] = sums.area[of_b] + area;
-    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(three, area);
+    add(octants[p.octant], of_b,
+        exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(), r.point()));
     return;
   }
   const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
@@ -137,6 +138,45 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   to_other.octant ^= bit;
   add_triangle(octants, of_b, times, to_next, next, other);
   add_triangle(octants, of_b, times, to_next, other, to_other);
+}
+
+/// Those of a crossing. Most lie in one octant.
+void ExactOctants::add_pieces(const OctantPieces& pieces, std::uint32_t lane,
+                              OctantSums* octants) noexcept {
+  int octant[6], all = 7, any = 0;
+  for (int c = 0; c < 6; ++c) {
+    octant[c] = pieces.octant[c][lane] & octants->planes;
+    all &= octant[c];
+    any |= octant[c];
+  }
+  const auto lanes = [&](const double(&of)[3][8]) -> Point {
+    return {of[0][lane], of[1][lane], of[2][lane]};
+  };
+  if (all == any) {
+    OctantSums& sums = octants[all];
+    sums.six_volumes += pieces.sum_six_volumes[lane];
+    sums.moment = sums.moment + lanes(pieces.sum_moment);
+    for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + lanes(pieces.sum_area[s]);
+    sums.torque = sums.torque + lanes(pieces.sum_torque);
+    return;
+  }
+  for (int t = 0; t < OctantPieces::kTriangles; ++t) {
+    if (pieces.times[t][lane] == 0) continue;
+    const bool of_b = (pieces.of_b[t] >> lane & 1) != 0;
+    const int c[3] = {pieces.corner(t, 0, lane), pieces.corner(t, 1, lane),
+                      pieces.corner(t, 2, lane)};
+    if (octant[c[0]] == octant[c[1]] && octant[c[0]] == octant[c[2]]) {
+      add(octants[octant[c[0]]], of_b,
+          {pieces.six_volumes[t][lane], lanes(pieces.moment[t]), lanes(pieces.area[t]),
+           lanes(pieces.torque[t])});
+      continue;
+    }
+    const auto at = [&](int k) -> Corner {
+      const double(&x)[3][8] = pieces.at[c[k]];
+      return {{x[0][lane], x[1][lane], x[2][lane]}, octant[c[k]]};
+    };
+    add_triangle(octants, of_b, pieces.times[t][lane], at(0), at(1), at(2));
+  }
 }
 
 OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
@@ -188,27 +228,24 @@ bool ExactOctants::find_planes(std::span<ExactPart> parts, double near) noexcept
 
 /// The pieces that parts are summed of: see ExactTerms.
 void ExactOctants::sum_octants() noexcept {
-  const Crossings& crossings = scratch_.crossings;
-  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    OctantSums* const octants = octants_of(i);
-    if (octants == nullptr) continue;
-    const Corner ends[2] = {corner(octants, crossings.place_of(i, 0, out_.origin)),
-                            corner(octants, crossings.place_of(i, 1, out_.origin))};
-    Corner apex[2];
-    for (int s = 0; s < 2; ++s) {
-      apex[s] = corner(octants,
-                       {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]});
-      add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
+  OctantView view;
+  view.origin = out_.origin;
+  std::copy_n(axis_, 3, view.axis);
+  OctantPieces pieces;
+  for (std::uint32_t first = 0; first < out_.crossings; first += 8) {
+    const std::uint32_t count = std::min(8u, out_.crossings - first);
+    OctantSums* octants[8] = {};
+    bool any = false;
+    for (std::uint32_t l = 0; l < count; ++l) {
+      octants[l] = octants_of(first + l);
+      if (octants[l] == nullptr) continue;
+      any = true;
+      for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
     }
-    for (int e = 0; e < 2; ++e) {
-      const double times = crossings.opposite(e)[i];
-      if (times == 0) continue;
-      const bool of_b = crossings.end_of(i, e).of_b;
-      const Point near = {crossings.end(e, Crossings::kFrom)[i],
-                          crossings.end(e, Crossings::kFrom + 1)[i],
-                          crossings.end(e, Crossings::kFrom + 2)[i]};
-      add_triangle(octants, of_b, times, apex[of_b], ends[e], corner(octants, near - out_.origin));
-    }
+    if (!any) continue;
+    octant_pieces(scratch_.crossings, first, view, pieces);
+    for (std::uint32_t l = 0; l < count; ++l)
+      if (octants[l] != nullptr) add_pieces(pieces, l, octants[l]);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {

@@ -4,6 +4,7 @@
 #include <span>
 
 #include "query/exact/exact_parts.h"
+#include "query/exact/overlap_terms.h"
 
 namespace ist {
 
@@ -36,6 +37,8 @@ class ExactOctants : public ExactParts {
 
   bool find_planes(std::span<ExactPart> parts, double near) noexcept;
   void sum_octants() noexcept;
+  static void add_pieces(const OctantPieces& pieces, std::uint32_t lane,
+                         OctantSums* octants) noexcept;
   void sum_block(const Side& side, std::uint32_t block, OctantSums* octants) noexcept;
   std::uint32_t write_octants(const ExactPart& part, double small, double near,
                               std::uint32_t first) noexcept;
