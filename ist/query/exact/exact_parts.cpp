@@ -12,6 +12,9 @@ namespace {
 /// ExactScratch has no more blocks, and eight times a pair's name fits into 64 bits.
 constexpr int kTriangleBits = 28;
 
+/// Of an end in the list of its edge, above the number of the next.
+constexpr std::uint64_t kEnters = std::uint64_t{1} << 32, kFromFirst = std::uint64_t{2} << 32;
+
 template <class Visit>
 void for_each_bit(std::uint64_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(std::countr_zero(bits)));
@@ -58,7 +61,7 @@ std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& 
   return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
 
-/// Each element by itself.
+/// Each element by itself, and no end in the list of an edge.
 void ExactParts::begin() noexcept {
   vertices_of_b_ = out_.crossings + kWidth * sides_[0].marks.count;
   blocks_of_a_ = vertices_of_b_ + kWidth * sides_[1].marks.count;
@@ -71,6 +74,13 @@ void ExactParts::begin() noexcept {
   for (const Side& own : sides_)
     for_each_block(own.marks.inside, own.mesh.level[0].count,
                    [&](std::uint32_t block) { alone(block_element(own, block)); });
+  for (const Side& own : sides_)
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
+        scratch_.middles[first_middle(own, crossed) + edge] = kNoIndex;
+      });
+    }
 }
 
 /// Segments that end at the same place go on in each other: it is an edge of one triangle and
@@ -78,12 +88,18 @@ void ExactParts::begin() noexcept {
 void ExactParts::join_curves() noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint64_t* const table = scratch_.keys.get();  // numbers of ends, from 1
+  std::uint64_t* const next = scratch_.other_keys.get();
   const std::uint32_t mask = std::bit_ceil(2 * out_.crossings + 1) - 1;
   std::fill_n(table, mask + 1, 0);
   for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
     const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    const MeshBlock& mesh = side(end.of_b).mesh.blocks[end.triangle / kWidth];
+    Side& own = side(end.of_b);
+    const MeshBlock& mesh = own.mesh.blocks[end.triangle / kWidth];
     const std::uint32_t lane = end.triangle % kWidth;
+    std::uint32_t& first =
+        scratch_.middles[first_middle(own, crossed_block(own, end.triangle)) + 3 * lane + end.edge];
+    next[i] = first | (end.enters ? kEnters : 0) | (end.from_first ? kFromFirst : 0);
+    first = i;
     const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
                         q = mesh.vertex[mesh.corner[(end.edge + 1) % 3][lane]];
     const std::uint64_t edge = std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
@@ -112,8 +128,9 @@ void ExactParts::join_holes(Side& own) noexcept {
   CurveExtent* const curves = scratch_.curves.get();
   std::uint32_t alone = 0;  // curves in one triangle
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    std::uint32_t& triangle = curves[root(i)].triangle;
-    if (root(i) == i) {
+    const std::uint32_t first = root(i);
+    std::uint32_t& triangle = curves[first].triangle;
+    if (first == i) {
       triangle = triangle_of(i);
       ++alone;
     } else if (triangle != kNoIndex && triangle != triangle_of(i)) {
@@ -167,23 +184,6 @@ void ExactParts::join_holes(Side& own) noexcept {
 
 /// What an edge has inside joins what bounds it, end by end.
 void ExactParts::join_edges() noexcept {
-  // A list of its ends for each edge that is pierced.
-  std::uint64_t* const next = scratch_.other_keys.get();
-  for (Side& own : sides_)
-    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
-      const CrossedBlock& crossed = own.marks.blocks[c];
-      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
-        scratch_.middles[first_middle(own, crossed) + edge] = kNoIndex;
-      });
-    }
-  for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
-    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    Side& own = side(end.of_b);
-    std::uint32_t& first = scratch_.middles[first_middle(own, crossed_block(own, end.triangle)) +
-                                            3 * (end.triangle % kWidth) + end.edge];
-    next[i] = first;
-    first = i;
-  }
   for (Side& own : sides_)
     for (std::uint32_t c = 0; c < own.marks.count; ++c) {
       const CrossedBlock& crossed = own.marks.blocks[c];
@@ -205,43 +205,53 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
                                     std::uint32_t edge, std::uint32_t first) noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
-  for (std::uint32_t i = first; i != kNoIndex;
-       i = static_cast<std::uint32_t>(scratch_.other_keys[i])) {
-    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    ends[count++] = {0, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
-                     i / 2, (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
+  for (std::uint32_t i = first; i != kNoIndex;) {
+    const std::uint64_t next = scratch_.other_keys[i];
+    ends[count++] = {next, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
+                     i / 2, 0, false};
+    i = static_cast<std::uint32_t>(next);
   }
-  std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
-    const bool first_half = (x.other & 2) != 0;
-    if (first_half != ((y.other & 2) != 0)) return first_half;
-    return x.t < y.t || (x.t == y.t && x.crossing < y.crossing);
-  });
+  if (count > 1)
+    std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
+      const bool first_half = (x.edge & kFromFirst) != 0;
+      if (first_half != ((y.edge & kFromFirst) != 0)) return first_half;
+      return x.t < y.t || (x.t == y.t && x.crossing < y.crossing);
+    });
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
   const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                       q = mesh.corner[(edge + 1) % 3][edge / 3];
   std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoIndex;
   std::uint32_t middle = inside;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if ((ends[i].other & 1) != 0) {
+    if ((ends[i].edge & kEnters) != 0) {
       inside = ends[i].crossing;
     } else {
       if (inside != kNoIndex) unite(inside, ends[i].crossing);
       inside = kNoIndex;
     }
-    if ((ends[i].other & 2) != 0) middle = inside;
+    if ((ends[i].edge & kFromFirst) != 0) middle = inside;
   }
   if (inside != kNoIndex && (crossed.inside >> q & 1) != 0)
     unite(inside, vertex_element(own, crossed, q));
   return middle;
 }
 
-/// Vertices inside, along edges that nothing pierces and from block to block.
+/// Vertices inside, along edges that nothing pierces and from block to block. A table finds those
+/// that are one.
 void ExactParts::join_vertices(Side& own) noexcept {
-  std::uint64_t* const found = scratch_.keys.get();  // vertex and element
-  std::uint32_t count = 0;
+  const auto matters = [](const CrossedBlock& crossed) {
+    return crossed.pierced != 0 && crossed.inside != 0;
+  };
+  int count = 0;
+  for (std::uint32_t c = 0; c < own.marks.count; ++c)
+    if (matters(own.marks.blocks[c])) count += std::popcount(own.marks.blocks[c].inside);
+  std::uint64_t* const table = scratch_.keys.get();  // vertex and element
+  const std::uint32_t mask = std::bit_ceil(2 * static_cast<std::uint32_t>(count) + 1) - 1;
+  constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+  std::fill_n(table, mask + 1, kEmpty);
   for (std::uint32_t c = 0; c < own.marks.count; ++c) {
     const CrossedBlock& crossed = own.marks.blocks[c];
-    if (crossed.pierced == 0 || crossed.inside == 0) continue;
+    if (!matters(crossed)) continue;
     const MeshBlock& mesh = own.mesh.blocks[crossed.block];
     for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
       const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
@@ -249,14 +259,16 @@ void ExactParts::join_vertices(Side& own) noexcept {
       if ((crossed.pierced >> edge & 1) == 0 && (crossed.inside >> p & 1) != 0)
         unite(vertex_element(own, crossed, p), vertex_element(own, crossed, q));
     }
-    for (std::uint32_t v = 0; v < mesh.vertices; ++v)
-      if (crossed.inside >> v & 1)
-        found[count++] = std::uint64_t{mesh.vertex[v]} << 32 | vertex_element(own, crossed, v);
+    for_each_bit(crossed.inside, [&](std::uint32_t v) {
+      const std::uint32_t vertex = mesh.vertex[v], element = vertex_element(own, crossed, v);
+      std::uint32_t slot = vertex * 2654435769u >> 7 & mask;
+      while (table[slot] != kEmpty && table[slot] >> 32 != vertex) slot = (slot + 1) & mask;
+      if (table[slot] == kEmpty)
+        table[slot] = std::uint64_t{vertex} << 32 | element;
+      else
+        unite(element, static_cast<std::uint32_t>(table[slot]));
+    });
   }
-  std::sort(found, found + count);
-  for (std::uint32_t i = 1; i < count; ++i)
-    if (found[i] >> 32 == found[i - 1] >> 32)
-      unite(static_cast<std::uint32_t>(found[i]), static_cast<std::uint32_t>(found[i - 1]));
 }
 
 /// Blocks inside as a whole, with each other and with what is inside of crossed ones.
@@ -281,6 +293,8 @@ void ExactParts::join_blocks(Side& own) noexcept {
 }
 
 std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
+  std::uint32_t& known = scratch_.part[element];
+  if (known != kNoIndex) return known;
   std::uint32_t& part = scratch_.part[root(element)];
   if (part == kNoIndex) {
     part = std::min(parts_, ExactScratch::kMostParts - 1);
@@ -290,7 +304,7 @@ std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
       ++parts_;
     }
   }
-  return part;
+  return known = part;
 }
 
 void ExactParts::name_parts() noexcept {
