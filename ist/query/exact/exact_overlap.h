@@ -119,6 +119,7 @@ class ExactQuery {
   const Similarity& b_from_a_;
   ExactScratch& scratch_;
   ExactOverlap out_;
+  KeptPairs* kept_ = nullptr;  ///< of the caller's pair
 
  private:
   void move_aside() noexcept;
@@ -139,7 +140,6 @@ class ExactQuery {
   void add_layer(const Side& side, double area, double width) noexcept;
 
   CrossingSearch search_ = {&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_};
-  KeptPairs* kept_ = nullptr;  ///< of the caller's pair
   bool serves_ = false, whole_ = true;
   std::uint32_t block_pairs_ = 0;
   SlotSums slots_;

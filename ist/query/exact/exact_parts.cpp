@@ -1,7 +1,9 @@
 #include "query/exact/exact_parts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 
 namespace ist {
 
@@ -56,6 +58,7 @@ std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) co
 
 std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& crossed,
                                            std::uint32_t t) const noexcept {
+  if (one_) return 0;
   const std::uint32_t edge = 3 * t + opposite_edge(crossed, t);
   if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
   return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
@@ -139,6 +142,7 @@ void ExactParts::join_holes(Side& own) noexcept {
     }
   }
   if (alone == 0) return;
+  by_names_ = false;
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     CurveExtent& curve = curves[root(i)];
     Point from, to;
@@ -211,6 +215,7 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
                      i / 2, 0, false};
     i = static_cast<std::uint32_t>(next);
   }
+  by_names_ = by_names_ && count <= 2;
   if (count > 1)
     std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
       const bool first_half = (x.edge & kFromFirst) != 0;
@@ -293,6 +298,7 @@ void ExactParts::join_blocks(Side& own) noexcept {
 }
 
 std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
+  if (one_) return 0;
   std::uint32_t& known = scratch_.part[element];
   if (known != kNoIndex) return known;
   std::uint32_t& part = scratch_.part[root(element)];
@@ -307,7 +313,41 @@ std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
   return known = part;
 }
 
+/// Of the names of crossings and of their ends, in their order, and of what is inside. They tell
+/// what hangs together, unless an edge is pierced more than twice or a curve lies in one triangle.
+std::uint64_t ExactParts::hash_of_names() const noexcept {
+  std::uint64_t hash = out_.crossings;
+  const auto mix = [&](std::uint64_t name) {
+    hash = (hash ^ name) * 0x9e3779b97f4a7c15u;
+    hash ^= hash >> 32;
+  };
+  const Crossings& crossings = scratch_.crossings;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    const auto edge = [&](int e) {
+      return static_cast<std::uint64_t>(static_cast<int>(crossings.end(e, Crossings::kEdge)[i]));
+    };
+    mix(std::uint64_t{crossings.triangle(0, i)} << (kTriangleBits + 8) |
+        std::uint64_t{crossings.triangle(1, i)} << 8 | edge(0) << 4 | edge(1));
+  }
+  for (const Side& own : sides_) {
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      std::uint64_t apexes[2];
+      std::memcpy(apexes, crossed.apex, sizeof apexes);
+      for (const std::uint64_t name : {std::uint64_t{crossed.inside}, apexes[0], apexes[1]})
+        mix(name);
+    }
+    for (std::uint32_t w = 0; w < (own.mesh.level[0].count + 63) / 64; ++w)
+      mix(own.marks.inside[w]);
+  }
+  return std::max(hash, std::uint64_t{1});
+}
+
 void ExactParts::name_parts() noexcept {
+  if (one_) {
+    scratch_.parts[0] = {};
+    parts_ = 1;
+  }
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     ExactPart& part = scratch_.parts[part_of(i)];
     const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << kTriangleBits |
@@ -338,7 +378,7 @@ bool ExactParts::are_one() noexcept {
 }
 
 void ExactParts::sum_parts() noexcept {
-  if (are_one() && out_.sums.volume() > 0) {
+  if (one_ && out_.sums.volume() > 0) {
     scratch_.parts[0].sums = out_.sums;
     return;
   }
@@ -377,15 +417,25 @@ void ExactParts::join_cavities() noexcept {
     if (scratch_.parts[p].sums.volume() < 0) scratch_.parts[p].kept = largest;
 }
 
-std::uint32_t ExactParts::divide() noexcept {
-  parts_ = 0;
+void ExactParts::join() noexcept {
   begin();
   join_curves();
   for (Side& own : sides_) join_holes(own);
   join_edges();
   for (Side& own : sides_) join_vertices(own);
   for (Side& own : sides_) join_blocks(own);
+}
+
+std::uint32_t ExactParts::divide() noexcept {
+  parts_ = 0;
+  const std::uint64_t names = kept_ != nullptr ? hash_of_names() : 0;
+  one_ = kept_ != nullptr && kept_->one == names;
+  if (!one_) join();
   name_parts();
+  if (!one_) {
+    one_ = are_one();
+    if (kept_ != nullptr) kept_->one = one_ && by_names_ ? names : 0;
+  }
   sum_parts();
   join_cavities();
   return parts_;

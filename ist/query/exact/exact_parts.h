@@ -45,13 +45,17 @@ class ExactParts : public ExactQuery {
                           std::uint32_t first) noexcept;
   void join_vertices(Side& side) noexcept;
   void join_blocks(Side& side) noexcept;
+  void join() noexcept;
+  std::uint64_t hash_of_names() const noexcept;
   void name_parts() noexcept;
-  /// Whether all that counts is in one part: its sums are the whole's.
+  /// Whether all that counts is in one part.
   bool are_one() noexcept;
   void sum_parts() noexcept;
   void join_cavities() noexcept;
 
   std::uint32_t parts_ = 0;
+  bool one_ = false;      ///< all that counts is in one part
+  bool by_names_ = true;  ///< what hangs together follows from what hash_of_names() is of
   std::uint32_t vertices_of_b_ = 0, blocks_of_a_ = 0, blocks_of_b_ = 0;  ///< first elements
 };
 
