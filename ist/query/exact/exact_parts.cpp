@@ -46,9 +46,7 @@ std::uint32_t ExactParts::vertex_element(const Side& own, const CrossedBlock& cr
   return (own.is_b ? vertices_of_b_ : out_.crossings) + kWidth * place + vertex;
 }
 
-std::uint32_t ExactParts::first_middle(const Side& own,
-                                       const CrossedBlock& crossed) const noexcept {
-  const auto place = static_cast<std::uint32_t>(&crossed - own.marks.blocks.get());
+std::uint32_t ExactParts::first_middle(const Side& own, std::uint32_t place) const noexcept {
   return 3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + place);
 }
 
@@ -60,7 +58,8 @@ std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& 
                                            std::uint32_t t) const noexcept {
   if (one_) return 0;
   const std::uint32_t edge = 3 * t + opposite_edge(crossed, t);
-  if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
+  if (crossed.pierced >> edge & 1)
+    return scratch_.middles[first_middle(own, own.marks.place[crossed.block]) + edge];
   return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
 
@@ -81,7 +80,7 @@ void ExactParts::begin() noexcept {
     for (std::uint32_t c = 0; c < own.marks.count; ++c) {
       const CrossedBlock& crossed = own.marks.blocks[c];
       for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
-        scratch_.middles[first_middle(own, crossed) + edge] = kNoIndex;
+        scratch_.middles[first_middle(own, c) + edge] = kNoIndex;
       });
     }
 }
@@ -99,8 +98,8 @@ void ExactParts::join_curves() noexcept {
     Side& own = side(end.of_b);
     const MeshBlock& mesh = own.mesh.blocks[end.triangle / kWidth];
     const std::uint32_t lane = end.triangle % kWidth;
-    std::uint32_t& first =
-        scratch_.middles[first_middle(own, crossed_block(own, end.triangle)) + 3 * lane + end.edge];
+    const std::uint32_t place = own.marks.place[end.triangle / kWidth];
+    std::uint32_t& first = scratch_.middles[first_middle(own, place) + 3 * lane + end.edge];
     next[i] = first | (end.enters ? kEnters : 0) | (end.from_first ? kFromFirst : 0);
     first = i;
     const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
@@ -198,7 +197,7 @@ void ExactParts::join_edges() noexcept {
         if (edge % 3 != opposite_edge(crossed, t) &&
             mesh.vertex[mesh.corner[edge % 3][t]] > mesh.vertex[mesh.corner[(edge + 1) % 3][t]])
           return;
-        std::uint32_t& middle = scratch_.middles[first_middle(own, crossed) + edge];
+        std::uint32_t& middle = scratch_.middles[first_middle(own, c) + edge];
         middle = join_edge(own, crossed, edge, middle);
       });
     }

@@ -35,7 +35,8 @@ class ExactParts : public ExactQuery {
  private:
   std::uint32_t root(std::uint32_t element) noexcept;
   void unite(std::uint32_t x, std::uint32_t y) noexcept;
-  std::uint32_t first_middle(const Side& side, const CrossedBlock& crossed) const noexcept;
+  /// Of the edges of a crossed block, by its place.
+  std::uint32_t first_middle(const Side& side, std::uint32_t place) const noexcept;
 
   void begin() noexcept;
   void join_curves() noexcept;
