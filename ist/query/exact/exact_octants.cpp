@@ -54,17 +54,27 @@ double oneness(const OctantSums& x, const OctantSums& y, double near) {
   return std::max(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// How far the octants above and below the middle of a part are one, as it is thin along an axis.
-double thinness(const OctantSums& box, int axis, double near) {
-  return falls(box.high[axis] - box.low[axis], near);
+/// Of what is near: a part that is no thicker along an axis is not cut across it.
+constexpr double kThin = 1.0 / 8;
+
+/// How far a part is no longer than `length` along an axis.
+double shortness(const OctantSums& box, int axis, double length) {
+  return falls(box.high[axis] - box.low[axis], length);
+}
+/// And along all.
+double smallness(const OctantSums& box, double length) {
+  return std::min(
+      {shortness(box, 0, length), shortness(box, 1, length), shortness(box, 2, length)});
 }
 
-bool is_thick(const OctantSums& box, double near) {
-  return thinness(box, 0, near) == 0 && thinness(box, 1, near) == 0 && thinness(box, 2, near) == 0;
+/// Whether it is longer than that along all.
+bool is_large(const OctantSums& box, double near) {
+  return shortness(box, 0, near) == 0 && shortness(box, 1, near) == 0 &&
+         shortness(box, 2, near) == 0;
 }
 
-/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for
-/// lack of room.
+/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one as
+/// it is small, or for lack of room.
 void join_octants(OctantSums (&octants)[8], double near, double small) {
   const auto join = [&](int k, const auto& share) {
     for (int i = 0; i < 8; ++i)
@@ -72,7 +82,7 @@ void join_octants(OctantSums (&octants)[8], double near, double small) {
         move(octants[i | 1 << k], share(octants[i], octants[i | 1 << k]), octants[i]);
   };
   for (int k = 0; k < 3; ++k) {
-    const double thin = thinness(octants[0], k, near);
+    const double thin = shortness(octants[0], k, kThin * near);
     join(k, [&](const auto&, const auto&) { return thin; });
   }
   for (int k = 0; k < 3; ++k)
@@ -209,7 +219,7 @@ bool ExactOctants::find_planes(std::span<ExactPart> parts, double near) noexcept
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
       OctantSums* const sums = octants_of(block_element(own, b));
-      if (sums == nullptr || is_thick(*sums, near)) return;
+      if (sums == nullptr || is_large(*sums, near)) return;
       const MeshBlock& mesh = own.mesh.blocks[b];
       for (std::uint32_t v = 0; v < mesh.vertices; ++v)
         reach(*sums, place(own, mesh.vertex[v]) - out_.origin);
@@ -219,7 +229,8 @@ bool ExactOctants::find_planes(std::span<ExactPart> parts, double near) noexcept
   for (ExactPart& part : parts) {
     if (part.slot == kNoIndex) continue;
     OctantSums& sums = scratch_.octant_sums[8 * part.slot];
-    for (int k = 0; k < 3; ++k) sums.planes |= (thinness(sums, k, near) < 1 ? 1 : 0) << k;
+    for (int k = 0; k < 3 && smallness(sums, near) < 1; ++k)
+      sums.planes |= (shortness(sums, k, kThin * near) < 1 ? 1 : 0) << k;
     if (sums.planes == 0) part.slot = kNoIndex;
     any = any || sums.planes != 0;
   }
@@ -307,7 +318,7 @@ std::uint32_t ExactOctants::split(std::span<ExactPart> parts, bool by_b, double 
     part.slot = slots++;
     OctantSums* const octants = &scratch_.octant_sums[8 * part.slot];
     std::fill_n(octants, 8, OctantSums{});
-    octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+    octants->centre = part.sums.moment / (24 * part.sums.volume());
   }
   if (slots > 0 && find_planes(parts, near)) sum_octants();
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
@@ -333,7 +344,7 @@ std::uint32_t ExactOctants::write_octants(const ExactPart& part, double small, d
   OctantSums octants[8];
   std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
   const Point centre = octants[0].centre;
-  join_octants(octants, near, small);
+  join_octants(octants, near, std::max(small, smallness(octants[0], near)));
   ExactSums missing = part.sums;  // but for rounding nothing
   const double volume = part.sums.volume();
   double areas = 0;
