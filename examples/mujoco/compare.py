@@ -266,6 +266,21 @@ class Torch(Scene):
                 f"{height[-1]:.2f} mm high (9 on the floor), {tilt.max():.2f}° tilted, {speed:.1f} mm/s at the end")
 
 
+class Rings(Scene):
+    """Five flat rings lie on each other: all their faces are in contact. To hulls they are discs."""
+
+    seconds, step, count = 1.2, 0.002, 5
+    meshes = {"ring": (turned([(.01, -.002), (.02, -.002), (.02, .002), (.01, .002)]), "1")}
+    bodies = '<geom type="plane" size="1 1 .1"/>' + "".join(
+        f'<body name="ring {i}" pos="{1e-4 * i:.4f} {5e-5 * i:.5f} {.00205 + .00405 * i:.5f}" euler="0 0 {17 * i}">'
+        f'<freejoint/><geom name="ring {i}" mesh="ring" friction=".5"/></body>' for i in range(count))
+
+    def judge(self, model, data, log):
+        aside = 1e3 * np.linalg.norm((data.qpos - log[100]).reshape(-1, 7)[:, :2], axis=1).max()
+        top = 1e3 * data.qpos[-5]
+        return bool(aside < 1 and top > 16), f"the highest is {top:.2f} mm high (18 undeformed), {aside:.3f} mm moved aside"
+
+
 class Cloth(Scene):
     """A cloth falls over a table's corner: MuJoCo's own contacts of a flex, by distances of the solid."""
 
@@ -310,7 +325,7 @@ class Arm(Scene):
         return bool(abs(turned - expected) < 0.02 * abs(expected)), f"turns {turned:.3f} rad, {expected:.3f} without contacts"
 
 
-SCENES = {scene.__name__.lower(): scene for scene in (Nut, Thread, Mug, Pin, Bowl, Chain, Hook, Pipe, Gears, Torch, Arm, Cloth)}
+SCENES = {scene.__name__.lower(): scene for scene in (Nut, Thread, Mug, Pin, Bowl, Chain, Hook, Pipe, Gears, Torch, Rings, Arm, Cloth)}
 
 
 def write_obj(path, mesh):

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <utility>
 
 #include "query/base/no_answer.h"
 #include "query/base/solid_bounds.h"
@@ -82,14 +82,20 @@ std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room, bool oc
   std::pair<bool, double> cost[ExactScratch::kMostParts];
   std::uint32_t nearest[ExactScratch::kMostParts];
   const auto weigh = [&](std::uint32_t p) {
-    const auto distance = [&](std::uint32_t q) {
+    bool unlike = false;
+    double square = 0;
+    nearest[p] = p;
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const std::uint32_t q = kept[k];
+      if (q == p) continue;
       const exact::Point between = parts[q].centre - parts[p].centre;
-      return std::tuple(q == p, dot(parts[q].sums.force, parts[p].sums.force) < 0,
-                        dot(between, between));
-    };
-    const auto nearer = [&](std::uint32_t q, std::uint32_t r) { return distance(q) < distance(r); };
-    nearest[p] = *std::min_element(kept, kept + count, nearer);
-    const auto [self, unlike, square] = distance(nearest[p]);
+      const bool against = dot(parts[q].sums.force, parts[p].sums.force) < 0;
+      const double apart = dot(between, between);
+      if (nearest[p] != p && (against != unlike ? against : !(apart < square))) continue;
+      nearest[p] = q;
+      unlike = against;
+      square = apart;
+    }
     cost[p] = {unlike, parts[p].sums.volume() * (square * square)};
   };
   for (std::uint32_t k = 0; k < count; ++k) {

@@ -37,17 +37,16 @@ class ExactLoop : public ::testing::Test {
     settings.measure = Measure::exact;
     settings.pair_id = pair_id;
     const PlacedAsset at_a{a.view(), {}, 1}, at_b{b.view(), pose, 1};
-    ContactPatch patches[16];
     std::vector<OutlineSegment> segments(8000);
     testing::AnswerBits bits;
     const auto add = [&](ContactPatches contact) {
       contact.penetration.node_visits = 0;
       bits.add(contact.penetration);
-      for (std::size_t p = 0; p < contact.count; ++p) bits.add(patches[p]);
+      for (std::size_t p = 0; p < contact.count; ++p) bits.add(patches_[p]);
     };
-    add(contact_patches(at_a, at_b, settings, workspace_, patches));
+    add(contact_patches(at_a, at_b, settings, workspace_, patches_));
     const OverlapOutline outline =
-        overlap_outline(at_a, at_b, settings, workspace_, patches, segments);
+        overlap_outline(at_a, at_b, settings, workspace_, patches_, segments);
     add(outline.contact);
     for (std::size_t s = 0; s < std::min(outline.segments, segments.size()); ++s) {
       bits.add(segments[s].from);
@@ -60,6 +59,7 @@ class ExactLoop : public ::testing::Test {
   const Asset bolt_ = testing::surface(make_sample("bolt"));
   const Asset nut_ = testing::surface(make_sample("nut"));
   Workspace workspace_;
+  ContactPatch patches_[16];
 };
 
 TEST_F(ExactLoop, PatchesAndOutlinesHaveTheSameBits) {
@@ -67,6 +67,29 @@ TEST_F(ExactLoop, PatchesAndOutlinesHaveTheSameBits) {
     const Pose pose = on_thread(0.1 + 2e-4 * i, 0.1 * std::sin(0.02 * i));
     EXPECT_EQ(bits(bolt_, nut_, pose, 0), bits(bolt_, nut_, pose, 1)) << i;
   }
+}
+
+TEST_F(ExactLoop, PartsThatJoinAndComeApartHaveTheSameBits) {
+  // Two feet that rock on a table, in steps of which half change no crossing.
+  const Asset table = testing::surface(testing::box_mesh({-9, -9, -1}, {9, 9, 0}));
+  const Asset feet =
+      testing::surface(testing::joined(testing::box_mesh({-1, -0.4, 0}, {-0.2, 0.4, 1}),
+                                       testing::box_mesh({0.2, -0.3, 0}, {1, 0.3, 1})));
+  std::size_t most = 0, least = 99;
+  for (int i = 0; i < 600; ++i) {
+    const double turn = 0.02 * std::sin(0.05 * (i / 2));
+    const Pose pose = {{std::cos(turn), 0, std::sin(turn), 0}, {1e-7 * i, 0, -0.005}};
+    EXPECT_EQ(bits(table, feet, pose, 0), bits(table, feet, pose, 1)) << i;
+    ContactSettings settings;
+    settings.measure = Measure::exact;
+    const std::size_t parts = overlap_outline({table.view(), {}, 1}, {feet.view(), pose, 1},
+                                              settings, workspace_, patches_, {})
+                                  .contact.count;
+    most = std::max(most, parts);
+    least = std::min(least, parts);
+  }
+  EXPECT_EQ(least, 1u);
+  EXPECT_GE(most, 2u);
 }
 
 TEST_F(ExactLoop, InClearanceNothingIsSearchedAndNothingTouches) {

@@ -271,6 +271,31 @@ TEST_F(ExactOctants, AThreadHoldsAllAround) {
   }
 }
 
+TEST_F(ExactOctants, ASmallContactIsTheWhole) {
+  const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
+  const Asset ball = surface(testing::icosphere_mesh(5));
+  for (int k = 0; k < 20; ++k) {
+    const Pose pose = turned(Point(1, 2, k), 0.3 * k, {0.1 * k, 0, 0.998});
+    const auto& patches = ask({table.view(), {}, 1}, {ball.view(), pose, 1});
+    ASSERT_EQ(patches.size(), 1u);
+    EXPECT_EQ(patches[0].volume, whole().volume);
+    EXPECT_EQ(patches[0].force, whole().force);
+    EXPECT_EQ(patches[0].torque, whole().torque);
+    EXPECT_EQ(patches[0].centroid, whole().centroid);
+  }
+}
+
+TEST_F(ExactOctants, AThinContactIsNotCutAlongItsFace) {
+  // Aslant, so that what is above the middle is not over what is below it.
+  const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
+  const Asset foot = surface(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)));
+  for (int k = 0; k < 12; ++k) {
+    const double way = 0.1 + k * std::numbers::pi / 6;
+    const Pose pose = turned(Point(std::cos(way), std::sin(way), 0), 1e-3, {0, 0, -2e-3});
+    EXPECT_EQ(ask({table.view(), {}, 1}, {foot.view(), pose, 1}).size(), 4u) << way;
+  }
+}
+
 TEST_F(ExactOctants, ASmallFootKeepsItsPatchWhereRoomIsShort) {
   const Asset table = surface(box_mesh(Point(-9, -9, -1), Point(9, 9, 0)));
   const Asset feet = surface(testing::joined(box_mesh(Point(-1, -1, 0), Point(1, 1, 1)),

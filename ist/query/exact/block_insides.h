@@ -34,6 +34,8 @@ struct BlockInsides {
       inside |= static_cast<std::uint32_t>((net < 0) | leaves) << p |
                 static_cast<std::uint32_t>((net > 0) | leaves) << q;
     }
+    known = found;
+    if (found == (1u << mesh.vertices) - 1) return;
     for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
       const std::uint32_t v[3] = {mesh.corner[0][t], mesh.corner[1][t], mesh.corner[2][t]};
       const auto other_end = [&](std::uint32_t edge, std::uint32_t end) {

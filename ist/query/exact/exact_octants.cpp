@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "query/base/smooth_step.h"
+#include "query/exact/overlap_formulas.h"
 
 namespace ist {
 namespace {
@@ -33,10 +34,17 @@ void move(OctantSums& from, double share, OctantSums& to) {
   for (int s = 0; s < 2; ++s) give(from.area[s], to.area[s]);
 }
 
+void add(OctantSums& sums, bool of_b, const exact::OctantTerms& terms) {
+  sums.six_volumes += terms.six_volumes;
+  sums.moment = sums.moment + terms.moment;
+  sums.area[of_b] = sums.area[of_b] + terms.area;
+  sums.torque = sums.torque + terms.torque;
+}
+
 double both_areas(const OctantSums& sums) { return length(sums.area[0]) + length(sums.area[1]); }
 
 /// How far two octants are one: where one is a sliver of the other, or where they are near to each
-/// other, as those above and below the middle of a thin contact are.
+/// other, as those above and below the middle of a contact that is thin aslant are.
 double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = std::min(x.six_volumes, y.six_volumes),
                more = std::max(x.six_volumes, y.six_volumes);
@@ -46,15 +54,39 @@ double oneness(const OctantSums& x, const OctantSums& y, double near) {
   return std::max(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one for
-/// lack of room.
+/// Of what is near: a part that is no thicker along an axis is not cut across it.
+constexpr double kThin = 1.0 / 8;
+
+/// How far a part is no longer than `length` along an axis.
+double shortness(const OctantSums& box, int axis, double length) {
+  return falls(box.high[axis] - box.low[axis], length);
+}
+/// And along all.
+double smallness(const OctantSums& box, double length) {
+  return std::min(
+      {shortness(box, 0, length), shortness(box, 1, length), shortness(box, 2, length)});
+}
+
+/// Whether it is longer than that along all.
+bool is_large(const OctantSums& box, double near) {
+  return shortness(box, 0, near) == 0 && shortness(box, 1, near) == 0 &&
+         shortness(box, 2, near) == 0;
+}
+
+/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one as
+/// it is small, or for lack of room.
 void join_octants(OctantSums (&octants)[8], double near, double small) {
-  for (int k = 0; k < 3; ++k)
+  const auto join = [&](int k, const auto& share) {
     for (int i = 0; i < 8; ++i)
-      if ((i >> k & 1) == 0) {
-        OctantSums &x = octants[i], &y = octants[i | 1 << k];
-        move(y, oneness(x, y, near), x);
-      }
+      if ((i >> k & 1) == 0)
+        move(octants[i | 1 << k], share(octants[i], octants[i | 1 << k]), octants[i]);
+  };
+  for (int k = 0; k < 3; ++k) {
+    const double thin = shortness(octants[0], k, kThin * near);
+    join(k, [&](const auto&, const auto&) { return thin; });
+  }
+  for (int k = 0; k < 3; ++k)
+    join(k, [&](const auto& x, const auto& y) { return oneness(x, y, near); });
   double different = 0, areas = 0;
   for (const OctantSums& sums : octants) {
     different += length(sums.area[0] + sums.area[1]);
@@ -66,11 +98,16 @@ void join_octants(OctantSums (&octants)[8], double near, double small) {
 
 }  // namespace
 
+Point ExactOctants::in_axes(const Point& x) const noexcept {
+  return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
+}
+
 ExactOctants::Corner ExactOctants::corner(const OctantSums* octants,
                                           const Point& x) const noexcept {
-  const Point from = x - octants->centre;
-  Corner out = {{dot(axis_[0], from), dot(axis_[1], from), dot(axis_[2], from)}, 0};
+  const Point from = in_axes(x - octants->centre);
+  Corner out = {{from.x, from.y, from.z}, 0};
   for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
+  out.octant &= octants->planes;
   return out;
 }
 
@@ -93,15 +130,8 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
                                 const Corner& q, const Corner& r) noexcept {
   const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
   if (unlike == 0) {
-    OctantSums& sums = octants[p.octant];
-    const Point first = p.point(), second = q.point(), third = r.point();
-    const Point area = (0.5 * times) * cross(second - first, third - first);
-    const Point three = first + (second + third);
-    const double six = 2 * dot(first, area);
-    sums.six_volumes += six;
-    sums.moment = sums.moment + six * three;
-    sums.area[of_b] = sums.area[of_b] + area;
-    sums.torque = sums.torque + ((of_b ? 0.5 : -0.5) / 3) * cross(three, area);
+    add(octants[p.octant], of_b,
+        exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(), r.point()));
     return;
   }
   const int plane = std::countr_zero(static_cast<unsigned>(unlike)), bit = 1 << plane;
@@ -120,35 +150,113 @@ void ExactOctants::add_triangle(OctantSums* octants, bool of_b, double times, co
   add_triangle(octants, of_b, times, to_next, other, to_other);
 }
 
+/// Those of a crossing. Most lie in one octant.
+void ExactOctants::add_pieces(const OctantPieces& pieces, std::uint32_t lane,
+                              OctantSums* octants) noexcept {
+  int octant[6], all = 7, any = 0;
+  for (int c = 0; c < 6; ++c) {
+    octant[c] = pieces.octant[c][lane] & octants->planes;
+    all &= octant[c];
+    any |= octant[c];
+  }
+  const auto lanes = [&](const double(&of)[3][8]) -> Point {
+    return {of[0][lane], of[1][lane], of[2][lane]};
+  };
+  if (all == any) {
+    OctantSums& sums = octants[all];
+    sums.six_volumes += pieces.sum_six_volumes[lane];
+    sums.moment = sums.moment + lanes(pieces.sum_moment);
+    for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + lanes(pieces.sum_area[s]);
+    sums.torque = sums.torque + lanes(pieces.sum_torque);
+    return;
+  }
+  for (int t = 0; t < OctantPieces::kTriangles; ++t) {
+    if (pieces.times[t][lane] == 0) continue;
+    const bool of_b = (pieces.of_b[t] >> lane & 1) != 0;
+    const int c[3] = {pieces.corner(t, 0, lane), pieces.corner(t, 1, lane),
+                      pieces.corner(t, 2, lane)};
+    if (octant[c[0]] == octant[c[1]] && octant[c[0]] == octant[c[2]]) {
+      add(octants[octant[c[0]]], of_b,
+          {pieces.six_volumes[t][lane], lanes(pieces.moment[t]), lanes(pieces.area[t]),
+           lanes(pieces.torque[t])});
+      continue;
+    }
+    const auto at = [&](int k) -> Corner {
+      const double(&x)[3][8] = pieces.at[c[k]];
+      return {{x[0][lane], x[1][lane], x[2][lane]}, octant[c[k]]};
+    };
+    add_triangle(octants, of_b, pieces.times[t][lane], at(0), at(1), at(2));
+  }
+}
+
 OctantSums* ExactOctants::octants_of(std::uint32_t element) noexcept {
   const ExactPart& part = scratch_.parts[part_of(element)];
   const std::uint32_t slot = scratch_.parts[part.kept].slot;
   return slot == kNoIndex ? nullptr : &scratch_.octant_sums[8 * slot];
 }
 
+/// The boxes of parts, and the planes that cut them: those across which octants are not one anyway.
+/// Whether there are any.
+bool ExactOctants::find_planes(std::span<ExactPart> parts, double near) noexcept {
+  const auto reach = [&](OctantSums& sums, const Point& x) {
+    const Point from = in_axes(x - sums.centre);
+    for (int k = 0; k < 3; ++k) {
+      sums.low[k] = std::min(sums.low[k], from[k]);
+      sums.high[k] = std::max(sums.high[k], from[k]);
+    }
+  };
+  // The surface between its curves may reach further than these.
+  for (std::uint32_t i = 0; i < out_.crossings; ++i)
+    if (OctantSums* const sums = octants_of(i))
+      reach(*sums, scratch_.crossings.place_of(i, 0, out_.origin));
+  for (Side& own : sides_) {
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      for (std::uint32_t v = 0; v < own.mesh.blocks[b].vertices; ++v)
+        if (crossed.inside >> v & 1)
+          if (OctantSums* const sums = octants_of(vertex_element(own, crossed, v)))
+            reach(*sums, crossed.at(v));
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {
+      OctantSums* const sums = octants_of(block_element(own, b));
+      if (sums == nullptr || is_large(*sums, near)) return;
+      const MeshBlock& mesh = own.mesh.blocks[b];
+      for (std::uint32_t v = 0; v < mesh.vertices; ++v)
+        reach(*sums, place(own, mesh.vertex[v]) - out_.origin);
+    });
+  }
+  bool any = false;
+  for (ExactPart& part : parts) {
+    if (part.slot == kNoIndex) continue;
+    OctantSums& sums = scratch_.octant_sums[8 * part.slot];
+    for (int k = 0; k < 3 && smallness(sums, near) < 1; ++k)
+      sums.planes |= (shortness(sums, k, kThin * near) < 1 ? 1 : 0) << k;
+    if (sums.planes == 0) part.slot = kNoIndex;
+    any = any || sums.planes != 0;
+  }
+  return any;
+}
+
 /// The pieces that parts are summed of: see ExactTerms.
 void ExactOctants::sum_octants() noexcept {
-  const Crossings& crossings = scratch_.crossings;
-  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    OctantSums* const octants = octants_of(i);
-    if (octants == nullptr) continue;
-    const Corner ends[2] = {corner(octants, crossings.place_of(i, 0, out_.origin)),
-                            corner(octants, crossings.place_of(i, 1, out_.origin))};
-    Corner apex[2];
-    for (int s = 0; s < 2; ++s) {
-      apex[s] = corner(octants,
-                       {crossings.apex(s, 0)[i], crossings.apex(s, 1)[i], crossings.apex(s, 2)[i]});
-      add_triangle(octants, s != 0, 1, apex[s], ends[s], ends[1 - s]);
+  OctantView view;
+  view.origin = out_.origin;
+  std::copy_n(axis_, 3, view.axis);
+  OctantPieces pieces;
+  for (std::uint32_t first = 0; first < out_.crossings; first += 8) {
+    const std::uint32_t count = std::min(8u, out_.crossings - first);
+    OctantSums* octants[8] = {};
+    bool any = false;
+    for (std::uint32_t l = 0; l < count; ++l) {
+      octants[l] = octants_of(first + l);
+      if (octants[l] == nullptr) continue;
+      any = true;
+      for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
     }
-    for (int e = 0; e < 2; ++e) {
-      const double times = crossings.opposite(e)[i];
-      if (times == 0) continue;
-      const bool of_b = crossings.end_of(i, e).of_b;
-      const Point near = {crossings.end(e, Crossings::kFrom)[i],
-                          crossings.end(e, Crossings::kFrom + 1)[i],
-                          crossings.end(e, Crossings::kFrom + 2)[i]};
-      add_triangle(octants, of_b, times, apex[of_b], ends[e], corner(octants, near - out_.origin));
-    }
+    if (!any) continue;
+    octant_pieces(scratch_.crossings, first, view, pieces);
+    for (std::uint32_t l = 0; l < count; ++l)
+      if (octants[l] != nullptr) add_pieces(pieces, l, octants[l]);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -182,9 +290,6 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
   }
   if (all == any) {
     const LaneSums found = lane_sums(own, 1, b / kWidth, b % kWidth, out_.origin + octants->centre);
-    const auto in_axes = [&](const Point& v) -> Point {
-      return {dot(axis_[0], v), dot(axis_[1], v), dot(axis_[2], v)};
-    };
     OctantSums& sums = octants[all];
     sums.six_volumes += found.six_volumes;
     sums.moment = sums.moment + in_axes(found.moment);
@@ -197,7 +302,7 @@ void ExactOctants::sum_block(const Side& own, std::uint32_t b, OctantSums* octan
                  vertex[mesh.corner[2][t]]);
 }
 
-std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, double near,
+std::uint32_t ExactOctants::split(std::span<ExactPart> parts, bool by_b, double near,
                                   std::size_t room) noexcept {
   for (int k = 0; k < 3; ++k)
     axis_[k] =
@@ -206,17 +311,16 @@ std::uint32_t ExactOctants::split(std::span<const ExactPart> parts, bool by_b, d
   std::uint32_t slots = 0, count = 0;
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
-    ExactPart& part = scratch_.parts[p];
-    part.slot = kNoIndex;
+    ExactPart& part = parts[p];
     if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
         slots == ExactScratch::kMostSplit)
       continue;
     part.slot = slots++;
     OctantSums* const octants = &scratch_.octant_sums[8 * part.slot];
     std::fill_n(octants, 8, OctantSums{});
-    octants->centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
+    octants->centre = part.sums.moment / (24 * part.sums.volume());
   }
-  if (slots > 0) sum_octants();
+  if (slots > 0 && find_planes(parts, near)) sum_octants();
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
     const std::uint32_t first = count;
@@ -240,7 +344,7 @@ std::uint32_t ExactOctants::write_octants(const ExactPart& part, double small, d
   OctantSums octants[8];
   std::copy_n(&scratch_.octant_sums[8 * part.slot], 8, octants);
   const Point centre = octants[0].centre;
-  join_octants(octants, near, small);
+  join_octants(octants, near, std::max(small, smallness(octants[0], near)));
   ExactSums missing = part.sums;  // but for rounding nothing
   const double volume = part.sums.volume();
   double areas = 0;

@@ -102,8 +102,7 @@ bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
   for (int e = 0; e < 2; ++e) {
     const Crossings::End end = crossings.end_of(i, e);
     CrossedBlock& block = *blocks[end.of_b];
-    constexpr std::uint32_t kOpposite[3] = {1, 2, 0};
-    const bool opposite = kOpposite[block.apex[end.triangle % kWidth]] == end.edge;
+    const bool opposite = opposite_edge(block, end.triangle % kWidth) == end.edge;
     crossings.opposite(e)[i] = opposite ? (end.enters ? 1.0 : -1.0) : 0.0;
     note_piercing(side(end.of_b), block, end, crossings.end(e, Crossings::kT)[i],
                   crossings.end(e, Crossings::kTError)[i]);
@@ -148,7 +147,7 @@ void ExactQuery::count_triangles(const MeshBlock& mesh, const CrossedBlock& cros
   for (std::uint32_t t = 0; t < kWidth; ++t)
     whole[t] =
         t < mesh.triangles
-            ? static_cast<std::int8_t>(middle_of(mesh, crossed, 3 * t + (crossed.apex[t] + 1u) % 3))
+            ? static_cast<std::int8_t>(middle_of(mesh, crossed, 3 * t + opposite_edge(crossed, t)))
             : std::int8_t{0};
 }
 

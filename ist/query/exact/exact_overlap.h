@@ -60,6 +60,10 @@ class ExactQuery {
   CrossedBlock& crossed_block(Side& side, std::uint32_t triangle) noexcept {
     return side.marks.blocks[side.marks.place[triangle / kWidth]];
   }
+  /// The edge of a triangle that is opposite to its apex.
+  static std::uint32_t opposite_edge(const CrossedBlock& crossed, std::uint32_t triangle) noexcept {
+    return crossed.apex[triangle] == 2 ? 0 : crossed.apex[triangle] + 1u;
+  }
   /// Whether the middle of a triangle's edge is inside: 1 or 0, if nothing pierces it on the way
   /// from its ends but what is counted from there.
   static int middle_of(const MeshBlock& mesh, const CrossedBlock& crossed, std::uint32_t edge) {
@@ -115,6 +119,7 @@ class ExactQuery {
   const Similarity& b_from_a_;
   ExactScratch& scratch_;
   ExactOverlap out_;
+  KeptPairs* kept_ = nullptr;  ///< of the caller's pair
 
  private:
   void move_aside() noexcept;
@@ -135,7 +140,6 @@ class ExactQuery {
   void add_layer(const Side& side, double area, double width) noexcept;
 
   CrossingSearch search_ = {&sides_[0].mesh, &sides_[1].mesh, a_from_b_, b_from_a_};
-  KeptPairs* kept_ = nullptr;  ///< of the caller's pair
   bool serves_ = false, whole_ = true;
   std::uint32_t block_pairs_ = 0;
   SlotSums slots_;

@@ -1,8 +1,9 @@
 #include "query/exact/exact_parts.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <tuple>
+#include <cstring>
 
 namespace ist {
 
@@ -12,6 +13,9 @@ namespace {
 
 /// ExactScratch has no more blocks, and eight times a pair's name fits into 64 bits.
 constexpr int kTriangleBits = 28;
+
+/// Of an end in the list of its edge, above the number of the next.
+constexpr std::uint64_t kEnters = std::uint64_t{1} << 32, kFromFirst = std::uint64_t{2} << 32;
 
 template <class Visit>
 void for_each_bit(std::uint64_t bits, const Visit& visit) {
@@ -42,9 +46,7 @@ std::uint32_t ExactParts::vertex_element(const Side& own, const CrossedBlock& cr
   return (own.is_b ? vertices_of_b_ : out_.crossings) + kWidth * place + vertex;
 }
 
-std::uint32_t ExactParts::first_middle(const Side& own,
-                                       const CrossedBlock& crossed) const noexcept {
-  const auto place = static_cast<std::uint32_t>(&crossed - own.marks.blocks.get());
+std::uint32_t ExactParts::first_middle(const Side& own, std::uint32_t place) const noexcept {
   return 3 * kWidth * ((own.is_b ? sides_[0].marks.count : 0) + place);
 }
 
@@ -54,12 +56,14 @@ std::uint32_t ExactParts::block_element(const Side& own, std::uint32_t block) co
 
 std::uint32_t ExactParts::triangle_element(const Side& own, const CrossedBlock& crossed,
                                            std::uint32_t t) const noexcept {
-  const std::uint32_t edge = 3 * t + (crossed.apex[t] + 1u) % 3;
-  if (crossed.pierced >> edge & 1) return scratch_.middles[first_middle(own, crossed) + edge];
+  if (one_) return 0;
+  const std::uint32_t edge = 3 * t + opposite_edge(crossed, t);
+  if (crossed.pierced >> edge & 1)
+    return scratch_.middles[first_middle(own, own.marks.place[crossed.block]) + edge];
   return vertex_element(own, crossed, own.mesh.blocks[crossed.block].corner[edge % 3][t]);
 }
 
-/// Each element by itself.
+/// Each element by itself, and no end in the list of an edge.
 void ExactParts::begin() noexcept {
   vertices_of_b_ = out_.crossings + kWidth * sides_[0].marks.count;
   blocks_of_a_ = vertices_of_b_ + kWidth * sides_[1].marks.count;
@@ -72,6 +76,13 @@ void ExactParts::begin() noexcept {
   for (const Side& own : sides_)
     for_each_block(own.marks.inside, own.mesh.level[0].count,
                    [&](std::uint32_t block) { alone(block_element(own, block)); });
+  for (const Side& own : sides_)
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
+        scratch_.middles[first_middle(own, c) + edge] = kNoIndex;
+      });
+    }
 }
 
 /// Segments that end at the same place go on in each other: it is an edge of one triangle and
@@ -79,12 +90,18 @@ void ExactParts::begin() noexcept {
 void ExactParts::join_curves() noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint64_t* const table = scratch_.keys.get();  // numbers of ends, from 1
+  std::uint64_t* const next = scratch_.other_keys.get();
   const std::uint32_t mask = std::bit_ceil(2 * out_.crossings + 1) - 1;
   std::fill_n(table, mask + 1, 0);
   for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
     const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    const MeshBlock& mesh = side(end.of_b).mesh.blocks[end.triangle / kWidth];
+    Side& own = side(end.of_b);
+    const MeshBlock& mesh = own.mesh.blocks[end.triangle / kWidth];
     const std::uint32_t lane = end.triangle % kWidth;
+    const std::uint32_t place = own.marks.place[end.triangle / kWidth];
+    std::uint32_t& first = scratch_.middles[first_middle(own, place) + 3 * lane + end.edge];
+    next[i] = first | (end.enters ? kEnters : 0) | (end.from_first ? kFromFirst : 0);
+    first = i;
     const std::uint32_t p = mesh.vertex[mesh.corner[end.edge][lane]],
                         q = mesh.vertex[mesh.corner[(end.edge + 1) % 3][lane]];
     const std::uint64_t edge = std::uint64_t{std::min(p, q)} << 32 | std::max(p, q);
@@ -111,12 +128,25 @@ void ExactParts::join_holes(Side& own) noexcept {
     return scratch_.crossings.triangle(own.is_b ? 1 : 0, i);
   };
   CurveExtent* const curves = scratch_.curves.get();
+  std::uint32_t alone = 0;  // curves in one triangle
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    const std::uint32_t first = root(i);
+    std::uint32_t& triangle = curves[first].triangle;
+    if (first == i) {
+      triangle = triangle_of(i);
+      ++alone;
+    } else if (triangle != kNoIndex && triangle != triangle_of(i)) {
+      triangle = kNoIndex;
+      --alone;
+    }
+  }
+  if (alone == 0) return;
+  by_names_ = false;
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     CurveExtent& curve = curves[root(i)];
     Point from, to;
     segment(i, from, to);
-    if (root(i) == i) curve = {triangle_of(i), from, from, {}};
-    if (curve.triangle != triangle_of(i)) curve.triangle = kNoIndex;
+    if (root(i) == i) curve = {curve.triangle, from, from, {}};
     curve.low = {std::min(curve.low.x, from.x), std::min(curve.low.y, from.y),
                  std::min(curve.low.z, from.z)};
     curve.high = {std::max(curve.high.x, from.x), std::max(curve.high.y, from.y),
@@ -157,28 +187,17 @@ void ExactParts::join_holes(Side& own) noexcept {
 
 /// What an edge has inside joins what bounds it, end by end.
 void ExactParts::join_edges() noexcept {
-  // A list of its ends for each edge that is pierced.
-  std::uint64_t* const next = scratch_.other_keys.get();
   for (Side& own : sides_)
     for (std::uint32_t c = 0; c < own.marks.count; ++c) {
       const CrossedBlock& crossed = own.marks.blocks[c];
+      const MeshBlock& mesh = own.mesh.blocks[crossed.block];
       for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
-        scratch_.middles[first_middle(own, crossed) + edge] = kNoIndex;
-      });
-    }
-  for (std::uint32_t i = 0; i < 2 * out_.crossings; ++i) {
-    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    Side& own = side(end.of_b);
-    std::uint32_t& first = scratch_.middles[first_middle(own, crossed_block(own, end.triangle)) +
-                                            3 * (end.triangle % kWidth) + end.edge];
-    next[i] = first;
-    first = i;
-  }
-  for (Side& own : sides_)
-    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
-      const CrossedBlock& crossed = own.marks.blocks[c];
-      for_each_bit(crossed.pierced, [&](std::uint32_t edge) {
-        std::uint32_t& middle = scratch_.middles[first_middle(own, crossed) + edge];
+        // The triangle on its other side has the same ends.
+        const std::uint32_t t = edge / 3;
+        if (edge % 3 != opposite_edge(crossed, t) &&
+            mesh.vertex[mesh.corner[edge % 3][t]] > mesh.vertex[mesh.corner[(edge + 1) % 3][t]])
+          return;
+        std::uint32_t& middle = scratch_.middles[first_middle(own, c) + edge];
         middle = join_edge(own, crossed, edge, middle);
       });
     }
@@ -189,42 +208,54 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
                                     std::uint32_t edge, std::uint32_t first) noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
   std::uint32_t count = 0;
-  for (std::uint32_t i = first; i != kNoIndex;
-       i = static_cast<std::uint32_t>(scratch_.other_keys[i])) {
-    const Crossings::End end = scratch_.crossings.end_of(i / 2, static_cast<int>(i % 2));
-    ends[count++] = {0, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
-                     i / 2, (end.enters ? 1u : 0u) | (end.from_first ? 2u : 0u), end.of_b};
+  for (std::uint32_t i = first; i != kNoIndex;) {
+    const std::uint64_t next = scratch_.other_keys[i];
+    ends[count++] = {next, scratch_.crossings.end(static_cast<int>(i % 2), Crossings::kT)[i / 2],
+                     i / 2, 0, false};
+    i = static_cast<std::uint32_t>(next);
   }
-  std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
-    return std::tuple((x.other & 2) == 0, x.t, x.crossing) <
-           std::tuple((y.other & 2) == 0, y.t, y.crossing);
-  });
+  by_names_ = by_names_ && count <= 2;
+  if (count > 1)
+    std::sort(ends, ends + count, [](const PiercedEnd& x, const PiercedEnd& y) {
+      const bool first_half = (x.edge & kFromFirst) != 0;
+      if (first_half != ((y.edge & kFromFirst) != 0)) return first_half;
+      return x.t < y.t || (x.t == y.t && x.crossing < y.crossing);
+    });
   const MeshBlock& mesh = own.mesh.blocks[crossed.block];
   const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                       q = mesh.corner[(edge + 1) % 3][edge / 3];
   std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoIndex;
   std::uint32_t middle = inside;
   for (std::uint32_t i = 0; i < count; ++i) {
-    if ((ends[i].other & 1) != 0) {
+    if ((ends[i].edge & kEnters) != 0) {
       inside = ends[i].crossing;
     } else {
       if (inside != kNoIndex) unite(inside, ends[i].crossing);
       inside = kNoIndex;
     }
-    if ((ends[i].other & 2) != 0) middle = inside;
+    if ((ends[i].edge & kFromFirst) != 0) middle = inside;
   }
   if (inside != kNoIndex && (crossed.inside >> q & 1) != 0)
     unite(inside, vertex_element(own, crossed, q));
   return middle;
 }
 
-/// Vertices inside, along edges that nothing pierces and from block to block.
+/// Vertices inside, along edges that nothing pierces and from block to block. A table finds those
+/// that are one.
 void ExactParts::join_vertices(Side& own) noexcept {
-  std::uint64_t* const found = scratch_.keys.get();  // vertex and element
-  std::uint32_t count = 0;
+  const auto matters = [](const CrossedBlock& crossed) {
+    return crossed.pierced != 0 && crossed.inside != 0;
+  };
+  int count = 0;
+  for (std::uint32_t c = 0; c < own.marks.count; ++c)
+    if (matters(own.marks.blocks[c])) count += std::popcount(own.marks.blocks[c].inside);
+  std::uint64_t* const table = scratch_.keys.get();  // vertex and element
+  const std::uint32_t mask = std::bit_ceil(2 * static_cast<std::uint32_t>(count) + 1) - 1;
+  constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
+  std::fill_n(table, mask + 1, kEmpty);
   for (std::uint32_t c = 0; c < own.marks.count; ++c) {
     const CrossedBlock& crossed = own.marks.blocks[c];
-    if (crossed.pierced == 0) continue;
+    if (!matters(crossed)) continue;
     const MeshBlock& mesh = own.mesh.blocks[crossed.block];
     for (std::uint32_t edge = 0; edge < 3u * mesh.triangles; ++edge) {
       const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
@@ -232,14 +263,16 @@ void ExactParts::join_vertices(Side& own) noexcept {
       if ((crossed.pierced >> edge & 1) == 0 && (crossed.inside >> p & 1) != 0)
         unite(vertex_element(own, crossed, p), vertex_element(own, crossed, q));
     }
-    for (std::uint32_t v = 0; v < mesh.vertices; ++v)
-      if (crossed.inside >> v & 1)
-        found[count++] = std::uint64_t{mesh.vertex[v]} << 32 | vertex_element(own, crossed, v);
+    for_each_bit(crossed.inside, [&](std::uint32_t v) {
+      const std::uint32_t vertex = mesh.vertex[v], element = vertex_element(own, crossed, v);
+      std::uint32_t slot = vertex * 2654435769u >> 7 & mask;
+      while (table[slot] != kEmpty && table[slot] >> 32 != vertex) slot = (slot + 1) & mask;
+      if (table[slot] == kEmpty)
+        table[slot] = std::uint64_t{vertex} << 32 | element;
+      else
+        unite(element, static_cast<std::uint32_t>(table[slot]));
+    });
   }
-  std::sort(found, found + count);
-  for (std::uint32_t i = 1; i < count; ++i)
-    if (found[i] >> 32 == found[i - 1] >> 32)
-      unite(static_cast<std::uint32_t>(found[i]), static_cast<std::uint32_t>(found[i - 1]));
 }
 
 /// Blocks inside as a whole, with each other and with what is inside of crossed ones.
@@ -264,6 +297,9 @@ void ExactParts::join_blocks(Side& own) noexcept {
 }
 
 std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
+  if (one_) return 0;
+  std::uint32_t& known = scratch_.part[element];
+  if (known != kNoIndex) return known;
   std::uint32_t& part = scratch_.part[root(element)];
   if (part == kNoIndex) {
     part = std::min(parts_, ExactScratch::kMostParts - 1);
@@ -273,19 +309,82 @@ std::uint32_t ExactParts::part_of(std::uint32_t element) noexcept {
       ++parts_;
     }
   }
-  return part;
+  return known = part;
 }
 
-void ExactParts::sum_parts() noexcept {
-  ExactTerms terms;
+/// Of the names of crossings and of their ends, in their order, and of what is inside. They tell
+/// what hangs together, unless an edge is pierced more than twice or a curve lies in one triangle.
+std::uint64_t ExactParts::hash_of_names() const noexcept {
+  std::uint64_t hash = out_.crossings;
+  const auto mix = [&](std::uint64_t name) {
+    hash = (hash ^ name) * 0x9e3779b97f4a7c15u;
+    hash ^= hash >> 32;
+  };
+  const Crossings& crossings = scratch_.crossings;
   for (std::uint32_t i = 0; i < out_.crossings; ++i) {
-    if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
+    const auto edge = [&](int e) {
+      return static_cast<std::uint64_t>(static_cast<int>(crossings.end(e, Crossings::kEdge)[i]));
+    };
+    mix(std::uint64_t{crossings.triangle(0, i)} << (kTriangleBits + 8) |
+        std::uint64_t{crossings.triangle(1, i)} << 8 | edge(0) << 4 | edge(1));
+  }
+  for (const Side& own : sides_) {
+    for (std::uint32_t c = 0; c < own.marks.count; ++c) {
+      const CrossedBlock& crossed = own.marks.blocks[c];
+      std::uint64_t apexes[2];
+      std::memcpy(apexes, crossed.apex, sizeof apexes);
+      for (const std::uint64_t name : {std::uint64_t{crossed.inside}, apexes[0], apexes[1]})
+        mix(name);
+    }
+    for (std::uint32_t w = 0; w < (own.mesh.level[0].count + 63) / 64; ++w)
+      mix(own.marks.inside[w]);
+  }
+  return std::max(hash, std::uint64_t{1});
+}
+
+void ExactParts::name_parts() noexcept {
+  if (one_) {
+    scratch_.parts[0] = {};
+    parts_ = 1;
+  }
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
     ExactPart& part = scratch_.parts[part_of(i)];
     const std::uint64_t id = (std::uint64_t{scratch_.crossings.triangle(0, i)} << kTriangleBits |
                               scratch_.crossings.triangle(1, i)) +
                              1;
     part.id = part.id == 0 ? id : std::min(part.id, id);
-    add_crossing_term(terms, i % 8, part.sums);
+  }
+}
+
+bool ExactParts::are_one() noexcept {
+  bool one = parts_ == 1;
+  for (Side& own : sides_) {
+    if (!one) return false;
+    for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
+      const CrossedBlock& crossed = own.marks.blocks[own.marks.place[b]];
+      std::int8_t whole[kWidth];
+      count_triangles(own.mesh.blocks[b], crossed, whole);
+      for (std::uint32_t t = 0; one && t < kWidth; ++t) {
+        if (whole[t] == 0) continue;
+        const std::uint32_t element = triangle_element(own, crossed, t);
+        one = element != kNoIndex && part_of(element) == 0;
+      }
+    });
+    for_each_block(own.marks.inside, own.mesh.level[0].count,
+                   [&](std::uint32_t b) { one = one && part_of(block_element(own, b)) == 0; });
+  }
+  return one;
+}
+
+void ExactParts::sum_parts() noexcept {
+  if (one_ && out_.sums.volume() > 0) {
+    scratch_.parts[0].sums = out_.sums;
+    return;
+  }
+  ExactTerms terms;
+  for (std::uint32_t i = 0; i < out_.crossings; ++i) {
+    if (i % 8 == 0) crossing_terms(scratch_.crossings, i, out_.origin, terms);
+    add_crossing_term(terms, i % 8, scratch_.parts[part_of(i)].sums);
   }
   for (Side& own : sides_) {
     for_each_block(own.marks.pierced, own.mesh.level[0].count, [&](std::uint32_t b) {
@@ -317,14 +416,25 @@ void ExactParts::join_cavities() noexcept {
     if (scratch_.parts[p].sums.volume() < 0) scratch_.parts[p].kept = largest;
 }
 
-std::uint32_t ExactParts::divide() noexcept {
-  parts_ = 0;
+void ExactParts::join() noexcept {
   begin();
   join_curves();
   for (Side& own : sides_) join_holes(own);
   join_edges();
   for (Side& own : sides_) join_vertices(own);
   for (Side& own : sides_) join_blocks(own);
+}
+
+std::uint32_t ExactParts::divide() noexcept {
+  parts_ = 0;
+  const std::uint64_t names = kept_ != nullptr ? hash_of_names() : 0;
+  one_ = kept_ != nullptr && kept_->one == names;
+  if (!one_) join();
+  name_parts();
+  if (!one_) {
+    one_ = are_one();
+    if (kept_ != nullptr) kept_->one = one_ && by_names_ ? names : 0;
+  }
   sum_parts();
   join_cavities();
   return parts_;

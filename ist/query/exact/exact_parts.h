@@ -24,6 +24,9 @@ class ExactParts : public ExactQuery {
  protected:
   std::uint32_t part_of(std::uint32_t element) noexcept;
 
+  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
+  std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
+                               std::uint32_t vertex) const noexcept;
   std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
   /// What a triangle of a crossed block hangs together with, where it counts as a whole.
   std::uint32_t triangle_element(const Side& side, const CrossedBlock& crossed,
@@ -32,10 +35,8 @@ class ExactParts : public ExactQuery {
  private:
   std::uint32_t root(std::uint32_t element) noexcept;
   void unite(std::uint32_t x, std::uint32_t y) noexcept;
-  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
-  std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
-                               std::uint32_t vertex) const noexcept;
-  std::uint32_t first_middle(const Side& side, const CrossedBlock& crossed) const noexcept;
+  /// Of the edges of a crossed block, by its place.
+  std::uint32_t first_middle(const Side& side, std::uint32_t place) const noexcept;
 
   void begin() noexcept;
   void join_curves() noexcept;
@@ -45,10 +46,17 @@ class ExactParts : public ExactQuery {
                           std::uint32_t first) noexcept;
   void join_vertices(Side& side) noexcept;
   void join_blocks(Side& side) noexcept;
+  void join() noexcept;
+  std::uint64_t hash_of_names() const noexcept;
+  void name_parts() noexcept;
+  /// Whether all that counts is in one part.
+  bool are_one() noexcept;
   void sum_parts() noexcept;
   void join_cavities() noexcept;
 
   std::uint32_t parts_ = 0;
+  bool one_ = false;      ///< all that counts is in one part
+  bool by_names_ = true;  ///< what hangs together follows from what hash_of_names() is of
   std::uint32_t vertices_of_b_ = 0, blocks_of_a_ = 0, blocks_of_b_ = 0;  ///< first elements
 };
 

@@ -236,11 +236,11 @@ struct ExactSums {
 
 /// A connected part of an overlap, or an octant of one.
 struct ExactPart {
-  ExactSums sums;            ///< from the whole's origin
-  std::uint64_t id = 0;      ///< lowest pair of triangles on its outline, from 1; 0: it has none
-  std::uint32_t kept = 0;    ///< the part that it was added to, or itself
-  std::uint32_t slot = 0;    ///< of its octants
-  exact::Point centre = {};  ///< centroid from the whole's origin, once there is need of it
+  ExactSums sums;          ///< from the whole's origin
+  std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
+  std::uint32_t kept = 0;  ///< the part that it was added to, or itself
+  std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex: it is not divided
+  exact::Point centre = {};       ///< centroid from the whole's origin, once there is need of it
 };
 
 /// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
@@ -249,8 +249,10 @@ struct OctantSums {
   exact::Point moment = {};   ///< 24 ∫ x
   exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
   exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
-  exact::Point centre =
-      {};  ///< of the first: the part's centroid from the whole's origin, A's axes
+  // Of the first:
+  exact::Point centre = {};          ///< the part's centroid from the whole's origin, A's axes
+  exact::Point low = {}, high = {};  ///< its box in the axes, from the centre
+  int planes = 0;                    ///< a bit an axis: the part is cut across it
 };
 
 /// An edge where it is pierced.

@@ -26,6 +26,8 @@ struct KeptPairs {
   std::uint64_t first;      ///< in the ring
   std::uint32_t count;
   std::uint64_t nearest = kNone;  ///< of distances: the pair that the last query found
+  /// Of crossings that all hang together, and of what they go around: see ExactParts. 0: unknown.
+  std::uint64_t one = 0;
 };
 
 /// What exact queries keep from call to call: pairs of triangles of many pairs of solids. The

@@ -96,3 +96,18 @@ IST_FORMULA void cone_terms(Real count, const Vec3& apex, const Vec3& next, cons
                   (length_bound(u) * length_bound(v)));
   out.moment = six * (apex + (next + last));
 }
+
+/// What a piece of a surface adds to the sums of an octant, from the centre of its part.
+struct OctantTerms {
+  Real six_volumes;
+  Vec3 moment, area, torque;
+};
+
+/// `half`: 0.5 times how often it counts; `share`: of its torque, a third of the octant's share in
+/// a surface, and less than 0 for A's.
+IST_FORMULA OctantTerms octant_terms(Real half, Real share, const Vec3& p, const Vec3& q,
+                                     const Vec3& r) {
+  const Vec3 area = half * cross(q - p, r - p), three = p + (q + r);
+  const Real six = constant(2.0) * dot(p, area);
+  return {six, six * three, area, share * cross(three, area)};
+}

@@ -22,6 +22,13 @@ HWY_INLINE void store(const PieceTerms& terms, ExactTerms& out, std::size_t l) {
   store(terms.moment, out.moment, l);
 }
 
+/// Whether the edge of an end is B's, of crossings from `i` on.
+HWY_INLINE Mask ends_by_b(const Crossings& crossings, int e, std::size_t i) {
+  const D d;
+  const V edge = hn::LoadU(d, crossings.end(e, Crossings::kEdge) + i), eight = hn::Set(d, 8.0);
+  return hn::IfThenElse(edge >= eight, edge - eight, edge) >= hn::Set(d, 3.0);
+}
+
 void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
                    ExactTerms& out) {
   const D d;
@@ -36,10 +43,7 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
       return {load(crossings.apex(side, 0)), load(crossings.apex(side, 1)),
               load(crossings.apex(side, 2))};
     };
-    const auto by_b = [&](int e) {
-      const V edge = load(crossings.end(e, Crossings::kEdge)), eight = hn::Set(d, 8.0);
-      return hn::IfThenElse(edge >= eight, edge - eight, edge) >= hn::Set(d, 3.0);
-    };
+    const auto by_b = [&](int e) { return ends_by_b(crossings, e, first + l); };
     PieceTerms terms;
     segment_terms({vector(0, Crossings::kFrom) - o, vector(1, Crossings::kFrom) - o},
                   {vector(0, Crossings::kOffset), vector(1, Crossings::kOffset)},
@@ -52,6 +56,82 @@ void sum_crossings(const Crossings& crossings, std::uint32_t first, const exact:
     for (int e = 1; e < 3; ++e) store(terms.six_volumes[e], out.six_volumes[e] + l);
     store(terms.force, out.force, l);
     store(terms.torque, out.torque, l);
+  }
+}
+
+void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const OctantView& view,
+                       OctantPieces& out) {
+  const D d;
+  const auto all = [&](const exact::Point& x) -> Vec3 {
+    return {hn::Set(d, x.x), hn::Set(d, x.y), hn::Set(d, x.z)};
+  };
+  const Vec3 origin = all(view.origin),
+             axis[3] = {all(view.axis[0]), all(view.axis[1]), all(view.axis[2])};
+  for (int t = 0; t < OctantPieces::kTriangles; ++t) out.of_b[t] = t == 1 ? 0xff : 0;
+  const V once = hn::Set(d, 1.0), half = hn::Set(d, 0.5), third = hn::Set(d, 0.5 / 3);
+  for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
+    const std::size_t i = first + l;
+    const Vec3 centre = {hn::Load(d, view.centre[0] + l), hn::Load(d, view.centre[1] + l),
+                         hn::Load(d, view.centre[2] + l)};
+    const auto load = [&](const auto& number) -> Vec3 {
+      return {hn::LoadU(d, number(0) + i), hn::LoadU(d, number(1) + i),
+              hn::LoadU(d, number(2) + i)};
+    };
+    Vec3 corner[6];
+    const auto see = [&](int c, const Vec3& x) {
+      const Vec3 from = x - centre;
+      corner[c] = {dot(axis[0], from), dot(axis[1], from), dot(axis[2], from)};
+      store(corner[c], out.at[c], l);
+      const auto above = [&](V at, double bit) {
+        return hn::IfThenElseZero(at >= hn::Zero(d), hn::Set(d, bit));
+      };
+      const V octant =
+          (above(corner[c].x, 1.0) + above(corner[c].y, 2.0)) + above(corner[c].z, 4.0);
+      hn::StoreU(hn::DemoteTo(hn::Rebind<std::uint8_t, D>(),
+                              hn::DemoteTo(hn::Rebind<std::int32_t, D>(), octant)),
+                 hn::Rebind<std::uint8_t, D>(), out.octant[c] + l);
+    };
+    const auto add = [&](int t, V times, V share, const Vec3& p, const Vec3& q, const Vec3& r) {
+      const OctantTerms terms = octant_terms(half * times, share, p, q, r);
+      store(times, out.times[t] + l);
+      store(terms.six_volumes, out.six_volumes[t] + l);
+      store(terms.moment, out.moment[t], l);
+      store(terms.area, out.area[t], l);
+      store(terms.torque, out.torque[t], l);
+      return terms;
+    };
+    for (int s = 0; s < 2; ++s) see(s, load([&](int k) { return crossings.apex(s, k); }));
+    for (int e = 0; e < 2; ++e) {
+      const Vec3 near =
+          load([&](int k) { return crossings.end(e, Crossings::kFrom + k); }) - origin;
+      see(OctantPieces::kEnd + e,
+          near + load([&](int k) { return crossings.end(e, Crossings::kOffset + k); }));
+      see(OctantPieces::kNear + e, near);
+    }
+    const OctantTerms of_a = add(0, once, hn::Neg(third), corner[0], corner[2], corner[3]),
+                      of_b = add(1, once, third, corner[1], corner[3], corner[2]);
+    V six = of_a.six_volumes + of_b.six_volumes;
+    Vec3 moment = of_a.moment + of_b.moment, torque = of_a.torque + of_b.torque;
+    Vec3 area[2] = {of_a.area, of_b.area};
+    for (int e = 0; e < 2; ++e) {
+      const Mask by_b = ends_by_b(crossings, e, i);
+      const V times = hn::LoadU(d, crossings.opposite(e) + i), b = hn::IfThenElseZero(by_b, once);
+      out.of_b[2 + e] |= mask_bits(d, by_b) << l;
+      const Vec3 apex = {choose(by_b, corner[1].x, corner[0].x),
+                         choose(by_b, corner[1].y, corner[0].y),
+                         choose(by_b, corner[1].z, corner[0].z)};
+      const OctantTerms terms = add(2 + e, times, choose(by_b, third, hn::Neg(third)), apex,
+                                    corner[2 + e], corner[4 + e]);
+      six = six + terms.six_volumes;
+      moment = moment + terms.moment;
+      torque = torque + terms.torque;
+      area[0] = area[0] + (once - b) * terms.area;
+      area[1] = area[1] + b * terms.area;
+    }
+    store(six, out.sum_six_volumes + l);
+    store(moment, out.sum_moment, l);
+    store(torque, out.sum_torque, l);
+    for (int s = 0; s < 2; ++s) store(area[s], out.sum_area[s], l);
   }
 }
 
@@ -131,6 +211,7 @@ namespace ist {
 
 HWY_EXPORT(place_block_fans);
 HWY_EXPORT(sum_crossings);
+HWY_EXPORT(sum_octant_pieces);
 HWY_EXPORT(sum_triangles);
 
 void place_fans(const PlacedVertices& placed, const MeshBlock& mesh, const exact::Point& origin,
@@ -141,6 +222,11 @@ void place_fans(const PlacedVertices& placed, const MeshBlock& mesh, const exact
 void crossing_terms(const Crossings& crossings, std::uint32_t first, const exact::Point& origin,
                     ExactTerms& out) noexcept {
   HWY_DYNAMIC_DISPATCH(sum_crossings)(crossings, first, origin, out);
+}
+
+void octant_pieces(const Crossings& crossings, std::uint32_t first, const OctantView& view,
+                   OctantPieces& out) noexcept {
+  HWY_DYNAMIC_DISPATCH(sum_octant_pieces)(crossings, first, view, out);
 }
 
 void triangle_terms(const CrossedBlock& crossed, const std::int8_t (&whole)[kWidth], int h,

@@ -47,7 +47,8 @@ class ContactSearch : PairSigns {
           const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
           if (std::exchange(blocks, met) != met)
             now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
-          for (lanes &= now->flush(i); lanes != 0; lanes &= lanes - 1) {
+          lanes &= now->flush(i);
+          for (; lanes != 0; lanes &= lanes - 1) {
             const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
             gather(kWidth * number_a + i, now->vertices(0), kWidth * number_b + j,
                    now->vertices(1));
@@ -114,7 +115,10 @@ class ContactSearch : PairSigns {
       }
       if (!is_near(a, b)) continue;
       const PlacedTriangles &of_a = placed_.triangles(false, a), &of_b = placed_.triangles(true, b);
-      for (std::uint32_t i = 0; i < search_.a->blocks[a].triangles; ++i) {
+      const OneBox all(of_b.all_low, of_b.all_high, search_.near);
+      for (std::uint32_t rows = meeting(of_a.low, of_a.high, all.low, all.high); rows != 0;
+           rows &= rows - 1) {
+        const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
         const OneBox box(of_a.low, of_a.high, i, search_.near);
         const std::uint32_t lanes = meeting(of_b.low, of_b.high, box.low, box.high);
         if (lanes != 0 && visit(a, i, b, lanes)) return;
