@@ -24,7 +24,7 @@ endforeach()")
 
 set(others PATTERN bullet EXCLUDE)
 if(IST_QUERY_ONLY)  # headers of functions that ist::query lacks
-  foreach(header IN ITEMS bake c_bake cover_spheres gpu gpu_query mesh query_tbb solid)
+  foreach(header IN ITEMS bake c_bake cover_spheres gpu gpu_query gpu_scene mesh query_tbb solid)
     list(APPEND others PATTERN ist/${header}.h EXCLUDE)
   endforeach()
 endif()

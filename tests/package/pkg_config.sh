@@ -61,7 +61,7 @@ int main(int, char** argv) try {
   return std::puts(error.what()), 2;
 }
 END
-for lacking in bake mesh packing gpu_query query_tbb; do [ ! -e "$headers/$lacking.h" ]; done
+for lacking in bake mesh packing gpu_query gpu_scene query_tbb; do [ ! -e "$headers/$lacking.h" ]; done
 "$cxx" -std=c++20 -Wall -Wextra -Wshadow -Wconversion -Werror "$work/headers.cpp" \
   $(pkg-config --cflags --libs ist-query | sed 's/-I\([^ ]*eigen3\)/-isystem \1/') -o "$work/headers"
 "$work/headers" "$a"
