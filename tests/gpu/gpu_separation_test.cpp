@@ -22,12 +22,12 @@ namespace {
 class GpuSeparationTest : public GpuTest {
  protected:
   std::vector<Separation> on_device(const GpuSolids& solids, const std::vector<BatchPair>& pairs,
-                                    std::uint32_t max_visits = 0) {
+                                    const GpuSeparationSettings& settings = {}) {
     GpuWorkspace workspace(pairs.size());
     const DeviceBatch batch(pairs);
     const DeviceSeparations answers(pairs.size());
     const Stream stream;
-    separation_batch(solids, batch.pairs(), max_visits, workspace, answers.answers(), stream);
+    separation_batch(solids, batch.pairs(), settings, workspace, answers.answers(), stream);
     stream.wait();
     return answers.get();
   }
@@ -44,7 +44,7 @@ TEST_F(GpuSeparationTest, HasTheBitsOfAWarpOnTheHost) {
   const GpuSolids solids(batch_solids());
   for (const std::uint32_t most : {0u, 7u, 250u}) {
     HostSeparations host(batch_solids());
-    expect_same_bits(on_device(solids, pairs, most), host.run(pairs, 0, most));
+    expect_same_bits(on_device(solids, pairs, {most}), host.run(pairs, 0, {most}));
     EXPECT_EQ(host.counters[0].tasks > 50, most != 7);
   }
 }
@@ -98,7 +98,7 @@ TEST_F(GpuSeparationTest, AGraphMayCaptureItBesidePenetrations) {
   cudaGraph_t graph = nullptr;
   cudaGraphExec_t ready = nullptr;
   gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
-  separation_batch(solids, batch.pairs(), 0, workspace, captured.answers(), stream);
+  separation_batch(solids, batch.pairs(), {}, workspace, captured.answers(), stream);
   penetration_batch(solids, batch.pairs(), {Measure::matched}, workspace, batch.answers(), stream);
   gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
   gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
@@ -116,12 +116,12 @@ TEST_F(GpuSeparationTest, WhatDoesNotFitIsAnError) {
   GpuWorkspace workspace(4);
   const DeviceBatch batch(pairs);
   const DeviceSeparations answers(pairs.size());
-  EXPECT_THROW(separation_batch(solids, batch.pairs(), 0, workspace, answers.answers(), nullptr),
+  EXPECT_THROW(separation_batch(solids, batch.pairs(), {}, workspace, answers.answers(), nullptr),
                Error);
   EXPECT_TRUE(on_device(solids, {}).empty());
   // Nothing is wanted: nothing is written.
   const DeviceBatch four({pairs.begin(), pairs.begin() + 4});
-  separation_batch(solids, four.pairs(), 0, workspace, {}, nullptr);
+  separation_batch(solids, four.pairs(), {}, workspace, {}, nullptr);
   gpu::check(cudaDeviceSynchronize(), "waiting");
 }
 
