@@ -26,7 +26,7 @@ struct ExactGrids {
 struct MeshGapGrids {
   int glance;
   int search[2];  ///< of boxes in float, and in double
-  int finish;
+  int measure, finish;
 };
 
 /// Blocks of each kernel that the current device runs at a time.

@@ -25,14 +25,16 @@ struct MeshGapQuery {
   std::uint32_t overlap;  ///< 1: triangles cross; 2: inner spheres meet
   std::uint32_t stopped;
   std::uint32_t in_double;  ///< in the k-th query the k-th of the round whose boxes are in doubles
-  double left;              ///< squared: what was stopped is no nearer
+  std::uint32_t waiting;    ///< pairs of triangles that are to be measured
+  std::uint32_t triangles[32][2];
+  double left;  ///< squared: what was stopped is no nearer
   NearestTriangles best;
 };
 
 /// A round takes pairs through their steps, of which each is a small kernel.
 struct MeshGapRound {
-  std::uint32_t count;                        ///< of pairs
-  std::uint32_t glanced, searched, finished;  ///< of them taken
+  std::uint32_t count;                                  ///< of pairs
+  std::uint32_t glanced, searched, measured, finished;  ///< of them taken
   std::uint32_t in_double, searched_in_double;
 };
 

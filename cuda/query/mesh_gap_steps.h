@@ -74,7 +74,7 @@ IST_HD inline void place_mesh_gap(const SeparationArrays& batch, MeshGapRound& r
   query.most = batch.max_distance > 0 ? batch.max_distance / place.unit_a + query.error : HUGE_VAL;
   query.likely = HUGE_VAL;
   query.toward = {0, 0, 0};
-  query.visits = query.tests = query.overlap = query.stopped = 0;
+  query.visits = query.tests = query.overlap = query.stopped = query.waiting = 0;
   query.left = HUGE_VAL;
   query.best = {};
   query.best.rounding = gap_rounding(query.reach);
@@ -116,41 +116,83 @@ IST_HD void glance_at_spheres(const Team& team, const SeparationArrays& batch, s
   if (const double far = norm(way); far > 0) query.toward = way / far;
 }
 
+/// Readies a team's memory for a pair.
+template <class Team>
+IST_HD void load_mesh_gap(const Team& team, const SeparationArrays& batch,
+                          const MeshGapQuery& query, MeshGapPair& memory) {
+  team.sync();
+  copy_words(team, query.place.a_from_b, memory.map[0]);
+  copy_words(team, query.place.b_from_a, memory.map[1]);
+  copy_words(team, query.best, memory.best);
+  for (int side = 0; side < 2; ++side)
+    copy_words(team, solid_of(batch.pairs, query, side).mesh, memory.mesh[side]);
+  if (team.lane() == 0) {
+    memory.reach = query.reach;
+    memory.crosses = 0;
+    memory.level = {0, 0, 0};
+  }
+  team.sync();
+}
+
 /// Searches both meshes of the k-th pair of a round.
 template <class Real, class Team>
 IST_HD void search_mesh_gap(const Team& team, const SeparationArrays& batch, std::uint32_t k,
                             MeshGapMemory<Real>& memory) {
   MeshGapQuery& query = batch.meshes.queries[k];
   if (query.overlap != 0 || (query.single != 0) != (sizeof(Real) == 4)) return;
-  team.sync();
-  copy_words(team, query.place.a_from_b, memory.map[0]);
-  copy_words(team, query.place.b_from_a, memory.map[1]);
-  copy_words(team, query.best, memory.best);
-  for (int side = 0; side < 2; ++side) {
-    const SolidRef& solid = solid_of(batch.pairs, query, side);
-    copy_words(team, solid.mesh, memory.mesh[side]);
-    if (team.lane() == 0) memory.in_floats[side] = solid.in_floats;
-  }
-  if (team.lane() == 0) memory.reach = query.reach;
+  load_mesh_gap(team, batch, query, memory);
+  if (team.lane() == 0)
+    for (int side = 0; side < 2; ++side)
+      memory.in_floats[side] = solid_of(batch.pairs, query, side).in_floats;
   team.sync();
   const double slack = gap_slack(query.reach);
   const double most = (query.most + slack) * (sizeof(Real) == 4 ? 1 : 1 + 2 * kGapsAlike);
   const std::uint32_t visits = batch.max_visits == ~0u ? ~0u : batch.max_visits - query.visits;
   MeshGapSearch<Team, Real> search(team, memory, query.toward);
   if (batch.max_visits != ~0u) search.begin();
-  search.run(std::fmin(most, query.likely + slack), visits);
-  if (memory.best.pair == NearestTriangles::kNone && memory.crosses == 0 && !search.stopped() &&
-      query.likely < query.most)
-    search.run(most, visits);
+  // Where nothing is as near as it is likely, a solid holds the other, but for roundings.
+  double limit = std::fmin(most, query.likely + slack);
+  IST_ROLLED
+  for (;;) {
+    search.run(limit, visits);
+    const bool none = memory.best.pair == NearestTriangles::kNone && search.queued() == 0;
+    if (!none || memory.crosses != 0 || search.stopped() || !(limit < most)) break;
+    limit = most;
+  }
   const double left = search.stopped() ? search.left() : HUGE_VAL;
+  const std::uint32_t waiting = search.queued();
   team.sync();
   copy_words(team, memory.best, query.best);
+  for (std::uint32_t n = static_cast<std::uint32_t>(team.lane()); n < waiting;
+       n += static_cast<std::uint32_t>(Team::kWidth))
+    for (int side = 0; side < 2; ++side) query.triangles[n][side] = memory.queue[n][side];
   if (team.lane() != 0) return;
+  query.waiting = waiting;
   query.visits += search.visits();
-  query.tests += search.tests();
+  query.tests += search.tests() + waiting;
   query.overlap = memory.crosses;
   query.stopped = search.stopped() ? 1 : 0;
   query.left = left;
+}
+
+/// Measures what the search of the k-th pair of a round has left.
+template <class Team>
+IST_HD void measure_mesh_gap(const Team& team, const SeparationArrays& batch, std::uint32_t k,
+                             MeshGapPair& memory) {
+  MeshGapQuery& query = batch.meshes.queries[k];
+  const std::uint32_t waiting = query.waiting;
+  if (waiting == 0) return;
+  load_mesh_gap(team, batch, query, memory);
+  constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
+  for (std::uint32_t first = 0; first < waiting; first += kBatch) {
+    const std::uint32_t count = waiting - first < kBatch ? waiting - first : kBatch;
+    for (std::uint32_t n = static_cast<std::uint32_t>(team.lane()); n < count; n += kBatch)
+      for (int side = 0; side < 2; ++side) memory.queue[n][side] = query.triangles[first + n][side];
+    team.sync();
+    measure_triangles(team, memory, 0, count);
+  }
+  copy_words(team, memory.best, query.best);
+  if (team.lane() == 0 && memory.crosses != 0) query.overlap = 1;
 }
 
 /// Whether a solid holds a shell of the other, B or A. All of a team together.
@@ -197,10 +239,11 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
     row.distance = unit * distance;
     row.distance_min = unit * std::fmax(0.0, std::fmax(0.0, least) - query.error);
     row.distance_max = unit * (distance * (1 + 1e-15) + query.error);
-    const Vec3 at_a = best.on_a, at_b = best.on_a + best.between, way = at_b - at_a;
+    const Vec3 at_a = best.on_a, at_b = best.on_a + best.between;
     row.point_a = place.to_world(query.swapped == 0 ? at_a : at_b);
     row.point_b = place.to_world(query.swapped == 0 ? at_b : at_a);
-    row.normal = turned(place.rotation_a, way / (query.swapped == 0 ? norm(way) : -norm(way)));
+    const double way = query.swapped == 0 ? norm(best.between) : -norm(best.between);
+    row.normal = turned(place.rotation_a, best.between / way);
   }
   if (query.stopped != 0) row.status = QueryStatus::budget_exhausted;
   row.node_visits = query.visits;

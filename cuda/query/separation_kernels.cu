@@ -25,8 +25,12 @@ constexpr int kBlocksEach = 5;
 constexpr unsigned kPlaceThreads = 128;
 constexpr unsigned kMeshWarps = 4, kMeshThreads = 32 * kMeshWarps;
 template <class Real>
-constexpr int kMeshBlocks = sizeof(Real) == 4 ? 4 : 2;
-constexpr int kFinishBlocks = 8;
+constexpr unsigned kSearchWarps = sizeof(Real) == 4 ? 4 : 2;
+template <class Real>
+constexpr unsigned kSearchThreads = 32 * kSearchWarps<Real>;
+template <class Real>
+constexpr int kMeshBlocks = sizeof(Real) == 4 ? 5 : 2;
+constexpr int kMeasureBlocks = 2, kFinishBlocks = 8;
 
 /// Places every pair and lists those that can be.
 __global__ void __launch_bounds__(kSiftThreads) sift_separations(const SeparationArrays batch) {
@@ -88,9 +92,9 @@ __global__ void __launch_bounds__(kThreads<float>, kBlocksEach<float>)
 }
 
 template <class Real>
-__global__ void __launch_bounds__(kMeshThreads, kMeshBlocks<Real>)
+__global__ void __launch_bounds__(kSearchThreads<Real>, kMeshBlocks<Real>)
     search_meshes(const SeparationArrays batch, const std::uint32_t n) {
-  __shared__ Raw<MeshGapMemory<Real>, kMeshWarps> memory;
+  __shared__ Raw<MeshGapMemory<Real>, kSearchWarps<Real>> memory;
   MeshGapRound& round = round_of(batch.meshes, n);
   constexpr bool kSingle = sizeof(Real) == 4;
   by_warps(kSingle ? round.count : round.in_double,
@@ -99,6 +103,15 @@ __global__ void __launch_bounds__(kMeshThreads, kMeshBlocks<Real>)
              search_mesh_gap<Real>(team, batch, kSingle ? k : batch.meshes.queries[k].in_double,
                                    memory[threadIdx.x / 32]);
            });
+}
+
+__global__ void __launch_bounds__(kMeshThreads, kMeasureBlocks)
+    measure_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  __shared__ Raw<MeshGapPair, kMeshWarps> memory;
+  MeshGapRound& round = round_of(batch.meshes, n);
+  by_warps(round.count, &round.measured, [&](const WarpTeam& team, std::uint32_t k) {
+    measure_mesh_gap(team, batch, k, memory[threadIdx.x / 32]);
+  });
 }
 
 __global__ void __launch_bounds__(kMeshThreads, kFinishBlocks)
@@ -122,10 +135,14 @@ void launch_meshes(const SeparationArrays& batch, const Grids& grids, cudaStream
     check_launch("placing meshes");
     glance_at_meshes<<<blocks(grids.mesh_gaps.glance), kThreads<float>, 0, stream>>>(batch, n);
     check_launch("looking at spheres of meshes");
-    search_meshes<float><<<blocks(grids.mesh_gaps.search[0]), kMeshThreads, 0, stream>>>(batch, n);
+    search_meshes<float>
+        <<<blocks(grids.mesh_gaps.search[0]), kSearchThreads<float>, 0, stream>>>(batch, n);
     check_launch("searching distances of meshes");
-    search_meshes<double><<<blocks(grids.mesh_gaps.search[1]), kMeshThreads, 0, stream>>>(batch, n);
+    search_meshes<double>
+        <<<blocks(grids.mesh_gaps.search[1]), kSearchThreads<double>, 0, stream>>>(batch, n);
     check_launch("searching distances of meshes in double");
+    measure_meshes<<<blocks(grids.mesh_gaps.measure), kMeshThreads, 0, stream>>>(batch, n);
+    check_launch("measuring triangles of meshes");
     finish_meshes<<<blocks(grids.mesh_gaps.finish), kMeshThreads, 0, stream>>>(batch, n);
     check_launch("answering distances of meshes");
   }
@@ -145,8 +162,9 @@ void find_separation_grids(Grids& grids) {
   grids.search[0] = blocks_at_a_time(separate_pairs<float>, kThreads<float>);
   grids.search[1] = blocks_at_a_time(separate_pairs<double>, kThreads<double>);
   grids.mesh_gaps = {blocks_at_a_time(glance_at_meshes, kThreads<float>),
-                     {blocks_at_a_time(search_meshes<float>, kMeshThreads),
-                      blocks_at_a_time(search_meshes<double>, kMeshThreads)},
+                     {blocks_at_a_time(search_meshes<float>, kSearchThreads<float>),
+                      blocks_at_a_time(search_meshes<double>, kSearchThreads<double>)},
+                     blocks_at_a_time(measure_meshes, kMeshThreads),
                      blocks_at_a_time(finish_meshes, kMeshThreads)};
 }
 

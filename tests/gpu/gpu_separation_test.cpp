@@ -5,11 +5,14 @@
 #include <ist/types.h>
 
 #include <cmath>
+#include <map>
 
 #include "cuda/check.h"
 #include "support/device_separations.h"
 #include "support/gpu_test.h"
 #include "support/host_separations.h"
+#include "support/mated_rows.h"
+#include "support/mesh_gaps.h"
 #include "support/oracle_assets.h"
 #include "support/random_pairs.h"
 
@@ -49,21 +52,23 @@ TEST_F(GpuSeparationTest, HasTheBitsOfAWarpOnTheHost) {
   }
 }
 
-TEST_F(GpuSeparationTest, AgreesWithSeparationOnTheOraclesRows) {
+TEST_F(GpuSeparationTest, SpheresAgreeWithSeparationOnTheOraclesRows) {
   IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
   constexpr std::size_t kSpheres = 4000;
   std::vector<BatchPair> pairs;
   std::vector<std::pair<PlacedAsset, PlacedAsset>> of_cpu;
+  std::vector<Asset> assets;
+  for (const char* const mesh : {"elephant", "dino"})
+    assets.push_back(baked(load_mesh(oracle_mesh_path(mesh)), mesh, kSpheres, false));
   for (const OracleRow& row : read_oracle_rows("eledino")) {
-    of_cpu.push_back(placed(row, kSpheres));
+    of_cpu.push_back({{assets[0].view(), {}, 1}, {assets[1].view(), row.pose, row.scale_b}});
     pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
   }
-  const GpuSolids solids(std::vector<GpuSolid>{of_cpu[0].first.asset, of_cpu[0].second.asset});
+  const GpuSolids solids(views_of(assets));
   const std::vector<Separation> answers = on_device(solids, pairs);
   Workspace workspace;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const Separation cpu =
-        separation(of_cpu[i].first, of_cpu[i].second, {.inner_spheres = true}, workspace);
+    const Separation cpu = separation(of_cpu[i].first, of_cpu[i].second, {}, workspace);
     EXPECT_NEAR(answers[i].distance, cpu.distance, 1e-6 * cpu.distance) << i;
     EXPECT_LE(answers[i].distance, cpu.distance_max) << i;
     EXPECT_GE(answers[i].distance_min, cpu.distance_min - 1e-12) << i;
@@ -108,6 +113,80 @@ TEST_F(GpuSeparationTest, AGraphMayCaptureItBesidePenetrations) {
   expect_same_bits(batch.get(), direct.get());
   cudaGraphExecDestroy(ready);
   cudaGraphDestroy(graph);
+}
+
+/// Distances of meshes: the host's lanes have the same bits, and two runs.
+TEST_F(GpuSeparationTest, MeshesHaveTheBitsOfAWarpOnTheHost) {
+  std::vector<BatchPair> pairs = mesh_gap_pairs(51, 300);
+  for (const BatchPair& pair : aligned_gap_pairs(52, 200)) pairs.push_back(pair);
+  pairs[20].pose_b.t[0] = std::nan("");
+  pairs[30].scale_b = -1;
+  pairs[40].a = 1000;
+  pairs[50].scale_b = 1e-6;
+  pairs[60].pose_b.t[2] = 1e9;
+  pairs[70].pose_b.t[2] = 1e30;
+  const GpuSolids solids(exact_solids());
+  for (const GpuSeparationSettings settings :
+       {GpuSeparationSettings{}, GpuSeparationSettings{30, 0}, GpuSeparationSettings{0, 0.2}}) {
+    HostSeparations host(exact_solids());
+    expect_same_bits(on_device(solids, pairs, settings), host.run(pairs, 1, settings));
+  }
+}
+
+TEST_F(GpuSeparationTest, RandomMeshesAnswerAsTheCpu) {
+  const std::vector<BatchPair> pairs = mesh_gap_pairs(53, 100'000);
+  const GpuSolids solids(exact_solids());
+  const std::vector<Separation> found = on_device(solids, pairs);
+  const GapDifferences differences = compare_gaps(exact_assets(), pairs, found);
+  EXPECT_GT(differences.apart, 50'000u);
+  EXPECT_LE(differences.other_points, 20u);
+  expect_same_bits(on_device(solids, pairs), found);
+}
+
+TEST_F(GpuSeparationTest, AlignedMeshesAnswerAsTheCpu) {
+  const std::vector<BatchPair> pairs = aligned_gap_pairs(54, 10'000);
+  const GpuSolids solids(exact_solids());
+  const std::vector<Separation> found = on_device(solids, pairs);
+  const GapDifferences differences = compare_gaps(exact_assets(), pairs, found);
+  EXPECT_GT(differences.apart, 2'000u);
+  EXPECT_LE(differences.other_points, 20u);
+  expect_same_bits(on_device(solids, pairs), found);
+}
+
+TEST_F(GpuSeparationTest, MeshesOfTheOraclesRowsAnswerAsTheCpu) {
+  IST_NEEDS_SHARED("oracle/poses/poses_eledino.csv");
+  for (const std::string& key : kPairKeys) {
+    std::vector<BatchPair> pairs;
+    const std::vector<OracleRow> rows = read_oracle_rows(key);
+    std::vector<Asset> assets;
+    for (const std::string& mesh : {rows[0].mesh_a, rows[0].mesh_b})
+      assets.push_back(bake_mesh_only(close_mesh(load_mesh(oracle_mesh_path(mesh)), mesh), 0));
+    for (const OracleRow& row : rows) pairs.push_back({0, 1, {}, row.pose, 1, row.scale_b});
+    const GpuSolids solids(views_of(assets));
+    const std::vector<Separation> found = on_device(solids, pairs);
+    compare_gaps(assets, pairs, found);
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      EXPECT_NEAR(found[i].distance, rows[i].solid_distance(), 1e-9) << key << " " << i;
+  }
+}
+
+/// One part on another, each part once as it is and once moved along the mate.
+TEST_F(GpuSeparationTest, MatedPartsAnswerAsTheCpu) {
+  IST_NEEDS_SHARED("oracle/mated/poses.csv");
+  std::map<std::string, std::uint32_t> number;
+  std::vector<Asset> assets;
+  std::vector<BatchPair> pairs;
+  for (const MatedRow& row : read_mated_rows()) {
+    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
+      if (number.try_emplace(mesh, static_cast<std::uint32_t>(assets.size())).second)
+        assets.push_back(bake_mesh_only(close_mesh(load_mesh(mated_mesh_path(mesh)), mesh), 0));
+    pairs.push_back({number[row.mesh_a], number[row.mesh_b], {}, row.pose});
+    pairs.push_back(pairs.back());
+    for (double& t : pairs.back().pose_b.t) t *= 1.25;
+  }
+  const GpuSolids solids(views_of(assets));
+  const GapDifferences differences = compare_gaps(assets, pairs, on_device(solids, pairs));
+  EXPECT_GT(differences.apart, 20u);
 }
 
 TEST_F(GpuSeparationTest, WhatDoesNotFitIsAnError) {

@@ -328,6 +328,7 @@ void HostSeparations::separate_meshes(gpu::SeparationArrays& batch, unsigned see
   const auto spheres = std::make_unique<gpu::GapMemory<float>>();
   const auto single = std::make_unique<gpu::MeshGapMemory<float>>();
   const auto in_double = std::make_unique<gpu::MeshGapMemory<double>>();
+  const auto pair = std::make_unique<gpu::MeshGapPair>();
   const auto stack = std::make_unique<InsideStack>();
   const std::uint32_t listed = counters[2].listed;
   for (std::uint32_t n = 0; n * mesh_room < listed; ++n) {
@@ -345,6 +346,8 @@ void HostSeparations::separate_meshes(gpu::SeparationArrays& batch, unsigned see
       by_team(seed, [&](const auto& team) {
         gpu::search_mesh_gap<double>(team, batch, queries[k].in_double, *in_double);
       });
+    for (std::uint32_t k = 0; k < count; ++k)
+      by_team(seed, [&](const auto& team) { gpu::measure_mesh_gap(team, batch, k, *pair); });
     for (std::uint32_t k = 0; k < count; ++k)
       by_team(seed, [&](const auto& team) { gpu::finish_mesh_gap(team, batch, k, *stack); });
   }

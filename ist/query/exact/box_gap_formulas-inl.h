@@ -16,17 +16,17 @@ constexpr double kGapRounding = sizeof(T) == sizeof(float) ? 2e-6 : 1e-14;
 /// `squared`: the distance from `one`, or less; `apart`: the largest gap along any axis, which is
 /// negative where both overlap along all of them. False where all are certain to be `beyond`, by
 /// the first axes alone: then neither is said.
-template <class Of>
-IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T>& look, const SeenBox& one,
+template <class Of, class S>
+IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const SeenBox<S>& one,
                                const LaneBox<typename Of::V>& box, typename Of::V beyond,
                                typename Of::V& squared, typename Of::V& apart) {
   using T = typename Of::T;
   using V = typename Of::V;
-  const auto set = [](double x) { return Of::set(static_cast<T>(x)); };
-  constexpr double kLength = 1 - 1e-5;  // of normals, or more
-  const V zero = set(0), half_one = set(0.5);
+  const auto set = [](S x) { return Of::set(static_cast<T>(x)); };
+  constexpr S kLength = S(1 - 1e-5);  // of normals, or more
+  const V zero = set(0), half_one = set(S(0.5));
   V away[3], half[3];
-  V along = zero, across = zero, largest = set(-1e30);
+  V along = zero, across = zero, largest = set(S(-1e30));
   const auto squared_gap = [&](V gap) {
     largest = Of::greater(largest, gap);
     const V positive = Of::greater(zero, gap);

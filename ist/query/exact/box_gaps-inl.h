@@ -49,8 +49,8 @@ struct BoxLanes {
 /// Which of sixteen boxes may be within `limit`, squared, of `one` of the other mesh: a bit each.
 /// Of these come the squared distances, or less, and how far they are apart.
 template <class T>
-HWY_INLINE std::uint32_t measure_sixteen(const BoxLook<T>& look, const BoxBlock& boxes,
-                                         const SeenBox& one, double limit, T (&squared)[kWidth],
+HWY_INLINE std::uint32_t measure_sixteen(const BoxLook<T, double>& look, const BoxBlock& boxes,
+                                         const SeenBox<double>& one, double limit, T (&squared)[kWidth],
                                          T (&apart)[kWidth]) {
   const LaneTag<T> d;
   using V = hn::Vec<decltype(d)>;

@@ -11,29 +11,31 @@
 namespace ist {
 
 /// A box by its middle and its slab, in its own frame.
+template <class S>
 struct MiddleBox {
-  double middle[3], half[3];
-  double normal[3] = {}, slab_low = 0, slab_high = 0;
+  S middle[3], half[3];
+  S normal[3] = {}, slab_low = 0, slab_high = 0;
 };
 
 /// The box of a node: a lane of the block above, or that of the whole mesh, which has no slab.
-IST_HD inline MiddleBox box_of(const MeshTree& mesh, int level, std::uint32_t i) {
-  MiddleBox box;
+template <class S>
+IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
+  MiddleBox<S> box;
   if (level == mesh.top) {
     for (int k = 0; k < 3; ++k) {
-      box.middle[k] = 0.5 * (double{mesh.low[k]} + mesh.high[k]);
-      box.half[k] = 0.5 * (double{mesh.high[k]} - mesh.low[k]);
+      box.middle[k] = S(0.5) * (S(mesh.low[k]) + S(mesh.high[k]));
+      box.half[k] = S(0.5) * (S(mesh.high[k]) - S(mesh.low[k]));
     }
     return box;
   }
   const BoxBlock& boxes = in_global_memory(mesh.level[level + 1].boxes)[i / kWidth];
   const std::uint32_t l = i % kWidth;
   for (int k = 0; k < 3; ++k) {
-    box.middle[k] = 0.5 * (double{boxes.low[k][l]} + boxes.high[k][l]);
-    box.half[k] = 0.5 * (double{boxes.high[k][l]} - boxes.low[k][l]);
-    box.normal[k] = double{boxes.normal[k][l]};
+    box.middle[k] = S(0.5) * (S(boxes.low[k][l]) + S(boxes.high[k][l]));
+    box.half[k] = S(0.5) * (S(boxes.high[k][l]) - S(boxes.low[k][l]));
+    box.normal[k] = S(boxes.normal[k][l]);
   }
-  box.slab_low = double{boxes.slab_low[l]}, box.slab_high = double{boxes.slab_high[l]};
+  box.slab_low = S(boxes.slab_low[l]), box.slab_high = S(boxes.slab_high[l]);
   return box;
 }
 
@@ -67,64 +69,75 @@ IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a,
 
 /// One box of the other mesh in the frame of boxes that are measured from it. All is told from its
 /// middle.
+template <class S>
 struct SeenBox {
-  double middle[3], hull[3], reach[3], normal[3];
-  double low, high;      ///< its slab
-  double nearest;        ///< how far it reaches back along the way
-  double beside_way[2];  ///< and beside that
+  S middle[3], hull[3], reach[3], normal[3];
+  S low, high;      ///< its slab
+  S nearest;        ///< how far it reaches back along the way
+  S beside_way[2];  ///< and beside that
 };
 
 /// How boxes of one mesh are seen from the other's frame: along their own axes, along the other's,
-/// along the normals of all slabs, and along the way that the answer is likely to go.
-template <class T>
+/// along the normals of all slabs, and along the way that the answer is likely to go. Boxes in lanes
+/// of T, the other's in S.
+template <class T, class S>
 struct BoxLook {
-  double axis[3][3];        ///< the other's, in their frame
-  double along[3][3] = {};  ///< [way][axis of the other]: their product
-  double blur;              ///< what a coordinate may be off by
+  S m[9], shift[3], scale;  ///< from the other's frame to theirs
+  S axis[3][3];             ///< the other's, in their frame
+  S along[3][3] = {};       ///< [way][axis of the other]: their product
+  S blur;                   ///< what a coordinate may be off by
   // For lanes; ways go from the boxes to the other, and two beside that.
   T lane_axis[3][3], abs_axis[3][3], lane_way[3][3] = {}, abs_way[3][3] = {};
 
   BoxLook() = default;
   /// `map` goes from the other's frame to theirs.
-  IST_HD BoxLook(const Similarity& map, double off) : blur(off) {
+  IST_HD BoxLook(const Similarity& map, double off)
+      : scale(static_cast<S>(map.scale)), blur(static_cast<S>(off)) {
     const double inverse = 1 / map.scale;
-    for (int i = 0; i < 3; ++i)
+    for (int i = 0; i < 3; ++i) {
+      shift[i] = static_cast<S>(map.t[i]);
       for (int k = 0; k < 3; ++k) {
-        axis[k][i] = map.m[3 * i + k] * inverse;
+        m[3 * i + k] = static_cast<S>(map.m[3 * i + k]);
+        axis[k][i] = static_cast<S>(map.m[3 * i + k] * inverse);
         lane_axis[k][i] = static_cast<T>(axis[k][i]);
         abs_axis[k][i] = std::abs(lane_axis[k][i]);
       }
+    }
   }
 
   /// The first of the axes, of length 1, goes from the boxes to the other mesh; or all are zero.
   IST_HD void turn(const WayAxes& axes) {
     for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) turn(axes, j, k);
+      for (int k = 0; k < 3; ++k) turn(axes.way[j], axes.way[j][k], j, k);
   }
-  IST_HD void turn(const WayAxes& axes, int j, int k) {
-    const exact::Point& way = axes.way[j];
-    along[j][k] = (way.x * axis[k][0] + way.y * axis[k][1]) + way.z * axis[k][2];
-    lane_way[j][k] = static_cast<T>(way[k]);
+  /// Its j-th, of which `component` is the k-th number.
+  IST_HD void turn(const exact::Point& way, double component, int j, int k) {
+    along[j][k] = static_cast<S>((way.x * double{axis[k][0]} + way.y * double{axis[k][1]}) +
+                                 way.z * double{axis[k][2]});
+    lane_way[j][k] = static_cast<T>(component);
     abs_way[j][k] = std::abs(lane_way[j][k]);
   }
 
-  IST_HD SeenBox see(const Similarity& map, const MiddleBox& one) const {
-    SeenBox out;
-    map.apply(one.middle, out.middle);
-    for (int i = 0; i < 3; ++i) out.reach[i] = map.scale * one.half[i] + blur;
+  IST_HD SeenBox<S> see(const MiddleBox<S>& one) const {
+    SeenBox<S> out;
+    for (int i = 0; i < 3; ++i) {
+      out.middle[i] = (m[3 * i] * one.middle[0] + m[3 * i + 1] * one.middle[1]) +
+                      m[3 * i + 2] * one.middle[2] + shift[i];
+      out.reach[i] = scale * one.half[i] + blur;
+    }
     for (int i = 0; i < 3; ++i) {
       out.hull[i] = (std::abs(axis[0][i]) * out.reach[0] + std::abs(axis[1][i]) * out.reach[1]) +
                     std::abs(axis[2][i]) * out.reach[2];
       out.normal[i] =
           (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) + axis[2][i] * one.normal[2];
     }
-    const double before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
-                          one.normal[2] * one.middle[2];
-    out.low = map.scale * (one.slab_low - before), out.high = map.scale * (one.slab_high - before);
-    const double(&along_way)[3] = along[0];
-    const double turned = (along_way[0] * one.normal[0] + along_way[1] * one.normal[1]) +
-                          along_way[2] * one.normal[2];
-    double by_box = 0, by_slab = std::fmin(turned * out.low, turned * out.high);
+    const S before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
+                     one.normal[2] * one.middle[2];
+    out.low = scale * (one.slab_low - before), out.high = scale * (one.slab_high - before);
+    const S(&along_way)[3] = along[0];
+    const S turned = (along_way[0] * one.normal[0] + along_way[1] * one.normal[1]) +
+                     along_way[2] * one.normal[2];
+    S by_box = 0, by_slab = std::fmin(turned * out.low, turned * out.high);
     out.beside_way[0] = out.beside_way[1] = 0;
     for (int k = 0; k < 3; ++k) {
       by_box -= out.reach[k] * std::abs(along_way[k]);

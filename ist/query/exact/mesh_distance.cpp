@@ -188,7 +188,7 @@ class MeshGapSearch {
 
   /// The larger node's sixteen against the other's box.
   template <class T>
-  void open(const GapPair& pair, const BoxLook<T>& at_a, const BoxLook<T>& at_b) {
+  void open(const GapPair& pair, const BoxLook<T, double>& at_a, const BoxLook<T, double>& at_b) {
     const bool open_a =
         pair.level_b == 0 || (pair.level_a > 0 && size_of(a_, pair.level_a, pair.a) >=
                                                       scale_ * size_of(b_, pair.level_b, pair.b));
@@ -201,10 +201,10 @@ class MeshGapSearch {
     const double limit = squared_limit_ / unit;
     std::uint32_t left =
         open_a ? measure_sixteen(at_a, boxes,
-                                 at_a.see(asked_.a_from_b, box_of(b_, pair.level_b, pair.b)), limit,
+                                 at_a.see(box_of<double>(b_, pair.level_b, pair.b)), limit,
                                  squared, apart)
                : measure_sixteen(at_b, boxes,
-                                 at_b.see(asked_.b_from_a, box_of(a_, pair.level_a, pair.a)), limit,
+                                 at_b.see(box_of<double>(a_, pair.level_a, pair.a)), limit,
                                  squared, apart);
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
@@ -372,8 +372,8 @@ class MeshGapSearch {
   const bool single_;                   ///< boxes are measured in floats
   const double slack_;                  ///< what distances of triangles are off by, by rounding
   const double blur_;                   ///< likewise of boxes
-  BoxLook<float> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
-  BoxLook<double> double_a_, double_b_;
+  BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
+  BoxLook<double, double> double_a_, double_b_;
   double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};
