@@ -29,7 +29,7 @@ constexpr unsigned kSearchWarps = sizeof(Real) == 4 ? 4 : 2;
 template <class Real>
 constexpr unsigned kSearchThreads = 32 * kSearchWarps<Real>;
 template <class Real>
-constexpr int kMeshBlocks = sizeof(Real) == 4 ? 5 : 2;
+constexpr int kMeshBlocks = sizeof(Real) == 4 ? 4 : 2;
 constexpr int kMeasureBlocks = 2, kFinishBlocks = 8;
 
 /// Places every pair and lists those that can be.
