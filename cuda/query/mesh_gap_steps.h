@@ -16,9 +16,6 @@
 
 namespace ist::gpu {
 
-/// Node pairs of spheres that are opened for a bound: more of them bring little.
-constexpr std::uint32_t kGlance = 64;
-
 /// The pair's A and B as the query has them.
 IST_HD inline const GpuPlacedSolids& side_of(const SolidPairs& batch, const MeshGapQuery& query,
                                              int side) {

@@ -361,9 +361,6 @@ class SurfaceGap {
     return result;
   }
 
-  /// Nodes that are opened for a bound: more of them bring little.
-  static constexpr std::uint32_t kGlance = 64;
-
   const PlacedAsset& a_;
   const PlacedAsset& b_;
   const RelativePose& pose_;

@@ -50,8 +50,8 @@ struct BoxLanes {
 /// Of these come the squared distances, or less, and how far they are apart.
 template <class T>
 HWY_INLINE std::uint32_t measure_sixteen(const BoxLook<T, double>& look, const BoxBlock& boxes,
-                                         const SeenBox<double>& one, double limit, T (&squared)[kWidth],
-                                         T (&apart)[kWidth]) {
+                                         const SeenBox<double>& one, double limit,
+                                         T (&squared)[kWidth], T (&apart)[kWidth]) {
   const LaneTag<T> d;
   using V = hn::Vec<decltype(d)>;
   const V beyond =

@@ -78,8 +78,8 @@ struct SeenBox {
 };
 
 /// How boxes of one mesh are seen from the other's frame: along their own axes, along the other's,
-/// along the normals of all slabs, and along the way that the answer is likely to go. Boxes in lanes
-/// of T, the other's in S.
+/// along the normals of all slabs, and along the way that the answer is likely to go. Boxes in
+/// lanes of T, the other's in S.
 template <class T, class S>
 struct BoxLook {
   S m[9], shift[3], scale;  ///< from the other's frame to theirs

@@ -200,12 +200,10 @@ class MeshGapSearch {
     const double unit = open_a ? 1 : asked_.a_from_b.scale * asked_.a_from_b.scale;
     const double limit = squared_limit_ / unit;
     std::uint32_t left =
-        open_a ? measure_sixteen(at_a, boxes,
-                                 at_a.see(box_of<double>(b_, pair.level_b, pair.b)), limit,
-                                 squared, apart)
-               : measure_sixteen(at_b, boxes,
-                                 at_b.see(box_of<double>(a_, pair.level_a, pair.a)), limit,
-                                 squared, apart);
+        open_a ? measure_sixteen(at_a, boxes, at_a.see(box_of<double>(b_, pair.level_b, pair.b)),
+                                 limit, squared, apart)
+               : measure_sixteen(at_b, boxes, at_b.see(box_of<double>(a_, pair.level_a, pair.a)),
+                                 limit, squared, apart);
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
     for (; left != 0; left &= left - 1) {
@@ -369,9 +367,9 @@ class MeshGapSearch {
   GapPair* const waiting_;  ///< a stack
   std::uint32_t size_ = 0;
   const double scale_, reach_;
-  const bool single_;                   ///< boxes are measured in floats
-  const double slack_;                  ///< what distances of triangles are off by, by rounding
-  const double blur_;                   ///< likewise of boxes
+  const bool single_;   ///< boxes are measured in floats
+  const double slack_;  ///< what distances of triangles are off by, by rounding
+  const double blur_;   ///< likewise of boxes
   BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
   BoxLook<double, double> double_a_, double_b_;
   double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;

@@ -50,6 +50,9 @@ IST_HD inline bool level_with(const exact::Point (&t)[3], const exact::Point& wa
   return true;
 }
 
+/// Node pairs of spheres that are opened for a bound: more of them bring little.
+inline constexpr std::uint32_t kGlance = 64;
+
 /// The nearest two triangles so far; of those that are as near, to rounding, the ones of the lowest
 /// numbers.
 struct NearestTriangles {
