@@ -83,7 +83,7 @@ class Batches {
     const DeviceBatch batch(drawn(scene.poses, count));
     const DeviceSeparations answers(count);
     const double ms = median_ms([&] {
-      separation_batch(solids, batch.pairs(), 0, workspace(count), answers.answers(),
+      separation_batch(solids, batch.pairs(), {}, workspace(count), answers.answers(),
                        stream_.get());
     });
     separations_ = answers.get();

@@ -1,8 +1,6 @@
 // Exact penetrations of many pairs at once on the GPU: rates with poses and answers resident, by
 // how much the solids overlap, of a nut on its bolt, of mated parts and of small bodies; the same
 // by all cores of the machine, and how far the answers differ.
-#include <cuda_runtime_api.h>
-
 #include <cstdio>
 #include <exception>
 #include <map>
@@ -12,8 +10,8 @@
 #include <ist/gpu_query.h>
 #include <ist/query_tbb.h>
 
-#include "cuda/base/check.h"
 #include "gpu_batch_scenes.h"
+#include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_batch.h"
@@ -29,38 +27,6 @@ using ist::testing::DeviceBatch;
 Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
   return bake_mesh_only(close_mesh(mesh, name), 0);
 }
-
-/// [ms] of the device's work, the median of some.
-template <class Work>
-double device_ms(const Work& work) {
-  cudaStream_t stream = nullptr;
-  cudaEvent_t event[2];
-  gpu::check(cudaStreamCreate(&stream), "making a stream");
-  for (cudaEvent_t& e : event) gpu::check(cudaEventCreate(&e), "making an event");
-  work(stream);
-  std::vector<double> all;
-  for (int k = 0; k < 5; ++k) {
-    gpu::check(cudaEventRecord(event[0], stream), "timing");
-    work(stream);
-    gpu::check(cudaEventRecord(event[1], stream), "timing");
-    gpu::check(cudaEventSynchronize(event[1]), "timing");
-    float ms = 0;
-    gpu::check(cudaEventElapsedTime(&ms, event[0], event[1]), "timing");
-    all.push_back(static_cast<double>(ms));
-  }
-  for (cudaEvent_t e : event) cudaEventDestroy(e);
-  cudaStreamDestroy(stream);
-  return benchmark::quantile(all, 0.5);
-}
-
-struct Solids {
-  std::vector<const Asset*> assets;
-  std::vector<GpuSolid> views() const {
-    std::vector<GpuSolid> out;
-    for (const Asset* asset : assets) out.emplace_back(asset->view());
-    return out;
-  }
-};
 
 /// By all cores, M/s.
 double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs,

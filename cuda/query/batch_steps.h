@@ -59,6 +59,16 @@ IST_HD inline bool place_pair(const SolidPairs& batch, std::uint32_t i, PairPlac
   return place_pair(batch, batch.pairs.a, batch.pairs.b, i, place);
 }
 
+/// The same by the CPU's divisions, for the CPU's digits.
+IST_HD_COLD bool place_exactly(const SolidPairs& batch, const GpuPlacedSolids& a,
+                               const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {
+  return place.place(solid_of(batch, a, i).frame, pose_of(a, i), scale_of(a, i),
+                     solid_of(batch, b, i).frame, pose_of(b, i), scale_of(b, i));
+}
+IST_HD inline bool place_exactly(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
+  return place_exactly(batch, batch.pairs.a, batch.pairs.b, i, place);
+}
+
 /// Places pair i; why it is none of two trees if not ok.
 IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
   const PairKind kind = kind_of(batch, i);

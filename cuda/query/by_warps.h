@@ -2,6 +2,7 @@
 
 // Device code only.
 
+#include <cstddef>
 #include <cstdint>
 
 #include "cuda/base/atomics.h"
@@ -9,6 +10,13 @@
 #include "cuda/base/warp_team.h"
 
 namespace ist::gpu {
+
+/// Shared memory runs no constructors.
+template <class T, unsigned kCount>
+struct Raw {
+  alignas(16) std::byte bytes[kCount][sizeof(T)];
+  __device__ T& operator[](unsigned warp) { return *reinterpret_cast<T*>(bytes[warp]); }
+};
 
 /// Calls work(team, k) for k < count, each warp taking the next when it is done with one, as long
 /// as goes_on().

@@ -18,13 +18,6 @@ constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 // A multiprocessor; more leave too few registers.
 constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4;
 
-/// Shared memory runs no constructors.
-template <class T, unsigned kCount>
-struct Raw {
-  alignas(16) std::byte bytes[kCount][sizeof(T)];
-  __device__ T& operator[](unsigned warp) { return *reinterpret_cast<T*>(bytes[warp]); }
-};
-
 /// Lists pairs whose boxes meet.
 __global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays batch) {
   const WarpTeam team;

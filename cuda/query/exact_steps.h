@@ -14,12 +14,6 @@
 
 namespace ist::gpu {
 
-IST_HD_COLD bool place_exactly(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
-  return place.place(solid_of(batch, batch.pairs.a, i).frame, pose_of(batch.pairs.a, i),
-                     scale_of(batch.pairs.a, i), solid_of(batch, batch.pairs.b, i).frame,
-                     pose_of(batch.pairs.b, i), scale_of(batch.pairs.b, i));
-}
-
 /// Whether the boxes of two meshes meet in A's frame.
 IST_HD inline bool boxes_meet(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b) {
   double middle[3], half[3], at[3];

@@ -85,11 +85,12 @@ class GapDescent {
     team_.sync();
   }
 
-  /// The roots, and a first bound from a pair of spheres.
-  IST_HD void start() {
+  /// The roots, and a first bound from a pair of spheres. `covers`: their gaps are asked for.
+  IST_HD void start(bool covers = true) {
     const TreeRef &a = m_.tree[0], &b = m_.tree[1];
     GapTotals first;
     first.clear();
+    if (!covers) limit_cover_ = -kHuge;
     measure(0, 0, first);
     if (team_.lane() == 0) {
       m_.best = first;

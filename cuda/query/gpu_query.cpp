@@ -41,6 +41,7 @@ constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
 constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
 /// A round of pairs of meshes, and chunks of triangles for each of them.
 constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 12;
+constexpr std::uint32_t kRoomForMeshGaps = 1 << 17;    ///< a round of distances of meshes
 constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
@@ -80,6 +81,7 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
     for (const gpu::CutsRef& cuts : solid.cuts)
       impl_->most_bins = std::max(impl_->most_bins, cuts.bins);
     impl_->most_blocks = std::max(impl_->most_blocks, solid.mesh.count);
+    impl_->all_meshes = impl_->all_meshes && (solid.is_field() || solid.mesh.header != nullptr);
   }
   queue.wait();
 }
@@ -136,15 +138,23 @@ std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
 std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
   gpu::Parts parts(from);
   gpu::SeparationArrays& arrays = room.separations;
-  arrays.counters = parts.take<gpu::BatchCounters>(2);
+  arrays.counters = parts.take<gpu::BatchCounters>(3);
   for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(room.most_pairs);
+  arrays.meshes.query_room =
+      static_cast<std::uint32_t>(std::min<std::size_t>(room.most_pairs, kRoomForMeshGaps));
+  arrays.meshes.rounds = parts.take<gpu::MeshGapRound>(2);
+  std::byte* const shared = from + parts.used();
+  arrays.meshes.queries = parts.take<gpu::MeshGapQuery>(arrays.meshes.query_room);
+  const std::size_t of_meshes = parts.used();
+  // Those of spheres, in the same memory: what these need is done before.
+  parts = gpu::Parts(shared);
   place_splits(parts, arrays.pairs);
   arrays.totals = parts.take<gpu::GapTotals>(kRoomForSplits + kRoomForTasks);
   arrays.entries = {parts.take<std::uint32_t>(kRoomForGapEntries),
                     parts.take<std::uint32_t>(kRoomForGapEntries),
                     parts.take<double>(kRoomForGapEntries), parts.take<double>(kRoomForGapEntries)};
   arrays.pairs.entry_room = kRoomForGapEntries;
-  return parts.used();
+  return std::max(of_meshes, static_cast<std::size_t>(shared - from) + parts.used());
 }
 
 /// Rooms of teams take what is left of `bytes`.
@@ -270,17 +280,20 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
   gpu::launch_field_batch(fields, solids.impl().has_group, room.grids, stream);
 }
 
-void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
-                      GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream) {
+void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
+                      const GpuSeparationSettings& settings, GpuWorkspace& workspace,
+                      const GpuSeparations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
   const gpu::SolidPairs asked = asked_of(solids, pairs, room, Measure::inner, {});
   if (pairs.count == 0) return;
   gpu::SeparationArrays batch = room.separations;
   static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.answers = answers;
-  batch.max_visits = max_visits == 0 ? ~0u : max_visits;
+  batch.max_visits = settings.max_visits == 0 ? ~0u : settings.max_visits;
+  batch.max_distance = settings.max_distance;
   const gpu::DeviceGuard guard(room.device);
-  gpu::launch_separations(batch, room.grids, stream);
+  gpu::launch_separations(batch, room.grids, !solids.impl().all_meshes,
+                          solids.impl().most_blocks > 0, stream);
 }
 
 void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,

@@ -63,6 +63,7 @@ struct GpuSolids::Impl {
   bool has_fields = false;
   bool has_group[gpu::kFieldGroups] = {};
   bool has_details = false;       ///< some asset has coarser levels
+  bool all_meshes = true;         ///< every asset keeps one
   std::uint32_t most_bins = 0;    ///< of a tree's contacts
   std::uint32_t most_blocks = 0;  ///< of a mesh
   std::vector<SolidBox> boxes;    ///< on the host

@@ -23,10 +23,17 @@ struct ExactGrids {
   int whole;
 };
 
+struct MeshGapGrids {
+  int glance;
+  int search[2];  ///< of boxes in float, and in double
+  int measure, finish;
+};
+
 /// Blocks of each kernel that the current device runs at a time.
 struct Grids {
-  int sum, details;      ///< of a batch of trees
-  int search[2];         ///< of separations, in float and in double
+  int sum, details;  ///< of a batch of trees
+  int search[2];     ///< of separations, in float and in double
+  MeshGapGrids mesh_gaps;
   int divide;            ///< of contact patches
   int smooth;            ///< of trees in smooth fields
   TriangleGrids facets;  ///< of trees in boxes and terrains
@@ -47,7 +54,9 @@ void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t str
 bool has_room(const ExactArrays& batch);
 /// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.
 std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs);
-void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream);
+/// `has_spheres`: some solids have no mesh; `has_meshes`: some have one.
+void launch_separations(const SeparationArrays& batch, const Grids& grids, bool has_spheres,
+                        bool has_meshes, cudaStream_t stream);
 /// As many divide contacts as `room_bytes` hold the rooms of.
 void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,
                     cudaStream_t stream);

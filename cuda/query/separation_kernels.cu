@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "cuda/base/check.h"
 #include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
@@ -20,13 +22,23 @@ constexpr unsigned kThreads = 32 * kWarps<Real>;
 template <class Real>
 constexpr int kBlocksEach = 5;
 
+constexpr unsigned kPlaceThreads = 128;
+constexpr unsigned kMeshWarps = 4, kMeshThreads = 32 * kMeshWarps;
+template <class Real>
+constexpr unsigned kSearchWarps = sizeof(Real) == 4 ? 4 : 2;
+template <class Real>
+constexpr unsigned kSearchThreads = 32 * kSearchWarps<Real>;
+template <class Real>
+constexpr int kMeshBlocks = sizeof(Real) == 4 ? 4 : 2;
+constexpr int kMeasureBlocks = 2, kFinishBlocks = 8;
+
 /// Places every pair and lists those that can be.
 __global__ void __launch_bounds__(kSiftThreads) sift_separations(const SeparationArrays batch) {
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
   const auto pair = static_cast<std::uint32_t>(i);
   const int list = i < batch.pairs.pairs.count ? sift_separation(batch, pair) : -1;
   const WarpTeam team;
-  for (int kind = 0; kind < 2; ++kind) {
+  for (int kind = 0; kind < 3; ++kind) {
     const std::uint32_t place = append(team, list == kind, &batch.counters[kind].listed);
     if (list == kind) batch.list[kind][place] = pair;
   }
@@ -56,6 +68,86 @@ __global__ void __launch_bounds__(kThreads<Real>, kBlocksEach<Real>)
            });
 }
 
+/// Begins the n-th round of meshes.
+__global__ void __launch_bounds__(kPlaceThreads)
+    place_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  const std::uint32_t first = n * batch.meshes.query_room, listed = batch.counters[2].listed;
+  const std::uint32_t left = first < listed ? listed - first : 0;
+  const std::uint32_t count = left < batch.meshes.query_room ? left : batch.meshes.query_room;
+  const std::uint32_t k = blockIdx.x * kPlaceThreads + threadIdx.x;
+  MeshGapRound& round = round_of(batch.meshes, n);
+  // The next one's: this one's are zero already, and in use.
+  if (k == 0) round_of(batch.meshes, n + 1) = {};
+  if (k == 0) round.count = count;
+  if (k < count) place_mesh_gap(batch, round, k, batch.list[2][first + k]);
+}
+
+__global__ void __launch_bounds__(kThreads<float>, kBlocksEach<float>)
+    glance_at_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  __shared__ GapMemory<float> memory[kWarps<float>];
+  MeshGapRound& round = round_of(batch.meshes, n);
+  by_warps(round.count, &round.glanced, [&](const WarpTeam& team, std::uint32_t k) {
+    glance_at_spheres(team, batch, k, memory[threadIdx.x / 32]);
+  });
+}
+
+template <class Real>
+__global__ void __launch_bounds__(kSearchThreads<Real>, kMeshBlocks<Real>)
+    search_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  __shared__ Raw<MeshGapMemory<Real>, kSearchWarps<Real>> memory;
+  MeshGapRound& round = round_of(batch.meshes, n);
+  constexpr bool kSingle = sizeof(Real) == 4;
+  by_warps(kSingle ? round.count : round.in_double,
+           kSingle ? &round.searched : &round.searched_in_double,
+           [&](const WarpTeam& team, std::uint32_t k) {
+             search_mesh_gap<Real>(team, batch, kSingle ? k : batch.meshes.queries[k].in_double,
+                                   memory[threadIdx.x / 32]);
+           });
+}
+
+__global__ void __launch_bounds__(kMeshThreads, kMeasureBlocks)
+    measure_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  __shared__ Raw<MeshGapPair, kMeshWarps> memory;
+  MeshGapRound& round = round_of(batch.meshes, n);
+  by_warps(round.count, &round.measured, [&](const WarpTeam& team, std::uint32_t k) {
+    measure_mesh_gap(team, batch, k, memory[threadIdx.x / 32]);
+  });
+}
+
+__global__ void __launch_bounds__(kMeshThreads, kFinishBlocks)
+    finish_meshes(const SeparationArrays batch, const std::uint32_t n) {
+  __shared__ InsideStack stack[kMeshWarps];
+  MeshGapRound& round = round_of(batch.meshes, n);
+  by_warps(round.count, &round.finished, [&](const WarpTeam& team, std::uint32_t k) {
+    finish_mesh_gap(team, batch, k, stack[threadIdx.x / 32]);
+  });
+}
+
+void launch_meshes(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream) {
+  const std::uint32_t room = batch.meshes.query_room;
+  const auto count = static_cast<std::uint32_t>(batch.pairs.pairs.count);
+  const auto blocks = [](int of) { return static_cast<unsigned>(of); };
+  check(cudaMemsetAsync(batch.meshes.rounds, 0, 2 * sizeof(MeshGapRound), stream),
+        "starting rounds");
+  for (std::uint32_t n = 0; n < (count + room - 1) / room; ++n) {
+    place_meshes<<<blocks_for(std::min(count, room), kPlaceThreads), kPlaceThreads, 0, stream>>>(
+        batch, n);
+    check_launch("placing meshes");
+    glance_at_meshes<<<blocks(grids.mesh_gaps.glance), kThreads<float>, 0, stream>>>(batch, n);
+    check_launch("looking at spheres of meshes");
+    search_meshes<float>
+        <<<blocks(grids.mesh_gaps.search[0]), kSearchThreads<float>, 0, stream>>>(batch, n);
+    check_launch("searching distances of meshes");
+    search_meshes<double>
+        <<<blocks(grids.mesh_gaps.search[1]), kSearchThreads<double>, 0, stream>>>(batch, n);
+    check_launch("searching distances of meshes in double");
+    measure_meshes<<<blocks(grids.mesh_gaps.measure), kMeshThreads, 0, stream>>>(batch, n);
+    check_launch("measuring triangles of meshes");
+    finish_meshes<<<blocks(grids.mesh_gaps.finish), kMeshThreads, 0, stream>>>(batch, n);
+    check_launch("answering distances of meshes");
+  }
+}
+
 template <class Real>
 void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t stream) {
   separate_pairs<Real><<<static_cast<unsigned>(blocks), kThreads<Real>, 0, stream>>>(batch);
@@ -69,15 +161,24 @@ void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t str
 void find_separation_grids(Grids& grids) {
   grids.search[0] = blocks_at_a_time(separate_pairs<float>, kThreads<float>);
   grids.search[1] = blocks_at_a_time(separate_pairs<double>, kThreads<double>);
+  grids.mesh_gaps = {blocks_at_a_time(glance_at_meshes, kThreads<float>),
+                     {blocks_at_a_time(search_meshes<float>, kSearchThreads<float>),
+                      blocks_at_a_time(search_meshes<double>, kSearchThreads<double>)},
+                     blocks_at_a_time(measure_meshes, kMeshThreads),
+                     blocks_at_a_time(finish_meshes, kMeshThreads)};
 }
 
-void launch_separations(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream) {
-  check(cudaMemsetAsync(batch.counters, 0, 2 * sizeof(BatchCounters), stream), "starting a batch");
+void launch_separations(const SeparationArrays& batch, const Grids& grids, bool has_spheres,
+                        bool has_meshes, cudaStream_t stream) {
+  check(cudaMemsetAsync(batch.counters, 0, 3 * sizeof(BatchCounters), stream), "starting a batch");
   sift_separations<<<blocks_for(batch.pairs.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(
       batch);
   check_launch("placing pairs of trees");
-  launch_searches<float>(batch, grids.search[0], stream);
-  launch_searches<double>(batch, grids.search[1], stream);
+  if (has_spheres) {
+    launch_searches<float>(batch, grids.search[0], stream);
+    launch_searches<double>(batch, grids.search[1], stream);
+  }
+  if (has_meshes) launch_meshes(batch, grids, stream);
 }
 
 }  // namespace ist::gpu

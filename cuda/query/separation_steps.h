@@ -5,6 +5,7 @@
 #include "base/host_device.h"
 #include "cuda/base/atomics.h"
 #include "cuda/query/batch_steps.h"
+#include "cuda/query/mesh_gap_steps.h"
 #include "cuda/query/separation_arrays.h"
 #include "query/base/precision.h"
 
@@ -46,13 +47,23 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     row.point_a = place.to_world(at_a + a.r * axis);
     row.point_b = place.to_world(at_b - place.a_from_b.scale * b.r * axis);
     row.normal = turned(place.rotation_a, axis);
+    if (batch.max_distance > 0 && row.distance_min > batch.max_distance)
+      row = farther_row(batch.max_distance);
   }
   write_row(batch.answers, i, row);
 }
 
-/// Which list pair i goes to: 0 float, 1 double; −1: it is answered. One thread a pair.
+/// Which list pair i goes to: 0 spheres in float, 1 in double, 2 meshes; −1: it is answered. One
+/// thread a pair.
 IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i) {
   PairPlace place;
+  if (kind_of(batch.pairs, i) == PairKind::trees &&
+      solid_of(batch.pairs, batch.pairs.pairs.a, i).mesh.header != nullptr &&
+      solid_of(batch.pairs, batch.pairs.pairs.b, i).mesh.header != nullptr) {
+    if (place_exactly(batch.pairs, i, place)) return 2;
+    write_row(batch.answers, i, no_row<SeparationRow>(QueryStatus::invalid_input));
+    return -1;
+  }
   const QueryStatus placed = place_trees(batch.pairs, i, place);
   if (placed != QueryStatus::ok) {
     write_row(batch.answers, i, no_row<SeparationRow>(placed));

@@ -92,11 +92,11 @@ struct GpuPenetrations {
 
 /// Answers, each as in Separation: arrays in device memory. Null pointers: not wanted.
 struct GpuSeparations {
-  double* distance = nullptr;      ///< [count] [u] between the inner spheres
+  double* distance = nullptr;      ///< [count] [u] between surfaces or inner spheres
   double* distance_min = nullptr;  ///< [count] [u] lower bound for the solids, certified
   double* distance_max = nullptr;  ///< [count] [u] upper bound, certified
-  double* point_a = nullptr;       ///< [count][3] [u] on A's inner spheres, world
-  double* point_b = nullptr;       ///< [count][3] [u] on B's inner spheres, world
+  double* point_a = nullptr;       ///< [count][3] [u] on A's surface or spheres, world
+  double* point_b = nullptr;       ///< [count][3] [u] on B's surface or spheres, world
   double* normal = nullptr;        ///< [count][3] unit, from A to B, world
   /// [count] ok; budget_exhausted under max_visits; others as in GpuPenetrations.
   QueryStatus* status = nullptr;

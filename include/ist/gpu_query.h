@@ -114,21 +114,35 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream);
 
-/// answers[i] = separation(pairs[i]) of two assets, by their inner spheres.
+/// Settings of a batch, as in SeparationSettings.
+struct GpuSeparationSettings {
+  std::uint32_t max_visits = 0;  ///< count of node pairs opened, depth first; 0: no limit
+  double max_distance = 0;       ///< [u] farther is not told how far; 0: no limit
+};
+
+/// answers[i] = separation(pairs[i]) of two assets: of their surfaces if both keep a mesh, else of
+/// their inner spheres.
 ///
-/// The distance is the least over all pairs of inner spheres in double. separation() selects that
+/// Surfaces: the distance is within 1e-9 of the CPU's, relative, or 1e-13 of the solids' size, and
+/// mostly the same double; of pairs of triangles that are as near, to rounding, the one of the
+/// lowest numbers answers, as there. The interval is certified as there. sphere_pairs counts
+/// spheres and triangles that were measured.
+///
+/// Inner spheres: the distance is the least over all pairs in double. separation() selects that
 /// pair in float: its distance may be larger by 1e-6 of the objects' size, and among equally near
 /// pairs it may select another. The interval is certified too, and its lower end is at least
-/// separation()'s. `max_visits` as in SeparationSettings; 0: no limit. Under a limit that binds the
-/// interval is certified too, but differs from that of separation(). The bits are the same in every
-/// run, whatever else is in the batch.
+/// separation()'s.
+///
+/// Under a max_visits that binds the interval is certified, but differs from that of separation().
+/// The bits are the same in every run, whatever else is in the batch.
 ///
 /// Only launches kernels on `stream`, as penetration_batch().
 ///
 /// Throws Error if a batch is larger than the workspace, if the devices differ, or if a launch
 /// fails.
-void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
-                      GpuWorkspace& workspace, const GpuSeparations& answers, CUstream_st* stream);
+void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
+                      const GpuSeparationSettings& settings, GpuWorkspace& workspace,
+                      const GpuSeparations& answers, CUstream_st* stream);
 
 /// answers[i] and its patches = contact_patches(pairs[i]) of two assets by lenses
 /// (PenetrationSettings::spheres_only), without limits: the contact condensed into at most

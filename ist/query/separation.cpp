@@ -13,15 +13,13 @@
 #include "query/base/relative_pose.h"
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_distance.h"
+#include "query/exact/mesh_gap.h"
 #include "query/kernel/gap_kernel.h"
 #include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 
 namespace ist {
 namespace {
-
-// Of a larger B the fourth powers of lengths would overflow: A is moved into its frame instead.
-constexpr double kLargestScale = 1e30;
 
 /// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
 /// spheres and, if asked, that of their cover balls; what is beyond the limit is not looked at. All
@@ -293,9 +291,7 @@ class SurfaceGap {
         mesh_a_(mesh_of(a)),
         mesh_b_(mesh_of(b)),
         simplified_(mesh_a_.header->error + pose.a_from_b.scale * mesh_b_.header->error),
-        error_(simplified_ + mesh_a_.header->rounding +
-               pose.a_from_b.scale * mesh_b_.header->rounding +
-               moved_by_poses(a, b, mesh_b_, pose) + pose.rounding_of_world()) {
+        error_(gap_error(mesh_a_, mesh_b_, pose, moved_by_poses(a, b, mesh_b_, pose))) {
     if (settings.max_distance > 0) question_.most = settings.max_distance / pose.unit_a + error_;
     if (enough > 0) question_.enough = enough / pose.unit_a - error_;
     if (settings.pair_id != 0 && settings.max_visits == 0)
@@ -365,9 +361,6 @@ class SurfaceGap {
     return result;
   }
 
-  /// Nodes that are opened for a bound: more of them bring little.
-  static constexpr std::uint32_t kGlance = 64;
-
   const PlacedAsset& a_;
   const PlacedAsset& b_;
   const RelativePose& pose_;
@@ -410,7 +403,7 @@ Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
   const std::optional<RelativePose> pose = relative_pose(a, b);
   if (!pose || workspace.impl() == nullptr) return invalid_input<Separation>();
   Separation result;
-  if (surfaces && pose->a_from_b.scale > kLargestScale) {
+  if (surfaces && pose->a_from_b.scale > kLargestGapScale) {
     result = find_separation(b, a, settings, workspace, enough);
     std::swap(result.point_a, result.point_b);
     result.normal = -result.normal;

@@ -54,8 +54,7 @@ def separation(solids: "ist.Solids | Sequence[ist.Asset | ist.Shape]", poses: to
     Arguments, shapes and NaN are those of overlap(); settings: inner_spheres, max_visits and threads of
     ist.separation. Solids that overlap have the distance 0 and no gradient. Elsewhere the gradient is
     that of the nearest points; where several pairs of points are nearest, that of one of them.
-    A GPU takes max_visits and pairs of two Assets; others are NaN. Its distances are always those of
-    inner spheres.
+    A GPU takes max_visits and pairs of two Assets; others are NaN.
     """
     return _differentiable(Gaps, solids, poses, pairs, scales, settings)
 

@@ -137,11 +137,10 @@ max_distance: [u] of solids that are certain to be farther apart the answer says
 pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps of
     one motion: between surfaces the nearest triangles are kept from step to step. Same answers.
 
-Solids on a GPU: of two Assets; a row of a Shape is missing_data, and max_distance raises. The CPU's default
-is another distance, that of the surfaces. On a GPU it is always that of the inner
-spheres, so inner_spheres=False raises: the minimum over all pairs in double. The CPU's may be larger by
-1e-6 of the solids' size, and among equally near pairs the two may differ. A stopped row's interval may
-differ from the CPU's.
+Solids on a GPU: of two Assets; a row of a Shape is missing_data. Of surfaces the CPU's distance, mostly to
+the bit; of inner spheres the minimum over all pairs in double, where the CPU's may be larger by 1e-6 of
+the solids' size, and among equally near pairs the two may differ. inner_spheres=True and pair_id raise.
+A stopped row's interval may differ from the CPU's.
 
 Returns a Separation: arrays of one row a pose, or numbers and (3,) arrays for one pose.)";
 
@@ -240,20 +239,19 @@ void add_separation(py::module_& module) {
           double max_distance, std::uint32_t pair_id, unsigned threads, const py::object& wanted,
           const py::object& out, const py::object& stream) -> py::object {
         const GivenOutput given{wanted, out, stream};
+        if (!(max_distance >= 0))
+          throw value_error("max_distance: " + std::to_string(max_distance) + "; wanted 0 or more");
         if (const DeviceSides sides = device_sides(pair.a, pair.b); sides.solids != nullptr) {
-          refuse_given("False; on a GPU distances are those of inner spheres",
-                       {{"inner_spheres", !inner_spheres.value_or(true)}});
-          refuse_given("not on a GPU", {{"max_distance", max_distance != 0}});
+          refuse_given("not on a GPU", {{"inner_spheres", inner_spheres.value_or(false)},
+                                        {"pair_id", pair_id != 0}});
           return ask<GpuSeparations>(
               sides, pair, given, {},
               [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
                   const GpuSeparations& to, cuda::Stream on) {
-                separation_batch(all, pairs, max_visits, workspace, to, on);
+                separation_batch(all, pairs, {max_visits, max_distance}, workspace, to, on);
               });
         }
         refuse_output(given);
-        if (!(max_distance >= 0))
-          throw value_error("max_distance: " + std::to_string(max_distance) + "; wanted 0 or more");
         return py::cast(separations(
             pair.rows(), {max_visits, inner_spheres.value_or(false), max_distance, pair_id},
             threads));

@@ -220,7 +220,7 @@ TEST_F(GpuQueryTest, BatchesOfOneAndOfTenMillionAreAnsweredAsOfFew) {
     one.count = patches.data();
     one.volume = of_patch.data();
     penetration_batch(solids, of.pairs(), {Measure::matched}, workspace, overlaps, stream);
-    separation_batch(solids, of.pairs(), 0, workspace, gaps, stream);
+    separation_batch(solids, of.pairs(), {}, workspace, gaps, stream);
     contact_patches_batch(solids, of.pairs(), Measure::matched, workspace, {}, one, stream);
     stream.wait();
     struct Answers {

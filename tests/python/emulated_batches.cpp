@@ -131,12 +131,13 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
       [to](const auto& found) { write(found, to); });
 }
 
-void separation_batch(const GpuSolids& solids, const GpuPairs& pairs, std::uint32_t max_visits,
-                      GpuWorkspace& workspace, const GpuSeparations& to, CUstream_st* stream) {
+void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
+                      const GpuSeparationSettings& settings, GpuWorkspace& workspace,
+                      const GpuSeparations& to, CUstream_st* stream) {
   launch(
       solids, pairs, workspace, stream,
-      [max_visits](const auto& there, const auto& rows) {
-        return testing::HostSeparations(there).run(rows, 0, max_visits);
+      [settings](const auto& there, const auto& rows) {
+        return testing::HostSeparations(there).run(rows, 0, settings);
       },
       [to](const auto& found) { write(found, to); });
 }

@@ -108,6 +108,25 @@ def test_the_exact_measure_is_that_of_the_cpu(random_poses):
     assert (found.status.numpy() == 0).all()
 
 
+@pytest.mark.parametrize("most", [0, 0.5])
+def test_distances_are_those_of_the_cpu(random_poses, most):
+    mesh = ist.sample_mesh("cube")
+    cube, edge = ist.bake_mesh_only(mesh), np.ptp(mesh.vertices[:, 0])
+    poses = np.concatenate([random_poses(40, 3.0), [[1, 0, 0, 0, 0, 0, 0], [1, 0, 0, 0, 1.5, 0, 0]]])
+    poses[:, 4:] *= edge
+    expected = ist.separation(cube, cube, poses, max_distance=most * edge)
+    names = ["distance", "distance_min", "distance_max", "point_a", "point_b", "normal", "status"]
+    found = batch(ist.Solids([cube], device="cuda"), a=0, b=0, poses=OnDevice(poses.copy()),
+                  query=ist.separation, max_distance=most * edge, wanted=names)
+    assert np.isinf(expected.distance_max).any() == (most > 0)
+    for name in names:
+        assert np.allclose(getattr(found, name).numpy(), getattr(expected, name), rtol=1e-9,
+                           atol=1e-12 * edge, equal_nan=True), name
+    with pytest.raises(ValueError, match="inner_spheres"):
+        batch(ist.Solids([cube], device="cuda"), a=0, b=0, poses=OnDevice(poses.copy()),
+              query=ist.separation, inner_spheres=True)
+
+
 def test_stopped_separations_keep_their_interval(solids, arguments):
     arguments["poses"][:, 4:] *= 8
     arguments["poses"][3, 5] = np.nan

@@ -132,9 +132,9 @@ def test_distances_are_those_of_the_cpu(there, gear, knot, cube, random_poses, h
     poses[1, 2, 5] = torch.nan
     scales = torch.linspace(0.7, 1.3, 16, dtype=torch.float64).reshape(4, 4)
     for s in (None, scales):
-        theirs = gradients(ist.torch.separation, solids, poses, s, inner_spheres=True)
+        theirs = gradients(ist.torch.separation, solids, poses, s)
         ours = gradients(there(ist.torch.separation),
-                         ist.Solids(solids, device="cuda") if held else solids, poses, s, inner_spheres=True)
+                         ist.Solids(solids, device="cuda") if held else solids, poses, s)
         assert (theirs[0] > 0).sum() > 12
         for one, other in zip(ours, theirs):
             assert (one.isnan() == other.isnan()).all()

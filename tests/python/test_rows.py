@@ -14,9 +14,7 @@ IDENTITY = [1.0, 0, 0, 0, 0, 0, 0]
 
 def ask(solids, *, a, b, poses, query=ist.penetration, **arguments):
     """The query of solids[a] and solids[b], as both devices take it."""
-    if query is ist.separation:
-        arguments.setdefault("inner_spheres", True)
-    else:
+    if query is not ist.separation:
         arguments.setdefault("spheres_only", True)
     return query(solids[a], solids[b], poses, **arguments)
 
@@ -144,18 +142,18 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
                  (ist.penetration, dict(scale_gradients=True), "scale_gradients: not on a GPU"),
                  (ist.contact_patches, dict(pair_budget=9), "pair_budget: not on a GPU"),
                  (ist.contact_patches, dict(max_patches=0), "max_patches: 0; wanted 1 to 32 on a GPU"),
-                 (ist.separation, dict(inner_spheres=False), "inner_spheres: False; on a GPU")]
+                 (ist.separation, dict(pair_id=1), "pair_id: not on a GPU"),
+                 (ist.separation, dict(inner_spheres=True), "inner_spheres: not on a GPU")]
     for query, settings, text in wrong:
         with pytest.raises(ValueError, match=text):
             ask(held, a=0, b=1, poses=poses, query=query, **settings)
 
 
 def test_the_defaults_work_on_both(device, there, solids, arguments):
-    """On a GPU they mean lenses and inner spheres."""
+    """On a GPU they mean lenses."""
     held = ist.Solids(solids, device=device)
     for query, meant, name in [(ist.penetration, dict(spheres_only=True), "volume"),
-                               (ist.contact_patches, dict(spheres_only=True), "volume"),
-                               (ist.separation, dict(inner_spheres=True), "distance")]:
+                               (ist.contact_patches, dict(spheres_only=True), "volume")]:
         found, same = (back(getattr(query(held[0], held[1], there(arguments["poses"]), **settings), name))
                        for settings in ({}, meant))
         assert found.shape == ((60, 8) if query is ist.contact_patches else (60,))

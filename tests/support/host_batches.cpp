@@ -274,7 +274,7 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
 }
 
 std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs, unsigned seed,
-                                             std::uint32_t max_visits) {
+                                             const GpuSeparationSettings& settings) {
   const std::size_t n = pairs.size();
   const PairColumns columns(pairs);
   constexpr double kUnwritten = -7;
@@ -288,25 +288,26 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
                        std::vector<QueryStatus>(n),
                        std::vector<std::uint32_t>(n),
                        std::vector<std::uint32_t>(n)};
-  std::vector<std::uint32_t> lists[2] = {std::vector<std::uint32_t>(n),
-                                         std::vector<std::uint32_t>(n)};
+  const std::vector<std::uint32_t> list(n);
+  std::vector<std::uint32_t> lists[3] = {list, list, list};
   std::vector<gpu::SplitPair> splits(room_);
   std::vector<gpu::PairTask> tasks(room_);
   std::vector<gpu::GapTotals> totals(2 * std::size_t{room_});
   std::vector<std::uint32_t> entries_a(room_), entries_b(room_);
   std::vector<double> entries_gap(room_), entries_cover(room_);
-  counters[0] = counters[1] = {};
+  counters[0] = counters[1] = counters[2] = {};
   gpu::SeparationArrays batch = {};
   static_cast<gpu::SolidPairs&>(batch.pairs) = solids_.asked(columns.pairs(), Measure::inner, {});
   batch.counters = counters;
-  for (int kind = 0; kind < 2; ++kind) batch.list[kind] = lists[kind].data();
+  for (int kind = 0; kind < 3; ++kind) batch.list[kind] = lists[kind].data();
   batch.pairs.splits = splits.data();
   batch.pairs.tasks = tasks.data();
   batch.pairs.split_room = batch.pairs.task_room = batch.pairs.entry_room = room_;
   batch.answers = {to.distance.data(), to.distance_min.data(), to.distance_max.data(),
                    to.point_a.data(),  to.point_b.data(),      to.normal.data(),
                    to.status.data(),   to.visits.data(),       to.spheres.data()};
-  batch.max_visits = max_visits == 0 ? ~0u : max_visits;
+  batch.max_visits = settings.max_visits == 0 ? ~0u : settings.max_visits;
+  batch.max_distance = settings.max_distance;
   batch.totals = totals.data();
   batch.entries = {entries_a.data(), entries_b.data(), entries_gap.data(), entries_cover.data()};
   for (std::uint32_t i = 0; i < n; ++i) {
@@ -315,7 +316,41 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
   }
   separate<float>(batch, 0, seed);
   separate<double>(batch, 1, seed);
+  separate_meshes(batch, seed);
   return to.rows();
+}
+
+/// The kernels of meshes in separation_kernels.cu.
+void HostSeparations::separate_meshes(gpu::SeparationArrays& batch, unsigned seed) {
+  gpu::MeshGapRound rounds[2] = {};
+  std::vector<gpu::MeshGapQuery> queries(mesh_room);
+  batch.meshes = {rounds, queries.data(), mesh_room};
+  const auto spheres = std::make_unique<gpu::GapMemory<float>>();
+  const auto single = std::make_unique<gpu::MeshGapMemory<float>>();
+  const auto in_double = std::make_unique<gpu::MeshGapMemory<double>>();
+  const auto pair = std::make_unique<gpu::MeshGapPair>();
+  const auto stack = std::make_unique<InsideStack>();
+  const std::uint32_t listed = counters[2].listed;
+  for (std::uint32_t n = 0; n * mesh_room < listed; ++n) {
+    const std::uint32_t first = n * mesh_room, count = std::min(mesh_room, listed - first);
+    gpu::MeshGapRound& round = gpu::round_of(batch.meshes, n);
+    round = {};
+    for (std::uint32_t k = 0; k < count; ++k)
+      gpu::place_mesh_gap(batch, round, k, batch.list[2][first + k]);
+    for (std::uint32_t k = 0; k < count; ++k)
+      by_team(seed, [&](const auto& team) { gpu::glance_at_spheres(team, batch, k, *spheres); });
+    for (std::uint32_t k = 0; k < count; ++k)
+      by_team(seed,
+              [&](const auto& team) { gpu::search_mesh_gap<float>(team, batch, k, *single); });
+    for (std::uint32_t k = 0; k < round.in_double; ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::search_mesh_gap<double>(team, batch, queries[k].in_double, *in_double);
+      });
+    for (std::uint32_t k = 0; k < count; ++k)
+      by_team(seed, [&](const auto& team) { gpu::measure_mesh_gap(team, batch, k, *pair); });
+    for (std::uint32_t k = 0; k < count; ++k)
+      by_team(seed, [&](const auto& team) { gpu::finish_mesh_gap(team, batch, k, *stack); });
+  }
 }
 
 template <class Real>

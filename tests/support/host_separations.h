@@ -18,15 +18,17 @@ class HostSeparations {
   explicit HostSeparations(HostSolids solids, std::uint32_t room = 1 << 16)
       : solids_(std::move(solids)), room_(room) {}
 
-  /// `seed`: of the order in which lanes go on; 0: a team of one. `max_visits`: 0: no limit.
+  /// `seed`: of the order in which lanes go on; 0: a team of one.
   std::vector<Separation> run(const std::vector<BatchPair>& pairs, unsigned seed = 0,
-                              std::uint32_t max_visits = 0);
+                              const GpuSeparationSettings& settings = {});
 
-  gpu::BatchCounters counters[2];  ///< of the last run, by kind
+  gpu::BatchCounters counters[3];  ///< of the last run, by kind
+  std::uint32_t mesh_room = 50;    ///< pairs of meshes of a round
 
  private:
   template <class Real>
   void separate(const gpu::SeparationArrays& batch, int kind, unsigned seed);
+  void separate_meshes(gpu::SeparationArrays& batch, unsigned seed);
 
   HostSolids solids_;
   std::uint32_t room_;

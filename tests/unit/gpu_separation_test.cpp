@@ -177,7 +177,7 @@ TEST(GpuSeparation, LanesOfAWarpNeedNoLuck) {
   EXPECT_GT(roomy.counters[0].tasks, 3u);
   expect_same_bits(roomy.run(pairs, 1), by_one);
   expect_same_bits(narrow.run(pairs, 2), by_one);
-  expect_same_bits(narrow.run(pairs, 3, 200), roomy.run(pairs, 0, 200));
+  expect_same_bits(narrow.run(pairs, 3, {200}), roomy.run(pairs, 0, {200}));
 }
 
 /// What a limit leaves out may be as near as the interval says.
@@ -186,8 +186,8 @@ TEST(GpuSeparation, IntervalsOfALimitHoldTheFinishedOnes) {
   const std::vector<Separation> finished = HostSeparations(batch_solids()).run(pairs);
   for (const std::uint32_t most : {1u, 3u, 20u, 100u, 200u, 400u}) {
     HostSeparations batch(batch_solids()), narrow(batch_solids(), 10);
-    const std::vector<Separation> answers = batch.run(pairs, 0, most);
-    expect_same_bits(narrow.run(pairs, 0, most), answers);
+    const std::vector<Separation> answers = batch.run(pairs, 0, {most});
+    expect_same_bits(narrow.run(pairs, 0, {most}), answers);
     std::size_t stopped = 0;
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       EXPECT_LE(answers[i].node_visits, most) << i;

@@ -39,8 +39,8 @@ void penetration_batch(const GpuSolids&, const GpuPairs&, const GpuPenetrationSe
   gpu_info(0);
 }
 
-void separation_batch(const GpuSolids&, const GpuPairs&, std::uint32_t, GpuWorkspace&,
-                      const GpuSeparations&, CUstream_st*) {
+void separation_batch(const GpuSolids&, const GpuPairs&, const GpuSeparationSettings&,
+                      GpuWorkspace&, const GpuSeparations&, CUstream_st*) {
   gpu_info(0);
 }
 

@@ -12,35 +12,13 @@
 #include "base/bits.h"
 #include "query/exact/box_gaps-inl.h"
 #include "query/exact/crossing.h"
+#include "query/exact/mesh_gap.h"
 #include "query/exact/mesh_queries.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/triangle_gaps-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
-
-/// The nearest two triangles so far; of those that are as near, to rounding, the ones of the lowest
-/// numbers.
-struct NearestTriangles {
-  double rounding;                            ///< of a distance
-  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to there all is as near as the least
-  double squared = HUGE_VAL;
-  std::uint64_t pair = KeptPairs::kNone;  ///< A's << 32 | B's
-  exact::Point on_a = {}, between = {};   ///< from there to B's
-
-  void take(const PairGaps& gaps, std::uint32_t n, std::uint64_t name) {
-    const double found = gaps.squared[n];
-    if (found < least) {
-      least = found;
-      alike = (std::sqrt(least) + rounding) * (std::sqrt(least) + rounding);
-    }
-    if (!(found <= alike) || (squared <= alike && pair < name)) return;
-    squared = found;
-    pair = name;
-    on_a = {gaps.on_a[0][n], gaps.on_a[1][n], gaps.on_a[2][n]};
-    between = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
-  }
-};
 
 class MeshGapSearch {
   /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
@@ -57,19 +35,19 @@ class MeshGapSearch {
         scratch_(scratch),
         waiting_(scratch.gaps.get()),
         scale_(asked.a_from_b.scale),
-        reach_(reach_of(asked)),
-        single_(kLost * reach_ < std::min(a_.extent(), scale_ * b_.extent())),
-        slack_(1e-14 * reach_),
-        blur_(single_ ? 2e-6 * reach_ : slack_),
+        reach_(reach_of(asked.a, asked.b, asked.a_from_b)),
+        single_(floats_tell(asked.a, asked.b, scale_, reach_)),
+        slack_(gap_slack(reach_)),
+        blur_(single_ ? float_gap_blur(reach_) : slack_),
         single_a_(asked.a_from_b, blur_),
         single_b_(asked.b_from_a, blur_ / scale_),
         double_a_(asked.a_from_b, blur_),
         double_b_(asked.b_from_a, blur_ / scale_),
-        best_{4e-15 * reach_} {
+        best_{gap_rounding(reach_)} {
     look_along(asked.toward);
     scratch.forget(a_.hash);
     scratch.pairs->count = 0;
-    most_ = (asked.most + slack_) * (single_ ? 1 : 1 + 2 * kAlike);
+    most_ = (asked.most + slack_) * (single_ ? 1 : 1 + 2 * kGapsAlike);
     limit_to(std::min(most_, asked.likely + slack_));
   }
 
@@ -100,7 +78,7 @@ class MeshGapSearch {
         measure_added();
       }
       search();
-      if (best_.pair == KeptPairs::kNone && asked_.likely < asked_.most) {
+      if (best_.pair == NearestTriangles::kNone && asked_.likely < asked_.most) {
         limit_to(most_);
         search();
       }
@@ -116,33 +94,13 @@ class MeshGapSearch {
   }
 
  private:
-  /// Floats tell boxes of both solids apart as long as neither is so small in what is between them.
-  static constexpr double kLost = 1e-3;
-  /// Of solids that are far apart for their size all is as near, to rounding: one pair will do.
-  static constexpr double kAlike = 1e-13;
-
-  /// No coordinate is larger, nor a difference of two.
-  static double reach_of(const GapQuestion& asked) {
-    double shift = 0;
-    for (const double t : asked.a_from_b.t) shift = std::max(shift, std::abs(t));
-    return asked.a.extent() + asked.a_from_b.scale * asked.b.extent() + shift;
-  }
-
   /// `toward`: unit, or zero: then solids are seen along the axes of A.
   void look_along(const exact::Point& toward) {
     toward_ = toward;
     const bool known = dot(toward, toward) > 0;
     axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
-    const double(&m)[9] = asked_.b_from_a.m;
-    WayAxes to_a;
-    for (std::size_t j = 0; j < 3; ++j) {
-      const exact::Point& way = axes_[j];
-      const auto back = [&](int i) {
-        return -scale_ * ((m[3 * i] * way.x + m[3 * i + 1] * way.y) + m[3 * i + 2] * way.z);
-      };
-      to_a[j] = {back(0), back(1), back(2)};
-    }
+    const WayAxes to_a = seen_back(axes_, asked_.b_from_a, scale_);
     single_ ? single_a_.turn(axes_) : double_a_.turn(axes_);
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
@@ -230,7 +188,7 @@ class MeshGapSearch {
 
   /// The larger node's sixteen against the other's box.
   template <class T>
-  void open(const GapPair& pair, const BoxLook<T>& at_a, const BoxLook<T>& at_b) {
+  void open(const GapPair& pair, const BoxLook<T, double>& at_a, const BoxLook<T, double>& at_b) {
     const bool open_a =
         pair.level_b == 0 || (pair.level_a > 0 && size_of(a_, pair.level_a, pair.a) >=
                                                       scale_ * size_of(b_, pair.level_b, pair.b));
@@ -242,8 +200,10 @@ class MeshGapSearch {
     const double unit = open_a ? 1 : asked_.a_from_b.scale * asked_.a_from_b.scale;
     const double limit = squared_limit_ / unit;
     std::uint32_t left =
-        open_a ? at_a.measure(boxes, box_of(b_, pair.level_b, pair.b), limit, squared, apart)
-               : at_b.measure(boxes, box_of(a_, pair.level_a, pair.a), limit, squared, apart);
+        open_a ? measure_sixteen(at_a, boxes, at_a.see(box_of<double>(b_, pair.level_b, pair.b)),
+                                 limit, squared, apart)
+               : measure_sixteen(at_b, boxes, at_b.see(box_of<double>(a_, pair.level_a, pair.a)),
+                                 limit, squared, apart);
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
     for (; left != 0; left &= left - 1) {
@@ -351,17 +311,24 @@ class MeshGapSearch {
     const double before = best_.least;
     for (std::uint32_t n = 0; n < count; ++n) {
       const std::uint64_t name = std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n];
-      best_.take(gaps, n, name);
+      const double found = gaps.squared[n];
+      best_.meet(found);
+      if (best_.wants(found, name))
+        best_.set(found, name, {gaps.on_a[0][n], gaps.on_a[1][n], gaps.on_a[2][n]},
+                  {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]});
     }
     if (!(best_.least < before)) return;
     const double distance = std::sqrt(best_.least);
-    limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kAlike) * distance));
+    limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kGapsAlike) * distance));
     if (distance > 0) {
       look_along((1 / distance) * best_.between);
       level_ = toward_;
       for (std::uint32_t n = 0; n < count; ++n)
         if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
-          for (int side = 0; side < 2; ++side) take_level(corners(pairs, side, n));
+          for (int side = 0; side < 2; ++side) {
+            const Corners t = corners(pairs, side, n);
+            level_with({t[0], t[1], t[2]}, toward_, level_);
+          }
     }
   }
 
@@ -392,15 +359,6 @@ class MeshGapSearch {
     return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
   }
 
-  /// The way between level faces is their normal: a short way has few digits of it.
-  void take_level(const Corners& t) {
-    const exact::Point n = cross(t[1] - t[0], t[2] - t[0]);
-    const double length = std::sqrt(dot(n, n)), along = dot(n, toward_);
-    constexpr double kLevel = 1 - 1e-10;
-    if (length > 0 && std::abs(along) > kLevel * length)
-      level_ = ((along > 0 ? 1 : -1) / length) * n;
-  }
-
   const GapQuestion& asked_;
   const MeshTree& a_;
   const MeshTree& b_;
@@ -409,11 +367,11 @@ class MeshGapSearch {
   GapPair* const waiting_;  ///< a stack
   std::uint32_t size_ = 0;
   const double scale_, reach_;
-  const bool single_;                   ///< boxes are measured in floats
-  const double slack_;                  ///< what distances of triangles are off by, by rounding
-  const double blur_;                   ///< likewise of boxes
-  BoxLook<float> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
-  BoxLook<double> double_a_, double_b_;
+  const bool single_;   ///< boxes are measured in floats
+  const double slack_;  ///< what distances of triangles are off by, by rounding
+  const double blur_;   ///< likewise of boxes
+  BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
+  BoxLook<double, double> double_a_, double_b_;
   double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};

@@ -47,7 +47,9 @@ using Mask = hn::Mask<D>;
 HWY_INLINE V constant(double x) { return hn::Set(D(), x); }
 HWY_INLINE V magnitude(V x) { return hn::Abs(x); }
 HWY_INLINE V lesser(V x, V y) { return hn::Min(x, y); }
+HWY_INLINE V greater(V x, V y) { return hn::Max(x, y); }
 HWY_INLINE Mask less(V x, V y) { return x < y; }
+HWY_INLINE Mask at_most(V x, V y) { return x <= y; }
 HWY_INLINE Mask equal(V x, V y) { return x == y; }
 HWY_INLINE Mask both(Mask x, Mask y) { return hn::And(x, y); }
 HWY_INLINE Mask either(Mask x, Mask y) { return hn::Or(x, y); }
@@ -57,7 +59,10 @@ HWY_INLINE V min3(V x, V y, V z) { return hn::Min(x, hn::Min(y, z)); }
 HWY_INLINE V max3(V x, V y, V z) { return hn::Max(x, hn::Max(y, z)); }
 
 #define IST_FORMULA HWY_INLINE
+#include "query/exact/careful_cross-inl.h"
+#include "query/exact/edge_gap_formulas-inl.h"
 #include "query/exact/overlap_formulas-inl.h"
+#include "query/exact/triangle_gap_formulas-inl.h"
 #undef IST_FORMULA
 
 }  // namespace ist::HWY_NAMESPACE

@@ -21,8 +21,8 @@ class TriangleCulls {
   TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const WayAxes& axes, float blur)
       : a_(a), b_(b), blur_(blur) {
     for (std::size_t k = 0; k < 3; ++k) {
-      of_a_[k] = along(axes[k], a);
-      of_b_[k] = along(axes[k], b);
+      of_a_[k] = along(axes.way[k], a);
+      of_b_[k] = along(axes.way[k], b);
       low_b_[k] = lowest(of_b_[k].low) - blur;
       high_b_[k] = highest(of_b_[k].high) + blur;
     }
@@ -135,142 +135,26 @@ struct alignas(64) PairGaps {
   double between[3][8];  ///< from there to B's
 };
 
-namespace gaps {
-
-/// a b − c d, rounded about once: products are split.
-struct Halves {
-  V whole, high, low;
-  explicit Halves(V x) : whole(x) {
-    const D d;
-    const V big = hn::Set(d, 134217729.0) * x;  // 2^27 + 1
-    high = big - (big - x);
-    low = x - high;
-  }
-};
-HWY_INLINE V difference_of_products(const Halves& a, const Halves& b, const Halves& c,
-                                    const Halves& e) {
-  const auto error = [](const Halves& x, const Halves& y, V product) {
-    return ((x.high * y.high - product) + (x.high * y.low + x.low * y.high)) + x.low * y.low;
-  };
-  const V ab = a.whole * b.whole, ce = c.whole * e.whole;
-  return (ab - ce) + (error(a, b, ab) - error(c, e, ce));
-}
-
-/// A triangle with what its points are found by. Its normal keeps its digits however thin it is: it
-/// is that of a triangle whose corners are off by roundings.
-struct Flat {
-  Vec3 corner[3], side[3];
-  V inverse[3];  ///< of squared sides; of no length: 0
-  Vec3 other;    ///< from the first corner to the last
-  Vec3 normal;
-  V squared_normal, inverse_normal;
-};
-
-HWY_INLINE V inverse_of(V x) {
-  const D d;
-  const V one = hn::Set(d, 1.0);
-  const auto long_enough = x > hn::Set(d, 1e-290);
-  return hn::IfThenElseZero(long_enough, one / hn::IfThenElse(long_enough, x, one));
-}
-
-HWY_INLINE Flat flat(const TrianglePairs& pairs, int side, std::size_t l) {
-  const D d;
-  Flat t;
-  for (int c = 0; c < 3; ++c)
-    t.corner[c] = {hn::Load(d, pairs.corner[side][c][0] + l),
-                   hn::Load(d, pairs.corner[side][c][1] + l),
-                   hn::Load(d, pairs.corner[side][c][2] + l)};
-  for (int c = 0; c < 3; ++c) {
-    t.side[c] = t.corner[(c + 1) % 3] - t.corner[c];
-    t.inverse[c] = inverse_of(dot(t.side[c], t.side[c]));
-  }
-  t.other = t.corner[2] - t.corner[0];
-  const Halves ux(t.side[0].x), uy(t.side[0].y), uz(t.side[0].z), vx(t.other.x), vy(t.other.y),
-      vz(t.other.z);
-  t.normal = {difference_of_products(uy, vz, uz, vy), difference_of_products(uz, vx, ux, vz),
-              difference_of_products(ux, vy, uy, vx)};
-  t.squared_normal = dot(t.normal, t.normal);
-  t.inverse_normal = inverse_of(t.squared_normal);
-  return t;
-}
-
-/// The least so far.
-struct Least {
-  V squared;
-  Vec3 on_a, between;
-
-  HWY_INLINE void take(V other, hn::Mask<D> valid, const Vec3& a, const Vec3& way) {
-    const auto nearer = hn::And(valid, other < squared);
-    squared = hn::IfThenElse(nearer, other, squared);
-    on_a = {hn::IfThenElse(nearer, a.x, on_a.x), hn::IfThenElse(nearer, a.y, on_a.y),
-            hn::IfThenElse(nearer, a.z, on_a.z)};
-    between = {hn::IfThenElse(nearer, way.x, between.x), hn::IfThenElse(nearer, way.y, between.y),
-               hn::IfThenElse(nearer, way.z, between.z)};
-  }
-};
-
-/// A corner over a triangle. Its height comes back, times the normal's length.
-template <bool kCornerOfA>
-HWY_INLINE V over_face(const Vec3& p, const Flat& t, Least& least) {
-  const D d;
-  const Vec3 r = p - t.corner[0];
-  const V height = dot(r, t.normal);
-  const V v = dot(cross(r, t.other), t.normal), w = dot(cross(t.side[0], r), t.normal);
-  const auto inside = hn::And(hn::And(v >= hn::Zero(d), w >= hn::Zero(d)),
-                              hn::And(v + w <= t.squared_normal, t.inverse_normal > hn::Zero(d)));
-  const V share = height * t.inverse_normal;
-  const Vec3 up = share * t.normal;  // from the foot to the corner
-  if constexpr (kCornerOfA)
-    least.take(height * share, inside, p, {hn::Neg(up.x), hn::Neg(up.y), hn::Neg(up.z)});
-  else
-    least.take(height * share, inside, p - up, up);
-  return height;
-}
-
-HWY_INLINE V clamped(V x) {
-  const D d;
-  return hn::Min(hn::Max(x, hn::Zero(d)), hn::Set(d, 1.0));
-}
-
-/// Edge i of A and edge j of B: where the lines are nearest, by products of vectors, which keep the
-/// digits of nearly parallel ones; then each is brought to the other's point in turn.
-HWY_INLINE void along_edges(const Flat& a, int i, const Flat& b, int j, Least& least) {
-  const Vec3 &u = a.side[i], &v = b.side[j];
-  const Vec3 w = b.corner[j] - a.corner[i];
-  const Vec3 n = cross(u, v);
-  V s = clamped(dot(cross(w, v), n) * inverse_of(dot(n, n)));
-  const V t = clamped(dot(s * u - w, v) * b.inverse[j]);
-  const Vec3 way = w + t * v;
-  s = clamped(dot(way, u) * a.inverse[i]);
-  const Vec3 su = s * u;
-  const Vec3 between = way - su;
-  const D d;
-  least.take(dot(between, between), hn::Set(d, 0.0) == hn::Set(d, 0.0), a.corner[i] + su, between);
-}
-
-}  // namespace gaps
-
 /// Measures pairs [0, count). Bit n of what comes back: pair n may cross, as each triangle reaches
 /// to both sides of the other's plane, where coordinates may be off by `slack`.
 HWY_INLINE std::uint32_t measure_pairs(const TrianglePairs& pairs, std::uint32_t count,
                                        double slack, PairGaps& out) {
   const D d;
+  const auto loaded = [&](int side, std::size_t l) {
+    Flat t;
+    for (int c = 0; c < 3; ++c)
+      t.corner[c] = {hn::Load(d, pairs.corner[side][c][0] + l),
+                     hn::Load(d, pairs.corner[side][c][1] + l),
+                     hn::Load(d, pairs.corner[side][c][2] + l)};
+    flatten(t);
+    return t;
+  };
   std::uint32_t unclear = 0;
   for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
-    const gaps::Flat a = gaps::flat(pairs, 0, l), b = gaps::flat(pairs, 1, l);
-    gaps::Least least{hn::Set(d, HUGE_VAL), a.corner[0], a.corner[0]};
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) gaps::along_edges(a, i, b, j, least);
-    V of_a[3], of_b[3];
-    for (int k = 0; k < 3; ++k) {
-      of_a[k] = gaps::over_face<true>(a.corner[k], b, least);
-      of_b[k] = gaps::over_face<false>(b.corner[k], a, least);
-    }
-    const auto straddle = [&](const V(&h)[3], const Vec3& normal) {
-      const V over = hn::Set(d, slack) * length_bound(normal);
-      return hn::And(min3(h[0], h[1], h[2]) <= over, max3(h[0], h[1], h[2]) >= hn::Neg(over));
-    };
-    unclear |= mask_bits(d, hn::And(straddle(of_a, b.normal), straddle(of_b, a.normal))) << l;
+    const Flat a = loaded(0, l), b = loaded(1, l);
+    Mask may_cross;
+    const NearestPoints least = nearest_points(a, b, slack, may_cross);
+    unclear |= mask_bits(d, may_cross) << l;
     hn::Store(least.squared, d, out.squared + l);
     const auto store = [&](const Vec3& x, double(&to)[3][8]) {
       hn::Store(x.x, d, to[0] + l);

@@ -1,0 +1,188 @@
+// Distances of many pairs of meshes at once on the GPU: rates with poses and answers resident, of
+// the oracle's classes, of a nut in clearance and of mated parts; the same by all cores of the
+// machine, and how far the answers differ.
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <ist/gpu_query.h>
+#include <ist/query_tbb.h>
+
+#include "gpu_batch_scenes.h"
+#include "gpu_many.h"
+#include "mesh/samples/samples.h"
+#include "report.h"
+#include "support/device_batch.h"
+#include "support/device_separations.h"
+#include "support/mated_rows.h"
+#include "timing.h"
+
+namespace {
+
+using namespace ist;
+using namespace ist::benchmark;
+using ist::testing::DeviceBatch;
+using ist::testing::DeviceSeparations;
+
+/// By all cores, M/s.
+double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs, double max_distance,
+                std::vector<Separation>& answers) {
+  std::vector<PlacedPair> placed;
+  for (const BatchPair& pair : pairs)
+    placed.push_back({{solids.assets[pair.a]->view(), pair.pose_a, pair.scale_a},
+                      {solids.assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
+  SeparationSettings settings;
+  settings.max_distance = max_distance;
+  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+  answers.resize(pairs.size());
+  double best = 1e30;
+  for (int k = 0; k < 2; ++k) {
+    const double start = benchmark::wall_seconds();
+    separation_batch(placed, settings, workspaces, answers, tbb_parallel_for());
+    best = std::min(best, benchmark::wall_seconds() - start);
+  }
+  return static_cast<double>(pairs.size()) / best * 1e-6;
+}
+
+/// Reports the rate of pairs drawn from some; false where answers are not the CPU's.
+bool ask(Report& report, const char* table, const std::string& name, const Solids& solids,
+         const std::vector<BatchPair>& some, std::size_t count, double target = 0,
+         double max_distance = 0) {
+  if (some.empty()) return true;
+  std::mt19937_64 random(1);
+  std::vector<BatchPair> pairs;
+  for (std::size_t k = 0; k < count; ++k) pairs.push_back(some[random() % some.size()]);
+  const GpuSolids on_device(solids.views());
+  GpuWorkspace workspace(count);
+  const DeviceBatch batch(pairs);
+  const DeviceSeparations answers(count);
+  const double ms = device_ms([&](cudaStream_t stream) {
+    separation_batch(on_device, batch.pairs(), {0, max_distance}, workspace, answers.answers(),
+                     stream);
+  });
+  const std::vector<Separation> found = answers.get();
+  std::vector<BatchPair> asked = pairs;
+  asked.resize(std::min<std::size_t>(count, 5'000));
+  std::vector<Separation> cpu;
+  const double by_cores = cpu_rate(solids, asked, max_distance, cpu);
+  double worst = 0, visits = 0, tests = 0;
+  std::size_t apart = 0;
+  bool right = true;
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    right = right && found[i].status == cpu[i].status &&
+            (found[i].distance == 0) == (cpu[i].distance == 0);
+    visits += found[i].node_visits / static_cast<double>(asked.size());
+    tests += found[i].sphere_pairs / static_cast<double>(asked.size());
+    if (cpu[i].distance == 0) continue;
+    ++apart;
+    worst = std::max(worst, std::abs(found[i].distance / cpu[i].distance - 1));
+  }
+  const double rate = static_cast<double>(count) / ms * 1e-3;
+  report.row(table, {{"poses", name},
+                     {"pairs", count},
+                     {"M/s", rate},
+                     {"apart, of 5,000", apart},
+                     {"node pairs opened, mean", visits},
+                     {"spheres and triangles measured, mean", tests},
+                     {"M/s by all cores", by_cores},
+                     {"largest difference to the CPU, relative", worst},
+                     {"all overlaps as there", right ? "yes" : "no"}});
+  if (target > 0) report.target(name + ", M/s", rate, target);
+  return right && worst < 1e-9;
+}
+
+int measure(Report& report) {
+  const std::size_t many = report.quick() ? 50'000 : 1'000'000;
+  constexpr std::size_t kSpheres = 4000;
+  bool right = true;
+  std::map<std::string, Asset> assets;
+  const auto asset = [&](const std::string& mesh, bool spheres = true) -> const Asset* {
+    const std::string name = mesh + (spheres ? "" : " alone");
+    const auto found = assets.find(name);
+    if (found != assets.end()) return &found->second;
+    const TriangleMesh from = load_mesh(ist::testing::oracle_mesh_path(mesh));
+    return &assets
+                .emplace(name, spheres ? baked(from, mesh, kSpheres, true)
+                                       : bake_mesh_only(close_mesh(from, mesh), 0))
+                .first->second;
+  };
+  for (const std::string& key : ist::testing::kPairKeys) {
+    std::map<std::string, std::vector<BatchPair>> classes;
+    std::vector<double> distances;
+    const std::vector<ist::testing::OracleRow> rows = ist::testing::read_oracle_rows(key);
+    for (const ist::testing::OracleRow& row : rows) {
+      BatchPair pair;
+      pair.b = 1;
+      pair.pose_b = row.pose;
+      pair.scale_b = row.scale_b;
+      classes[row.pose_class].push_back(pair);
+      if (row.pose_class == "sep") distances.push_back(row.surface_distance);
+    }
+    const Solids two = {{asset(rows[0].mesh_a), asset(rows[0].mesh_b)}};
+    const char* const table = "The oracle's poses";
+    const bool first = key == "eledino";
+    right = ask(report, table, key + " sep", two, classes["sep"], many, first ? 5 : 0) && right;
+    if (!first) continue;
+    const Solids alone = {{asset(rows[0].mesh_a, false), asset(rows[0].mesh_b, false)}};
+    right = ask(report, table, key + " sep, without spheres", alone, classes["sep"], many) && right;
+    right = ask(report, table, key + " sep, max_distance the median's half", two, classes["sep"],
+                many, 0, 0.5 * benchmark::quantile(distances, 0.5)) &&
+            right;
+    for (const char* of : {"pen", "deep", "contain"})
+      right = ask(report, table, key + " " + of, two, classes[of], many) && right;
+  }
+  const Asset bolt = baked(make_sample("bolt"), "bolt", kSpheres, true),
+              nut = baked(make_sample("nut"), "nut", kSpheres, true);
+  std::vector<BatchPair> clear = nut_poses(400);
+  for (BatchPair& pair : clear) {
+    pair.b = 1;
+    pair.pose_b.t[0] = pair.pose_b.t[1] = 0;
+    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
+    pair.pose_b.t[2] = 8 + 2 * turn;
+  }
+  right = ask(report, "Nut on bolt", "in clearance", {{&bolt, &nut}}, clear, many / 10) && right;
+  // Mated parts, in place and moved along the mate by up to a tenth.
+  std::map<std::string, std::uint32_t> number;
+  std::map<std::string, std::vector<BatchPair>> mates;
+  Solids mated;
+  std::map<std::string, Asset> parts;
+  for (const ist::testing::MatedRow& row : ist::testing::read_mated_rows()) {
+    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
+      if (number.try_emplace(mesh, static_cast<std::uint32_t>(number.size())).second) {
+        const TriangleMesh from = load_mesh(ist::testing::mated_mesh_path(mesh));
+        mated.assets.push_back(&parts.emplace(mesh, baked(from, mesh, 1000, true)).first->second);
+      }
+    BatchPair pair;
+    pair.a = number[row.mesh_a];
+    pair.b = number[row.mesh_b];
+    pair.pose_b = row.pose;
+    mates[row.name].push_back(pair);
+  }
+  for (const auto& [name, poses] : mates)
+    right = ask(report, "Mated parts", name, mated, poses, many / 50) && right;
+  const int written = report.write();
+  if (right) return written;
+  std::fprintf(stderr, "answers differ from the CPU's\n");
+  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Report report("gpu_distance", argc, argv);
+  report.page("Distances of many pairs of meshes on a GPU");
+  std::string why;
+  if (!gpu_available(0, &why)) {
+    std::fprintf(stderr, "gpu_distance: %s\n", why.c_str());
+    return 1;
+  }
+  try {
+    return measure(report);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s\n", error.what());
+    return 1;
+  }
+}

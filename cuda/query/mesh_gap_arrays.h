@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+#include "cuda/query/batch_arrays.h"
+#include "query/exact/mesh_gap.h"
+
+// Where the distances of a batch's meshes are worked out.
+
+namespace ist::gpu {
+
+/// What the steps of a pair of meshes hand on: A's unit frame.
+struct MeshGapQuery {
+  PairPlace place;
+  double error;           ///< of the distance, against the solids'
+  double simplified;      ///< of that, what the meshes are off by
+  double reach;           ///< no coordinate is larger
+  double most;            ///< the distance, if it is more, is not asked for
+  double likely;          ///< it is no more than this, unless a solid holds the other
+  Vec3 toward;            ///< unit, from A to B near where they are nearest; or zero
+  std::uint32_t pair;     ///< of the batch
+  std::uint32_t swapped;  ///< 1: its A is the query's B
+  std::uint32_t single;   ///< 1: boxes are measured in floats
+  std::uint32_t visits, tests;
+  std::uint32_t overlap;  ///< 1: triangles cross; 2: inner spheres meet
+  std::uint32_t stopped;
+  std::uint32_t in_double;  ///< in the k-th query the k-th of the round whose boxes are in doubles
+  std::uint32_t waiting;    ///< pairs of triangles that are to be measured
+  std::uint32_t triangles[32][2];
+  double left;  ///< squared: what was stopped is no nearer
+  NearestTriangles best;
+};
+
+/// A round takes pairs through their steps, of which each is a small kernel.
+struct MeshGapRound {
+  std::uint32_t count;                                  ///< of pairs
+  std::uint32_t glanced, searched, measured, finished;  ///< of them taken
+  std::uint32_t in_double, searched_in_double;
+};
+
+/// Pairs of assets that both keep their meshes.
+struct MeshGapArrays {
+  MeshGapRound* rounds;  ///< [2], in turn
+  MeshGapQuery* queries;
+  std::uint32_t query_room;
+};
+
+}  // namespace ist::gpu

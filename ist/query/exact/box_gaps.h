@@ -1,0 +1,152 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "query/base/pair_place.h"
+#include "query/exact/mesh_tree.h"
+
+// What bounds of the distance of boxes begin with, in double, on the CPU and on a GPU.
+
+namespace ist {
+
+/// A box by its middle and its slab, in its own frame.
+template <class S>
+struct MiddleBox {
+  S middle[3], half[3];
+  S normal[3] = {}, slab_low = 0, slab_high = 0;
+};
+
+/// The box of a node: a lane of the block above, or that of the whole mesh, which has no slab.
+template <class S>
+IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
+  MiddleBox<S> box;
+  if (level == mesh.top) {
+    for (int k = 0; k < 3; ++k) {
+      box.middle[k] = S(0.5) * (S(mesh.low[k]) + S(mesh.high[k]));
+      box.half[k] = S(0.5) * (S(mesh.high[k]) - S(mesh.low[k]));
+    }
+    return box;
+  }
+  const BoxBlock& boxes = in_global_memory(mesh.level[level + 1].boxes)[i / kWidth];
+  const std::uint32_t l = i % kWidth;
+  for (int k = 0; k < 3; ++k) {
+    box.middle[k] = S(0.5) * (S(boxes.low[k][l]) + S(boxes.high[k][l]));
+    box.half[k] = S(0.5) * (S(boxes.high[k][l]) - S(boxes.low[k][l]));
+    box.normal[k] = S(boxes.normal[k][l]);
+  }
+  box.slab_low = S(boxes.slab_low[l]), box.slab_high = S(boxes.slab_high[l]);
+  return box;
+}
+
+/// The way that an answer is likely to go, and two axes square to it and each other.
+struct WayAxes {
+  exact::Point way[3];
+};
+
+IST_HD inline WayAxes axes_along(const exact::Point& way) {
+  const double x = std::abs(way.x), y = std::abs(way.y), z = std::abs(way.z);
+  const exact::Point least = x <= y && x <= z ? exact::Point{1, 0, 0}
+                             : y <= z         ? exact::Point{0, 1, 0}
+                                              : exact::Point{0, 0, 1};
+  exact::Point beside = cross(way, least);
+  if (const double length = std::sqrt(dot(beside, beside)); length > 0)
+    beside = (1 / length) * beside;
+  return {{way, beside, cross(way, beside)}};
+}
+
+/// The same of A's, seen in B's frame, from B to A.
+IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a, double scale) {
+  const double(&m)[9] = b_from_a.m;
+  WayAxes out;
+  for (int j = 0; j < 3; ++j) {
+    const exact::Point& way = axes.way[j];
+    for (int i = 0; i < 3; ++i)
+      out.way[j][i] = -scale * ((m[3 * i] * way.x + m[3 * i + 1] * way.y) + m[3 * i + 2] * way.z);
+  }
+  return out;
+}
+
+/// One box of the other mesh in the frame of boxes that are measured from it. All is told from its
+/// middle.
+template <class S>
+struct SeenBox {
+  S middle[3], hull[3], reach[3], normal[3];
+  S low, high;      ///< its slab
+  S nearest;        ///< how far it reaches back along the way
+  S beside_way[2];  ///< and beside that
+};
+
+/// How boxes of one mesh are seen from the other's frame: along their own axes, along the other's,
+/// along the normals of all slabs, and along the way that the answer is likely to go. Boxes in
+/// lanes of T, the other's in S.
+template <class T, class S>
+struct BoxLook {
+  S m[9], shift[3], scale;  ///< from the other's frame to theirs
+  S axis[3][3];             ///< the other's, in their frame
+  S along[3][3] = {};       ///< [way][axis of the other]: their product
+  S blur;                   ///< what a coordinate may be off by
+  // For lanes; ways go from the boxes to the other, and two beside that.
+  T lane_axis[3][3], abs_axis[3][3], lane_way[3][3] = {}, abs_way[3][3] = {};
+
+  BoxLook() = default;
+  /// `map` goes from the other's frame to theirs.
+  IST_HD BoxLook(const Similarity& map, double off)
+      : scale(static_cast<S>(map.scale)), blur(static_cast<S>(off)) {
+    const double inverse = 1 / map.scale;
+    for (int i = 0; i < 3; ++i) {
+      shift[i] = static_cast<S>(map.t[i]);
+      for (int k = 0; k < 3; ++k) {
+        m[3 * i + k] = static_cast<S>(map.m[3 * i + k]);
+        axis[k][i] = static_cast<S>(map.m[3 * i + k] * inverse);
+        lane_axis[k][i] = static_cast<T>(axis[k][i]);
+        abs_axis[k][i] = std::abs(lane_axis[k][i]);
+      }
+    }
+  }
+
+  /// The first of the axes, of length 1, goes from the boxes to the other mesh; or all are zero.
+  IST_HD void turn(const WayAxes& axes) {
+    for (int j = 0; j < 3; ++j)
+      for (int k = 0; k < 3; ++k) turn(axes.way[j], axes.way[j][k], j, k);
+  }
+  /// Its j-th, of which `component` is the k-th number.
+  IST_HD void turn(const exact::Point& way, double component, int j, int k) {
+    along[j][k] = static_cast<S>((way.x * double{axis[k][0]} + way.y * double{axis[k][1]}) +
+                                 way.z * double{axis[k][2]});
+    lane_way[j][k] = static_cast<T>(component);
+    abs_way[j][k] = std::abs(lane_way[j][k]);
+  }
+
+  IST_HD SeenBox<S> see(const MiddleBox<S>& one) const {
+    SeenBox<S> out;
+    for (int i = 0; i < 3; ++i) {
+      out.middle[i] = (m[3 * i] * one.middle[0] + m[3 * i + 1] * one.middle[1]) +
+                      m[3 * i + 2] * one.middle[2] + shift[i];
+      out.reach[i] = scale * one.half[i] + blur;
+    }
+    for (int i = 0; i < 3; ++i) {
+      out.hull[i] = (std::abs(axis[0][i]) * out.reach[0] + std::abs(axis[1][i]) * out.reach[1]) +
+                    std::abs(axis[2][i]) * out.reach[2];
+      out.normal[i] =
+          (axis[0][i] * one.normal[0] + axis[1][i] * one.normal[1]) + axis[2][i] * one.normal[2];
+    }
+    const S before = (one.normal[0] * one.middle[0] + one.normal[1] * one.middle[1]) +
+                     one.normal[2] * one.middle[2];
+    out.low = scale * (one.slab_low - before), out.high = scale * (one.slab_high - before);
+    const S(&along_way)[3] = along[0];
+    const S turned = (along_way[0] * one.normal[0] + along_way[1] * one.normal[1]) +
+                     along_way[2] * one.normal[2];
+    S by_box = 0, by_slab = std::fmin(turned * out.low, turned * out.high);
+    out.beside_way[0] = out.beside_way[1] = 0;
+    for (int k = 0; k < 3; ++k) {
+      by_box -= out.reach[k] * std::abs(along_way[k]);
+      by_slab -= out.reach[k] * std::abs(along_way[k] - turned * one.normal[k]);
+      for (int j = 0; j < 2; ++j) out.beside_way[j] += out.reach[k] * std::abs(along[1 + j][k]);
+    }
+    out.nearest = std::fmax(by_box, by_slab) - 3 * blur;
+    return out;
+  }
+};
+
+}  // namespace ist
