@@ -24,43 +24,30 @@ class DeviceScene {
  public:
   DeviceScene(DeviceSolids& solids, const std::vector<GpuSceneBody>& bodies,
               const GpuSceneSettings& settings)
-      : solids_(solids),
-        nobodys_(std::make_shared<cuda::Block>(solids.solids().device(), nullptr)) {
-    GpuSettings gpu;
-    gpu.device = solids.solids().device();
+      : solids_(solids) {
     const py::gil_scoped_release released;
-    scene_ = std::make_unique<GpuScene>(solids.solids(), bodies, settings, gpu);
-  }
-  // Batches that read its pairs may be under way.
-  ~DeviceScene() {
-    const py::gil_scoped_release released;
-    if (ready_ != nullptr) cuda::Moment(nobodys_->device(), cuda::legacy_stream()).wait();
+    all_ = std::make_shared<Memory>(solids.solids(), bodies, settings);
   }
 
-  DevicePairs find_pairs(const py::object& self, const py::object& poses,
-                         const py::object& stream) {
+  DevicePairs find_pairs(const py::object& poses, const py::object& stream) {
     const cuda::Stream on = stream_of(stream);
-    LentArray lent = lend(poses, {"poses", {kFloat64}, {7}}, nobodys_->device(), on);
-    if (static_cast<std::size_t>(lent.rows) != scene_->size())
+    const int device = all_->block.device();
+    LentArray lent = lend(poses, {"poses", {kFloat64}, {7}}, device, on);
+    if (static_cast<std::size_t>(lent.rows) != size())
       throw value_error("poses: " + std::to_string(lent.rows) + " rows; there are " +
-                        std::to_string(scene_->size()) + " bodies");
-    std::vector<std::shared_ptr<void>> keep;
-    keep.push_back(std::move(lent.keep));
-    const auto done = solids_.in_order(
-        on, std::move(keep), [&] { scene_->find_pairs(static_cast<const Pose*>(lent.data), on); });
-    if (done != nullptr || ready_ == nullptr)
-      ready_ = done != nullptr
-                   ? done
-                   : std::make_shared<cuda::Moment>(nobodys_->device(), cuda::legacy_stream());
-    const GpuScenePairs& found = scene_->pairs();
+                        std::to_string(size()) + " bodies");
+    const auto done = solids_.in_order(on, {std::move(lent.keep), all_}, [&] {
+      all_->scene.find_pairs(static_cast<const Pose*>(lent.data), on);
+    });
+    if (done != nullptr)
+      ready_ = done;
+    else if (ready_ == nullptr)
+      ready_ = std::make_shared<cuda::Moment>(device, cuda::legacy_stream());
+    const GpuScenePairs& found = all_->scene.pairs();
     const std::size_t most = found.pairs.count;
     const auto array = [&](const auto* data, Shape shape, ElementType type) {
       DeviceArray out;
-      // As long as an array lives, so does the scene that owns its memory.
-      out.block = {nobodys_.get(), [keeps = self, block = nobodys_](const cuda::Block*) mutable {
-                     const py::gil_scoped_acquire held;
-                     keeps.reset();
-                   }};
+      out.block = {all_, &all_->block};
       out.ready = ready_;
       out.data = reinterpret_cast<std::byte*>(const_cast<void*>(static_cast<const void*>(data)));
       out.shape = std::move(shape);
@@ -77,16 +64,26 @@ class DeviceScene {
             array(found.pairs.b.pose, {most, 7}, kFloat64),
             array(found.pairs.a.scale, {most}, kFloat64),
             array(found.pairs.b.scale, {most}, kFloat64),
-            array(found.status, {scene_->size()}, kUInt32)};
+            array(found.status, {size()}, kUInt32)};
   }
 
-  std::size_t size() const { return scene_->size(); }
-  std::size_t bytes() const { return scene_->bytes(); }
+  std::size_t size() const { return all_->scene.size(); }
+  std::size_t bytes() const { return all_->scene.bytes(); }
 
  private:
+  /// What arrays need to live, without the solids: their last batch may hold the arrays.
+  struct Memory {
+    Memory(const GpuSolids& solids, const std::vector<GpuSceneBody>& bodies,
+           const GpuSceneSettings& settings)
+        : scene(solids, bodies, settings, {.device = solids.device()}),
+          block(solids.device(), nullptr) {}
+
+    GpuScene scene;
+    cuda::Block block;
+  };
+
   DeviceSolids& solids_;
-  std::shared_ptr<cuda::Block> nobodys_;  ///< what arrays say of their device
-  std::unique_ptr<GpuScene> scene_;
+  std::shared_ptr<Memory> all_;
   std::shared_ptr<const cuda::Moment> ready_;
 };
 
@@ -187,7 +184,7 @@ void add_gpu_scene(py::module_& module) {
            py::arg("scales") = py::none(), py::arg("worlds") = py::none(),
            py::arg("moves") = py::none(), py::arg("layers") = py::none(),
            py::arg("meets") = py::none(), py::arg("excluded") = py::none(), py::arg("margin") = 0.0,
-           py::arg("max_pairs") = 8192, py::arg("measure") = "matched", py::keep_alive<1, 2>(),
+           py::arg("max_pairs") = 8192, py::arg("measure") = "matched", py::keep_alive<0, 2>(),
            "solids: ist.Solids on a GPU. solid: (n,) which of them each body is. scales: (n,) or "
            "one. worlds: (n,) whole numbers below 2²⁴; bodies of different worlds never meet. "
            "moves: (n,) bool; two bodies that do not move are no pair, nor are two Shapes. layers, "
@@ -196,16 +193,12 @@ void add_gpu_scene(py::module_& module) {
            "one step. measure: that pairs will be asked by.")
       .def("__len__", &DeviceScene::size)
       .def_prop_ro("bytes", &DeviceScene::bytes, "Device memory of the scene.")
-      .def(
-          "find_pairs",
-          [](const py::object& self, const py::object& poses, const py::object& stream) {
-            return py::cast<DeviceScene&>(self).find_pairs(self, poses, stream);
-          },
-          py::arg("poses"), py::kw_only(), py::arg("stream") = py::none(),
-          "poses: (n, 7) float64 on the device. Returns ScenePairs: count, (1,), 0 if there are "
-          "more than max_pairs; boxes_met, (1,), how many there are; a, b, (max_pairs,) bodies; "
-          "status, (n,) of each body: invalid_input for a pose or scale that is not usable, which "
-          "leaves it out.");
+      .def("find_pairs", &DeviceScene::find_pairs, py::arg("poses"), py::kw_only(),
+           py::arg("stream") = py::none(),
+           "poses: (n, 7) float64 on the device. Returns ScenePairs: count, (1,), 0 if there are "
+           "more than max_pairs; boxes_met, (1,), how many there are; a, b, (max_pairs,) bodies; "
+           "status, (n,) of each body: invalid_input for a pose or scale that is not usable, which "
+           "leaves it out.");
 }
 
 }  // namespace ist::python

@@ -480,6 +480,10 @@ def test_a_scene_finds_pairs_and_their_arguments(solids, random_poses):
     del scene
     gc.collect()
     assert again.count.numpy()[0] == 0 and found.count.numpy()[0] == 0
+    # Nothing keeps the solids, and with them what their last batch was lent.
+    del again, found, answers, assets
+    gc.collect()
+    assert not lent
 
 
 def test_a_scene_refuses_what_it_cannot_hold(solids):
