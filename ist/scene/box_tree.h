@@ -99,7 +99,8 @@ class BoxTree {
     while (first != end || begun < boxes.size()) {
       while (begun < boxes.size() && end - first < kRoom / 8)
         waiting[end++ % kRoom] = {root_, begun++};
-      const auto [at, k] = waiting[first++ % kRoom];
+      const std::uint32_t at = waiting[first % kRoom].node, k = waiting[first % kRoom].box;
+      ++first;
       const SceneBox& box = boxes[k];
       for (std::uint32_t lanes = nodes_[at].meeting(box); lanes != 0; lanes &= lanes - 1) {
         const std::uint32_t child = nodes_[at].child[std::countr_zero(lanes)];
