@@ -3,8 +3,6 @@
 // trees in fields; the same by all cores of the machine. Answers are compared with the CPU's.
 #include <cuda_runtime_api.h>
 
-#include <cstdio>
-#include <exception>
 #include <string>
 #include <vector>
 
@@ -13,6 +11,7 @@
 #include "cuda/base/check.h"
 #include "gpu_batch_on_cpu.h"
 #include "gpu_batch_scenes.h"
+#include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_patches.h"
@@ -166,7 +165,7 @@ bool patches_are_right(Report& report, Batches& batches, const Scene& scene, std
   return from_cpu.of_other_regions < 0.01 && from_cpu.volume < 1e-3;
 }
 
-int measure(Report& report) {
+bool measure(Report& report) {
   const std::size_t many = report.quick() ? 100'000 : 1'000'000;
   const std::size_t for_cpu = report.quick() ? 2'000 : 20'000;
   const TriangleMesh elephant = load_mesh(testing::oracle_mesh_path("elephant"));
@@ -250,26 +249,13 @@ int measure(Report& report) {
                                        {"pairs", many / 10},
                                        {"M/s", static_cast<double>(many / 10) / ms * 1e-3}});
   }
-  const int written = report.write();
-  if (right) return written;
-  std::fprintf(stderr, "answers differ from the CPU's\n");
-  return 1;
+  return right;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report("gpu_batch", argc, argv);
-  report.page("Penetrations, separations and contact patches of many pairs on a GPU");
-  std::string why;
-  if (!gpu_available(0, &why)) {
-    std::fprintf(stderr, "gpu_batch: %s\n", why.c_str());
-    return 1;
-  }
-  try {
-    return measure(report);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  return ist::benchmark::report_of_gpu(
+      "gpu_batch", "Penetrations, separations and contact patches of many pairs on a GPU", argc,
+      argv, measure);
 }

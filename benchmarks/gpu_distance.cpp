@@ -2,8 +2,6 @@
 // the oracle's classes, of a nut in clearance and of mated parts; the same by all cores of the
 // machine, and how far the answers differ.
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <map>
 #include <string>
 #include <vector>
@@ -94,7 +92,7 @@ bool ask(Report& report, const char* table, const std::string& name, const Solid
   return right && worst < 1e-9;
 }
 
-int measure(Report& report) {
+bool measure(Report& report) {
   const std::size_t many = report.quick() ? 50'000 : 1'000'000;
   constexpr std::size_t kSpheres = 4000;
   bool right = true;
@@ -163,26 +161,12 @@ int measure(Report& report) {
   }
   for (const auto& [name, poses] : mates)
     right = ask(report, "Mated parts", name, mated, poses, many / 50) && right;
-  const int written = report.write();
-  if (right) return written;
-  std::fprintf(stderr, "answers differ from the CPU's\n");
-  return 1;
+  return right;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report("gpu_distance", argc, argv);
-  report.page("Distances of many pairs of meshes on a GPU");
-  std::string why;
-  if (!gpu_available(0, &why)) {
-    std::fprintf(stderr, "gpu_distance: %s\n", why.c_str());
-    return 1;
-  }
-  try {
-    return measure(report);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  return ist::benchmark::report_of_gpu("gpu_distance", "Distances of many pairs of meshes on a GPU",
+                                       argc, argv, measure);
 }

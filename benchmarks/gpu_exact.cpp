@@ -1,8 +1,6 @@
 // Exact penetrations of many pairs at once on the GPU: rates with poses and answers resident, by
 // how much the solids overlap, of a nut on its bolt, of mated parts and of small bodies; the same
 // by all cores of the machine, and how far the answers differ.
-#include <cstdio>
-#include <exception>
 #include <map>
 #include <string>
 #include <vector>
@@ -125,7 +123,7 @@ TriangleMesh small_body(std::size_t triangles, unsigned seed) {
   return mesh;
 }
 
-int measure(Report& report) {
+bool measure(Report& report) {
   const std::size_t many = report.quick() ? 50'000 : 1'000'000;
   bool right = true;
   const Asset elephant = mesh_of(load_mesh(ist::testing::oracle_mesh_path("elephant")), "elephant");
@@ -207,26 +205,12 @@ int measure(Report& report) {
                 many, 0) &&
             right;
   }
-  const int written = report.write();
-  if (right) return written;
-  std::fprintf(stderr, "answers differ from the CPU's\n");
-  return 1;
+  return right;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  Report report("gpu_exact", argc, argv);
-  report.page("Exact penetrations of many pairs on a GPU");
-  std::string why;
-  if (!gpu_available(0, &why)) {
-    std::fprintf(stderr, "gpu_exact: %s\n", why.c_str());
-    return 1;
-  }
-  try {
-    return measure(report);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
+  return ist::benchmark::report_of_gpu("gpu_exact", "Exact penetrations of many pairs on a GPU",
+                                       argc, argv, measure);
 }

@@ -2,11 +2,15 @@
 
 #include <cuda_runtime_api.h>
 
+#include <cstdio>
+#include <exception>
+#include <string>
 #include <vector>
 
 #include <ist/gpu_query.h>
 
 #include "cuda/base/check.h"
+#include "report.h"
 #include "timing.h"
 
 // What programs that ask a GPU about many pairs begin with.
@@ -44,5 +48,27 @@ struct Solids {
     return out;
   }
 };
+
+/// main() of such a program: measure(report) says whether all answers are the CPU's.
+template <class Measure>
+int report_of_gpu(const char* name, const char* title, int argc, char** argv,
+                  const Measure& measure) {
+  Report report(name, argc, argv);
+  report.page(title);
+  std::string why;
+  if (!gpu_available(0, &why)) {
+    std::fprintf(stderr, "%s: %s\n", name, why.c_str());
+    return 1;
+  }
+  try {
+    const bool right = measure(report);
+    const int written = report.write();
+    if (right) return written;
+    std::fprintf(stderr, "%s: answers differ from the CPU's\n", name);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", name, error.what());
+  }
+  return 1;
+}
 
 }  // namespace ist::benchmark

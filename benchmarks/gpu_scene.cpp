@@ -8,8 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <exception>
 #include <random>
 #include <string>
 #include <vector>
@@ -19,8 +17,9 @@
 #include <ist/mass_properties.h>
 
 #include "cuda/base/check.h"
-#include "report.h"
+#include "gpu_many.h"
 #include "mesh/samples/samples.h"
+#include "report.h"
 #include "support/device_batch.h"
 #include "timing.h"
 
@@ -35,6 +34,7 @@ struct Bodies {
   std::vector<GpuSceneBody> bodies;
   std::vector<Pose> poses;
   double side;
+  bool is_block = false;
   std::mt19937_64 random{7};
 
   /// Of size 1, one in ten with a box that meets another's.
@@ -51,7 +51,21 @@ struct Bodies {
       poses.push_back(pose);
     }
   }
+  /// Or in a block, flush, which a step lifts.
+  static Bodies in_block(std::size_t row, double scale) {
+    Bodies block(1, row * row * row, scale);
+    block.is_block = true;
+    for (std::size_t i = 0; i < block.poses.size(); ++i)
+      block.poses[i].t[0] = static_cast<double>(i % row),
+      block.poses[i].t[1] = static_cast<double>(i / row % row),
+      block.poses[i].t[2] = static_cast<double>(i / row / row);
+    return block;
+  }
   void move() {
+    if (is_block) {
+      for (Pose& pose : poses) pose.t[2] += 0.125;
+      return;
+    }
     std::uniform_real_distribution<double> uniform(-0.1, 0.1);
     for (Pose& pose : poses)
       for (double& x : pose.t) x = std::clamp(x + uniform(random), 0.0, side);
@@ -119,12 +133,11 @@ double scene_us(const Asset& asset, Bodies bodies, std::size_t max_pairs) {
   return quantile(us, 0.5);
 }
 
-int run(int argc, char** argv) {
-  Report report("gpu_scene", argc, argv);
-  report.page("Broad phases on a GPU");
+bool measure(Report& report) {
   report.remark(
       "Balls of size 1, each moved by up to 0.1 along each axis in a step; "
-      "one body in ten has a box that meets another's. Poses are on the device; a graph is "
+      "one body in ten has a box that meets another's. In the block all boxes are flush, and it is "
+      "lifted. Poses are on the device; a graph is "
       "launched, its work timed by events, median of 20 steps. With answers: the exact penetration "
       "of each pair follows in the same graph. Scene is ist::Scene's broad phase on one core of "
       "the "
@@ -136,16 +149,23 @@ int run(int argc, char** argv) {
   const GpuSolids solids(views);
   struct Case {
     const char* name;
-    std::size_t worlds, each;
-    double target;  ///< [us]
+    Bodies bodies, as_one_world;
+    double target = 0;  ///< [us]
   };
-  for (const Case& one :
-       {Case{"10,000 bodies", 1, 10'000, 0}, Case{"100,000 bodies", 1, 100'000, 300},
-        Case{"1,000,000 bodies", 1, 1'000'000, 0},
-        Case{"4,096 worlds of 32 bodies", 4'096, 32, 500}}) {
-    const Bodies bodies(one.worlds, one.each, scale);
+  const auto spread = [&](std::size_t worlds, std::size_t each) {
+    return Bodies(worlds, each, scale);
+  };
+  const Bodies block = Bodies::in_block(22, scale);
+  const Case cases[] = {
+      {"10,000 bodies", spread(1, 10'000), spread(1, 10'000)},
+      {"100,000 bodies", spread(1, 100'000), spread(1, 100'000), 300},
+      {"1,000,000 bodies", spread(1, 1'000'000), spread(1, 1'000'000)},
+      {"4,096 worlds of 32 bodies", spread(4'096, 32), spread(1, 4'096 * 32), 500},
+      {"10,648 in a block, flush", block, block}};
+  for (const Case& one : cases) {
+    const Bodies& bodies = one.bodies;
     GpuSceneSettings settings;
-    settings.max_pairs = bodies.poses.size() / 4 + 1000;
+    settings.max_pairs = (bodies.is_block ? 14 : 1) * bodies.poses.size();
     settings.measure = Measure::exact;
     GpuScene scene(solids, bodies.bodies, settings);
     GpuWorkspace workspace(settings.max_pairs);
@@ -169,20 +189,15 @@ int run(int argc, char** argv) {
                          {"boxes and pairs us", pairs_us},
                          {"with answers us", all_us},
                          {"MB", static_cast<double>(scene.bytes()) / 1e6}};
-    line["Scene us"] = scene_us(ball, Bodies(1, one.worlds * one.each, scale), settings.max_pairs);
+    line["Scene us"] = scene_us(ball, one.as_one_world, settings.max_pairs);
     report.row("Steps", line);
     if (one.target > 0) report.target(std::string(one.name) + ", us", pairs_us, one.target, true);
   }
-  return report.write();
+  return true;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "gpu_scene: %s\n", error.what());
-    return 1;
-  }
+  return ist::benchmark::report_of_gpu("gpu_scene", "Broad phases on a GPU", argc, argv, measure);
 }

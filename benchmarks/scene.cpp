@@ -28,6 +28,7 @@
 
 #include "mesh/samples/samples.h"
 #include "report.h"
+#include "support/bullet_mesh.h"
 #include "timing.h"
 
 namespace {
@@ -36,12 +37,7 @@ using ist::Pose;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
-
-btTransform transform_of(const Pose& pose) {
-  const auto x = [](double value) { return static_cast<btScalar>(value); };
-  return btTransform(btQuaternion(x(pose.q[1]), x(pose.q[2]), x(pose.q[3]), x(pose.q[0])),
-                     btVector3(x(pose.t[0]), x(pose.t[1]), x(pose.t[2])));
-}
+using ist::testing::bullet_transform;
 
 /// Cubes, of which the first `still` cannot move, and where the last ones stand in each step.
 struct Course {
@@ -127,7 +123,7 @@ Course simulated(std::size_t count, bool gravity_turns, int steps) {
     course.start.push_back(pose);
     course.edge.push_back(edges(random));
     const auto half = static_cast<btScalar>(course.edge.back() / 2);
-    add(std::make_unique<btBoxShape>(btVector3(half, half, half)), 1, transform_of(pose));
+    add(std::make_unique<btBoxShape>(btVector3(half, half, half)), 1, bullet_transform(pose));
   }
   const btScalar wide = static_cast<btScalar>(kApart * static_cast<double>(row));
   for (int axis = 0; axis < 3; ++axis)
@@ -277,7 +273,7 @@ struct OfBullet final : Peer {
       const auto half = static_cast<btScalar>(course.edge[i] / 2);
       shapes.emplace_back(btVector3(half, half, half));
       btVector3 low, high;
-      shapes[i].getAabb(transform_of(course.start[i]), low, high);
+      shapes[i].getAabb(bullet_transform(course.start[i]), low, high);
       // Those that stand still do not meet each other.
       proxies.push_back(broadphase->createProxy(low, high, 0, nullptr, is_still ? 2 : 1,
                                                 is_still ? 1 : 3, nullptr));
@@ -289,7 +285,7 @@ struct OfBullet final : Peer {
     const std::size_t first = proxies.size() - poses.size();
     for (std::size_t i = 0; i < poses.size(); ++i) {
       btVector3 low, high;
-      shapes[first + i].getAabb(transform_of(poses[i]), low, high);
+      shapes[first + i].getAabb(bullet_transform(poses[i]), low, high);
       broadphase->setAabb(proxies[first + i], low, high, nullptr);
     }
     broadphase->calculateOverlappingPairs(nullptr);
@@ -326,8 +322,7 @@ int main(int argc, char** argv) {
       "turned cubes with edges from 0.5 to 1.5 that Bullet moved beforehand: they fall onto a "
       "floor, or about in a closed box as a strong gravity turns. One thread, thread CPU time, "
       "median of the steps. Bullet's pairs are those of its wider boxes; FCL's boxes around what "
-      "is "
-      "turned hold its bounding ball.");
+      "is turned hold its bounding ball.");
   const ist::Asset cube = ist::bake_mesh_only(ist::close_mesh(ist::make_sample("cube"), "cube"));
   const std::size_t many = report.quick() ? 20'000 : 1'000'000, heap = report.quick() ? 300 : 4'000;
   const int steps = report.quick() ? 5 : 51;

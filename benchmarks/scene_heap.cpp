@@ -3,8 +3,6 @@
 // hulls. One thread.
 
 #include <BulletCollision/CollisionShapes/btShapeHull.h>
-#include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
-#include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <btBulletDynamicsCommon.h>
 #include <ist/bake.h>
 #include <ist/mesh.h>
@@ -18,6 +16,7 @@
 #include <vector>
 
 #include "report.h"
+#include "support/bullet_mesh.h"
 #include "support/shared_data.h"
 #include "timing.h"
 
@@ -27,28 +26,18 @@ using ist::Pose;
 using ist::benchmark::quantile;
 using ist::benchmark::Report;
 using ist::benchmark::thread_seconds;
-
-btTransform transform_of(const Pose& pose) {
-  return btTransform(btQuaternion(pose.q[1], pose.q[2], pose.q[3], pose.q[0]),
-                     btVector3(pose.t[0], pose.t[1], pose.t[2]));
-}
+using ist::testing::bullet_transform;
 
 /// A mesh of size 1 as each of them has it. The meshes lie inside their hulls, which meet first:
 /// where solids are asked they are 5 % larger, so that they overlap.
 struct Solid {
   static constexpr double kLarger = 1.05;
 
-  explicit Solid(ist::TriangleMesh mesh, const std::string& name) : asset(baked(mesh, name)) {
-    for (const Eigen::Vector3d& v : mesh.vertices)
-      for (int k = 0; k < 3; ++k) coordinates.push_back(v[k]);
-    for (const auto& t : mesh.triangles)
-      for (const std::uint32_t index : t) indices.push_back(static_cast<int>(index));
-    triangles = std::make_unique<btTriangleIndexVertexArray>(
-        static_cast<int>(indices.size() / 3), indices.data(), static_cast<int>(3 * sizeof(int)),
-        static_cast<int>(coordinates.size() / 3), coordinates.data(),
-        static_cast<int>(3 * sizeof(double)));
-    btConvexHullShape all(coordinates.data(), static_cast<int>(coordinates.size() / 3),
-                          3 * sizeof(double));
+  explicit Solid(ist::TriangleMesh mesh, const std::string& name)
+      : asset(baked(mesh, name)), surface(mesh, kLarger) {
+    btConvexHullShape all;
+    for (const Eigen::Vector3d& v : mesh.vertices) all.addPoint({v.x(), v.y(), v.z()}, false);
+    all.recalcLocalAabb();
     all.setMargin(0);
     btShapeHull few(&all);
     few.buildHull(0);
@@ -60,10 +49,6 @@ struct Solid {
       hull->recalcLocalAabb();
       hull->setMargin(0);
     }
-    surface = std::make_unique<btGImpactMeshShape>(triangles.get());
-    surface->setLocalScaling(btVector3(kLarger, kLarger, kLarger));
-    surface->setMargin(0);
-    surface->updateBound();
   }
 
   /// The mesh becomes of size 1.
@@ -77,11 +62,8 @@ struct Solid {
   }
 
   ist::Asset asset;
-  std::vector<double> coordinates;
-  std::vector<int> indices;
-  std::unique_ptr<btTriangleIndexVertexArray> triangles;
+  ist::testing::BulletMesh surface;
   btConvexHullShape small, large;  ///< as the heap is moved, and as it is asked
-  std::unique_ptr<btGImpactMeshShape> surface;
 };
 
 /// Bullet's collision world over shapes of its own.
@@ -92,13 +74,13 @@ struct World {
   void add(btCollisionShape* shape, const Pose& pose) {
     objects.push_back(std::make_unique<btCollisionObject>());
     objects.back()->setCollisionShape(shape);
-    objects.back()->setWorldTransform(transform_of(pose));
+    objects.back()->setWorldTransform(bullet_transform(pose));
     world.addCollisionObject(objects.back().get());
   }
   /// Returns the pairs with contacts.
   int step(const std::vector<Pose>& poses) {
     for (std::size_t i = 0; i < poses.size(); ++i)
-      objects[i]->setWorldTransform(transform_of(poses[i]));
+      objects[i]->setWorldTransform(bullet_transform(poses[i]));
     world.performDiscreteCollisionDetection();
     int pairs = 0;
     for (int i = 0; i < dispatcher.getNumManifolds(); ++i)
@@ -128,7 +110,7 @@ class Heap {
       Pose pose = {{turns(random), turns(random), turns(random), turns(random)},
                    {1.1 * static_cast<double>(i % row), 1.1 * static_cast<double>(i / row % row),
                     1 + 1.1 * static_cast<double>(i / row / row)}};
-      add(&solids[i % solids.size()]->small, 1, transform_of(pose));
+      add(&solids[i % solids.size()]->small, 1, bullet_transform(pose));
     }
     const double wide = 1.1 * static_cast<double>(row);
     const btVector3 normals[] = {{0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
@@ -221,7 +203,7 @@ int main(int argc, char** argv) {
     body.solid = ist::PlacedSolid(solid.asset.view(), poses[i], Solid::kLarger);
     scene.add(body);
     numbers.push_back(i);
-    surfaces.add(solid.surface.get(), poses[i]);
+    surfaces.add(solid.surface.shape(), poses[i]);
     hulls.add(&solid.large, poses[i]);
   }
   scene.step();

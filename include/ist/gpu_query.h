@@ -117,7 +117,7 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
 /// Settings of a batch, as in SeparationSettings.
 struct GpuSeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, depth first; 0: no limit
-  double max_distance = 0;       ///< [u] farther is not told how far; 0: no limit
+  double max_distance = 0;       ///< [u] as in SeparationSettings; 0: no limit
 };
 
 /// answers[i] = separation(pairs[i]) of two assets: of their surfaces if both keep a mesh, else of

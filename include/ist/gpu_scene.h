@@ -24,35 +24,36 @@ struct GpuSceneBody {
 inline constexpr std::uint32_t kGpuWorlds = 1u << 24;
 
 struct GpuSceneSettings {
-  std::size_t max_pairs = 8192;  ///< in one step; < 2^32
-  /// [u] ≥ 0: boxes of a pair come as near as this.
+  std::size_t max_pairs = 8192;  ///< room for the pairs of one step; < 2^32
+  /// [u] ≥ 0: two bodies are a pair too if their boxes are no farther apart.
   double margin = 0;
-  /// That pairs will be asked by: by matched spheres boxes are wider by what these protrude.
+  /// The measure of the queries that follow. Matched spheres may protrude from their solid, so its
+  /// box is widened for them.
   Measure measure = Measure::matched;
-  /// Bodies that are joined, by their indices: they are no pairs.
+  /// Indices of bodies that are joined and never are a pair.
   std::span<const ScenePairName> excluded = {};
 };
 
 /// The pairs that a step found: arrays in device memory that the scene owns.
 struct GpuScenePairs {
-  /// [1] how many; 0 if there are more than max_pairs.
+  /// [1] number of pairs. If there are more than max_pairs it is 0, and boxes_met tells.
   const std::uint32_t* count = nullptr;
-  const std::uint32_t* boxes_met = nullptr;  ///< [1] how many there are
+  const std::uint32_t* boxes_met = nullptr;  ///< [1] number of pairs, whether there is room or not
   const std::uint32_t* a = nullptr;          ///< [max_pairs] index of a body
-  const std::uint32_t* b = nullptr;          ///< [max_pairs] above `a`'s; pairs are by (a, b)
-  /// The same for a batch: all max_pairs, since the host does not know how many there are. Those
-  /// beyond `count` are invalid_input there, with NaN.
+  const std::uint32_t* b = nullptr;  ///< [max_pairs] a higher index; pairs are sorted by (a, b)
+  /// The pairs as a batch takes them: always max_pairs of them, since the host does not know their
+  /// number. A batch answers those beyond `count` with invalid_input and NaN.
   GpuPairs pairs;
-  /// [bodies] invalid_input: left out, since its pose or scale is not usable, or it reaches beyond
-  /// 1e37 [u], or it has no content.
+  /// [bodies] invalid_input: the body is left out, since its pose or scale is not usable, its box
+  /// reaches beyond 1e37 [u], or its asset is empty.
   const QueryStatus* status = nullptr;
 };
 
-/// Many bodies in device memory, and whose boxes meet: the broad phase of Scene for a GPU, for one
-/// scene or for thousands of small ones side by side (`world`). It has the same pairs as a Scene of
-/// the same bodies, in the order of bodies' indices, and the same in every run.
+/// Many bodies in device memory, and the pairs whose boxes overlap: Scene's broad phase on a GPU,
+/// for one scene or for thousands of small ones side by side (`world`). The pairs are those of a
+/// Scene of the same bodies, in every run.
 ///
-/// The hierarchy of boxes is built anew in every step. One step at a time may use it.
+/// The hierarchy of boxes is built anew in every step. One step at a time.
 class GpuScene {
  public:
   /// Bodies are named by their index.
@@ -68,7 +69,7 @@ class GpuScene {
   std::size_t size() const noexcept;   ///< number of bodies
   std::size_t bytes() const noexcept;  ///< of device memory
 
-  /// Finds the pairs of bodies that stand at `poses`, which are as many in device memory.
+  /// Finds the pairs of bodies at these poses: size() of them, in device memory.
   ///
   /// Only launches kernels on `stream`: it allocates nothing and waits for nothing, so a CUDA graph
   /// may capture it, together with the batch that answers. Throws Error if a launch fails.

@@ -139,9 +139,14 @@ std::unique_ptr<DeviceScene> make_scene(const py::object& solids, const py::obje
   if (!excluded.is_none()) {
     const Integers pairs = take_integers(excluded, "excluded", "(n, 2)");
     if (pairs.ndim() != 2 || pairs.shape(1) != 2) refuse_shape(pairs, "excluded", "(n, 2)");
+    const auto body = [&](std::int64_t number) {
+      if (number < 0 || number >= static_cast<std::int64_t>(bodies.size()))
+        throw value_error("excluded: " + std::to_string(number) + "; there are " +
+                          std::to_string(bodies.size()) + " bodies");
+      return static_cast<std::uint32_t>(number);
+    };
     for (std::size_t k = 0; k < pairs.shape(0); ++k)
-      joined.push_back({static_cast<std::uint32_t>(pairs.data()[2 * k]),
-                        static_cast<std::uint32_t>(pairs.data()[2 * k + 1])});
+      joined.push_back({body(pairs.data()[2 * k]), body(pairs.data()[2 * k + 1])});
   }
   GpuSceneSettings settings;
   settings.max_pairs = max_pairs;

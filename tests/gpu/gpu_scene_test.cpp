@@ -5,11 +5,9 @@
 #include <cmath>
 
 #include "support/answer_bits.h"
-#include "support/baked.h"
 #include "support/device_batch.h"
 #include "support/gpu_test.h"
 #include "support/random_scene.h"
-#include "support/test_meshes.h"
 
 // The broad phase of scenes on the device, beside Scene.
 
@@ -17,17 +15,6 @@ namespace ist::testing {
 namespace {
 
 class GpuSceneTest : public GpuTest {};
-
-std::vector<GpuSolid> some_solids() {
-  static const Asset cube = baked(box_mesh({-1, -1, -1}, {1, 1, 1}), "cube", 60);
-  static const Asset off_centre = baked(box_mesh({0.5, -1, 0}, {1, 3, 0.25}), "slab", 60);
-  return {cube.view(),
-          off_centre.view(),
-          Shape(BallShape{0.5}),
-          Shape(BoxShape{{1, 0.5, 2}}),
-          Shape(HalfSpaceShape{{0, 0, 1}, -0.75}),
-          Shape(CapsuleShape{0.5, 1})};
-}
 
 template <class T>
 std::vector<T> from_device(const T* from, std::size_t count) {

@@ -496,5 +496,8 @@ def test_a_scene_refuses_what_it_cannot_hold(solids):
         ist.gpu.Scene(assets, [0, 1], worlds=[0, 1, 2])
     with pytest.raises(ValueError, match="layers: -1; wanted a whole number from 0"):
         ist.gpu.Scene(assets, [0, 1], layers=[0, -1])
+    for number in (-1, 2, 2**32):
+        with pytest.raises(ValueError, match=f"excluded: {number}; there are 2 bodies"):
+            ist.gpu.Scene(assets, [0, 1], excluded=[[0, number]])
     with pytest.raises(ValueError, match="poses: 3 rows; there are 2 bodies"):
         ist.gpu.Scene(assets, [0, 1]).find_pairs(OnDevice(np.zeros((3, 7))))

@@ -31,6 +31,11 @@ namespace ist::testing {
 
 static_assert(sizeof(btScalar) == sizeof(double), "Bullet must be its double-precision build");
 
+inline btTransform bullet_transform(const Pose& pose) {
+  const btQuaternion q(pose.q[1], pose.q[2], pose.q[3], pose.q[0]);
+  return btTransform(q.normalized(), btVector3(pose.t[0], pose.t[1], pose.t[2]));
+}
+
 /// A mesh as Bullet sees it, scaled about its own origin. Bullet locks the shape during a query:
 /// one thread at a time.
 class BulletMesh {
@@ -53,11 +58,10 @@ class BulletMesh {
   }
 
   btCollisionObject& at(const Pose& pose) {
-    const btQuaternion q(pose.q[1], pose.q[2], pose.q[3], pose.q[0]);
-    object_.setWorldTransform(
-        btTransform(q.normalized(), btVector3(pose.t[0], pose.t[1], pose.t[2])));
+    object_.setWorldTransform(bullet_transform(pose));
     return object_;
   }
+  btGImpactMeshShape* shape() const { return shape_.get(); }
 
  private:
   std::vector<double> coordinates_;

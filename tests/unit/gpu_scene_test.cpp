@@ -3,26 +3,13 @@
 
 #include <string>
 
-#include "support/baked.h"
 #include "support/host_scene.h"
 #include "support/random_scene.h"
-#include "support/test_meshes.h"
 
 // The GPU's broad phase, its source run by teams of the host, beside Scene.
 
 namespace ist::testing {
 namespace {
-
-std::vector<GpuSolid> some_solids() {
-  static const Asset cube = baked(box_mesh({-1, -1, -1}, {1, 1, 1}), "cube", 60);
-  static const Asset off_centre = baked(box_mesh({0.5, -1, 0}, {1, 3, 0.25}), "slab", 60);
-  return {cube.view(),
-          off_centre.view(),
-          Shape(BallShape{0.5}),
-          Shape(BoxShape{{1, 0.5, 2}}),
-          Shape(HalfSpaceShape{{0, 0, 1}, -0.75}),
-          Shape(CapsuleShape{0.5, 1})};
-}
 
 NamedPairs names_of(const GpuScenePairs& found) {
   NamedPairs out;
