@@ -80,6 +80,13 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
+/// How many planes through edges a search has asked, of A's triangles and of B's, and how many pairs
+/// they kept apart. Those pairs are tested otherwise, at three times the cost.
+struct EdgeTally {
+  std::uint32_t asked[2] = {}, apart[2] = {};
+  bool pays(int side) const { return asked[side] <= 2 * apart[side] + 8; }
+};
+
 /// Two blocks whose triangles are tested by the planes of either side, in double, and by planes
 /// through their edges.
 class Meeting {
@@ -119,9 +126,26 @@ class Meeting {
     const bool told = margin_ != Margin::room;  // by the planes of flat blocks
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
     if (!told || !flat_[1])
-      lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
-    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
-    if (flat_[1]) lanes = edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); });
+      lanes = columns_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
+    return lanes;
+  }
+  /// Of `lanes`, B's triangles that planes through edges do not keep apart from A's triangle i.
+  std::uint32_t within_edges(std::uint32_t i, std::uint32_t lanes, EdgeTally& tally) {
+    const auto ask = [&](int side, std::uint32_t t) {
+      ++tally.asked[side];
+      return beyond(side, t);
+    };
+    if (flat_[0] || ((lanes & (lanes - 1)) != 0 && tally.pays(0))) {
+      const std::uint32_t apart = lanes & ask(0, i);
+      tally.apart[0] += static_cast<std::uint32_t>(std::popcount(apart));
+      lanes &= ~apart;
+    }
+    if (lanes != 0 && (flat_[1] || tally.pays(1))) {
+      const std::uint32_t left =
+          edges_.without(i, lanes, [&](std::uint32_t j) { return ask(1, j); });
+      tally.apart[1] += static_cast<std::uint32_t>(std::popcount(lanes & ~left));
+      lanes = left;
+    }
     return lanes;
   }
 
@@ -140,8 +164,12 @@ class Meeting {
     return (side == 0 ? search_.a : search_.b)->blocks[number_[side]];
   }
   const PlacedPlanes& planes_of(int side) const {
-    return side == 0 ? placed_planes(*search_.a, number_[0], nullptr, *scratch_.placed_a)
-                     : placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
+    const PlacedPlanes*& planes = planes_[side];
+    if (planes == nullptr)
+      planes = side == 0
+                   ? &placed_planes(*search_.a, number_[0], nullptr, *scratch_.placed_a)
+                   : &placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
+    return *planes;
   }
   /// Of the other block's vertices.
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
@@ -185,10 +213,11 @@ class Meeting {
   const float reach_;
   const std::uint32_t number_[2];
   const PlacedVertices* vertices_[2];
+  mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
   float apart_ = 0;    ///< no coordinates of both blocks differ by more
   float blur_;         ///< and planes through edges are floats
   bool flat_[2] = {};  ///< whose edges are asked
-  Columns planes_, edges_;
+  Columns columns_, edges_;
 };
 
 }  // namespace ist::HWY_NAMESPACE
