@@ -52,25 +52,27 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
     if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const auto over_b =
         hn::Set(d, blur) * hn::Load(d, b.length + l) + hn::Load(d, b.slack + l) * hn::Set(d, size);
-    hn::Vec<F> of_b[3], of_a[3];
-    for (int c = 0; c < 3; ++c) {
-      of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
-                  hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
-                 hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
-                hn::Set(d, a.offset[i]);
-      of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
-                  hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
-                 hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
-                hn::Load(d, b.offset + l);
-    }
-    // How far the heights reach to the nearer side of a plane.
+    // How far heights reach to the nearer side of a plane.
     const auto through = [](const hn::Vec<F>(&height)[3]) {
       return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
                      hn::Max(height[0], hn::Max(height[1], height[2])));
     };
-    const auto a_by = through(of_b), b_by = through(of_a);
-    const std::uint32_t may =
-        mask_bits(d, hn::And(a_by >= hn::Neg(over_a), b_by >= hn::Neg(over_b)));
+    hn::Vec<F> of_b[3], of_a[3];
+    for (int c = 0; c < 3; ++c)
+      of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
+                  hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
+                 hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
+                hn::Set(d, a.offset[i]);
+    const auto a_by = through(of_b);
+    const auto a_may = a_by >= hn::Neg(over_a);
+    if ((mask_bits(d, a_may) & lanes >> l) == 0) continue;
+    for (int c = 0; c < 3; ++c)
+      of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
+                  hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
+                 hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
+                hn::Load(d, b.offset + l);
+    const auto b_by = through(of_a);
+    const std::uint32_t may = mask_bits(d, hn::And(a_may, b_by >= hn::Neg(over_b)));
     const std::uint32_t clear = mask_bits(d, hn::And(a_by > over_a, b_by > over_b));
     out.clear |= clear << l;
     out.doubtful |= (may & ~clear) << l;
