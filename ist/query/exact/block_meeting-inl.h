@@ -82,8 +82,8 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
-/// How many planes through edges a search has asked, of A's triangles and of B's, and how many pairs
-/// they kept apart. Those pairs are tested otherwise, at three times the cost.
+/// How many planes through edges a search has asked, of A's triangles and of B's, and how many
+/// pairs they kept apart. Those pairs are tested otherwise, at three times the cost.
 struct EdgeTally {
   std::uint32_t asked[2] = {}, apart[2] = {};
   bool pays(int side) const { return asked[side] <= 2 * apart[side] + 8; }
@@ -216,9 +216,9 @@ class Meeting {
   const std::uint32_t number_[2];
   const PlacedVertices* vertices_[2];
   mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
-  float apart_ = 0;    ///< no coordinates of both blocks differ by more
-  float blur_;         ///< and planes through edges are floats
-  bool flat_[2] = {};  ///< whose edges are asked
+  float apart_ = 0;                             ///< no coordinates of both blocks differ by more
+  float blur_;                                  ///< and planes through edges are floats
+  bool flat_[2] = {};                           ///< whose edges are asked
   Columns columns_, edges_;
 };
 
