@@ -52,25 +52,27 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
     if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const auto over_b =
         hn::Set(d, blur) * hn::Load(d, b.length + l) + hn::Load(d, b.slack + l) * hn::Set(d, size);
-    hn::Vec<F> of_b[3], of_a[3];
-    for (int c = 0; c < 3; ++c) {
-      of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
-                  hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
-                 hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
-                hn::Set(d, a.offset[i]);
-      of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
-                  hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
-                 hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
-                hn::Load(d, b.offset + l);
-    }
-    // How far the heights reach to the nearer side of a plane.
+    // How far heights reach to the nearer side of a plane.
     const auto through = [](const hn::Vec<F>(&height)[3]) {
       return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
                      hn::Max(height[0], hn::Max(height[1], height[2])));
     };
-    const auto a_by = through(of_b), b_by = through(of_a);
-    const std::uint32_t may =
-        mask_bits(d, hn::And(a_by >= hn::Neg(over_a), b_by >= hn::Neg(over_b)));
+    hn::Vec<F> of_b[3], of_a[3];
+    for (int c = 0; c < 3; ++c)
+      of_b[c] = ((hn::Set(d, a.normal[0][i]) * hn::Load(d, b.corner[c][0] + l) +
+                  hn::Set(d, a.normal[1][i]) * hn::Load(d, b.corner[c][1] + l)) +
+                 hn::Set(d, a.normal[2][i]) * hn::Load(d, b.corner[c][2] + l)) -
+                hn::Set(d, a.offset[i]);
+    const auto a_by = through(of_b);
+    const auto a_may = a_by >= hn::Neg(over_a);
+    if ((mask_bits(d, a_may) & lanes >> l) == 0) continue;
+    for (int c = 0; c < 3; ++c)
+      of_a[c] = ((hn::Load(d, b.normal[0] + l) * hn::Set(d, a.corner[c][0][i]) +
+                  hn::Load(d, b.normal[1] + l) * hn::Set(d, a.corner[c][1][i])) +
+                 hn::Load(d, b.normal[2] + l) * hn::Set(d, a.corner[c][2][i])) -
+                hn::Load(d, b.offset + l);
+    const auto b_by = through(of_a);
+    const std::uint32_t may = mask_bits(d, hn::And(a_may, b_by >= hn::Neg(over_b)));
     const std::uint32_t clear = mask_bits(d, hn::And(a_by > over_a, b_by > over_b));
     out.clear |= clear << l;
     out.doubtful |= (may & ~clear) << l;
@@ -79,6 +81,13 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   out.doubtful &= lanes;
   return out;
 }
+
+/// How many planes through edges a search has asked, of A's triangles and of B's, and how many
+/// pairs they kept apart. Those pairs are tested otherwise, at three times the cost.
+struct EdgeTally {
+  std::uint32_t asked[2] = {}, apart[2] = {};
+  bool pays(int side) const { return asked[side] <= 2 * apart[side] + 8; }
+};
 
 /// Two blocks whose triangles are tested by the planes of either side, in double, and by planes
 /// through their edges.
@@ -119,9 +128,26 @@ class Meeting {
     const bool told = margin_ != Margin::room;  // by the planes of flat blocks
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
     if (!told || !flat_[1])
-      lanes = planes_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
-    if (lanes != 0 && flat_[0]) lanes &= ~beyond(0, i);
-    if (flat_[1]) lanes = edges_.without(i, lanes, [&](std::uint32_t j) { return beyond(1, j); });
+      lanes = columns_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
+    return lanes;
+  }
+  /// Of `lanes`, B's triangles that planes through edges do not keep apart from A's triangle i.
+  std::uint32_t within_edges(std::uint32_t i, std::uint32_t lanes, EdgeTally& tally) {
+    const auto ask = [&](int side, std::uint32_t t) {
+      ++tally.asked[side];
+      return beyond(side, t);
+    };
+    if (flat_[0] || ((lanes & (lanes - 1)) != 0 && tally.pays(0))) {
+      const std::uint32_t apart = lanes & ask(0, i);
+      tally.apart[0] += static_cast<std::uint32_t>(std::popcount(apart));
+      lanes &= ~apart;
+    }
+    if (lanes != 0 && (flat_[1] || tally.pays(1))) {
+      const std::uint32_t left =
+          edges_.without(i, lanes, [&](std::uint32_t j) { return ask(1, j); });
+      tally.apart[1] += static_cast<std::uint32_t>(std::popcount(lanes & ~left));
+      lanes = left;
+    }
     return lanes;
   }
 
@@ -140,8 +166,12 @@ class Meeting {
     return (side == 0 ? search_.a : search_.b)->blocks[number_[side]];
   }
   const PlacedPlanes& planes_of(int side) const {
-    return side == 0 ? placed_planes(*search_.a, number_[0], nullptr, *scratch_.placed_a)
-                     : placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
+    const PlacedPlanes*& planes = planes_[side];
+    if (planes == nullptr)
+      planes = side == 0
+                   ? &placed_planes(*search_.a, number_[0], nullptr, *scratch_.placed_a)
+                   : &placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
+    return *planes;
   }
   /// Of the other block's vertices.
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
@@ -185,10 +215,11 @@ class Meeting {
   const float reach_;
   const std::uint32_t number_[2];
   const PlacedVertices* vertices_[2];
-  float apart_ = 0;    ///< no coordinates of both blocks differ by more
-  float blur_;         ///< and planes through edges are floats
-  bool flat_[2] = {};  ///< whose edges are asked
-  Columns planes_, edges_;
+  mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
+  float apart_ = 0;                             ///< no coordinates of both blocks differ by more
+  float blur_;                                  ///< and planes through edges are floats
+  bool flat_[2] = {};                           ///< whose edges are asked
+  Columns columns_, edges_;
 };
 
 }  // namespace ist::HWY_NAMESPACE

@@ -144,6 +144,7 @@ class TriangleSearch : PairSigns {
       Meeting& both = now();
       lanes = found.clear;
       if (found.doubtful != 0) lanes |= both.straddling(i, found.doubtful);
+      if (lanes != 0) lanes = both.within_edges(i, lanes, edges_);
       if (lanes == 0) continue;
       for (; lanes != 0; lanes &= lanes - 1)
         add_pair(kWidth * number_a + i, both.vertices(0),
@@ -196,10 +197,10 @@ class TriangleSearch : PairSigns {
     find_ways_round<false>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
     heights.find_parts(parts);
-    for (std::uint32_t left = all & ~round.decided(parts, round.certain); left != 0;
+    for (std::uint32_t left = round.undecided(all, parts, round.certain); left != 0;
          left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
-    round.may_pierce(parts, round.certain, pierced);
+    round.pierced(parts, pierced);
     // Two edges pierce where triangles cross, none else.
     std::uint32_t once = 0, twice = 0, more = 0;
     for (const auto& of_side : pierced)
@@ -278,6 +279,7 @@ class TriangleSearch : PairSigns {
   ExactScratch& scratch_;
   PlacedMeshes placed_;
   float pad_b_, reach_, slack_;
+  EdgeTally edges_;
   KeptPairs* keep_ = nullptr;   ///< what is near is kept, and not tested yet
   std::uint32_t gathered_ = 0;  ///< for it
   CrossingsFound found_;

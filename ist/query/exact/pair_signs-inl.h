@@ -165,14 +165,25 @@ class PairSigns {
           out[s][k] = parts[s][k] & ~(plus & minus);
         }
     }
-    /// Whether all signs that matter are known.
-    std::uint32_t decided(const std::uint32_t (&parts)[2][3],
-                          const std::uint32_t (&known)[3][3]) const {
-      std::uint32_t asked[2][3], out = ~0u;
+    /// Those of `which` of which a sign that matters is unknown.
+    std::uint32_t undecided(std::uint32_t which, const std::uint32_t (&parts)[2][3],
+                            const std::uint32_t (&known)[3][3]) const {
+      which &= ~(each(known[0]) & each(known[1]) & each(known[2]));
+      if (which == 0) return 0;
+      std::uint32_t asked[2][3], decided = ~0u;
       may_pierce(parts, known, asked);
       for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j) out &= ~(asked[0][i] | asked[1][j]) | known[i][j];
-      return out;
+        for (int j = 0; j < 3; ++j) decided &= ~(asked[0][i] | asked[1][j]) | known[i][j];
+      return which & ~decided;
+    }
+    /// Pairs of which an edge goes through the other's triangle, once all signs that matter are
+    /// known.
+    void pierced(const std::uint32_t (&parts)[2][3], std::uint32_t (&out)[2][3]) const {
+      for (int k = 0; k < 3; ++k) {
+        const std::uint32_t of_b[3] = {positive[0][k], positive[1][k], positive[2][k]};
+        out[0][k] = parts[0][k] & alike(positive[k]);
+        out[1][k] = parts[1][k] & alike(of_b);
+      }
     }
   };
 
@@ -243,7 +254,7 @@ class PairSigns {
     find_ways_round<true>(pairs, count, round);
     std::uint32_t parts[2][3];
     heights.find_parts(parts);
-    return apart | (all & round.decided(parts, round.settled));
+    return apart | (all & ~round.undecided(all, parts, round.settled));
   }
 
   /// Pairs that are further apart than `reach` across or along the plane of one of them.

@@ -48,6 +48,7 @@ class ContactSearch : PairSigns {
           if (std::exchange(blocks, met) != met)
             now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
           lanes &= now->flush(i);
+          if (lanes != 0) lanes = now->within_edges(i, lanes, edges_);
           for (; lanes != 0; lanes &= lanes - 1) {
             const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
             gather(kWidth * number_a + i, now->vertices(0), kWidth * number_b + j,
@@ -184,6 +185,7 @@ class ContactSearch : PairSigns {
 
   ExactScratch& scratch_;
   PlacedMeshes placed_;
+  EdgeTally edges_;
 };
 
 SurfaceContact search_contact(const CrossingSearch& search, std::uint32_t count,
