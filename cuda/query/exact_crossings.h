@@ -76,7 +76,7 @@ class ExactCrossings {
     if (has) {
       for (int side = 0; side < 2; ++side)
         for (int k = 0; k < 3; ++k) view.set(side, k, pair_.corner(side, pair[side], k));
-      says = cross_pair<kExactly>(view, pair_.aside, end);
+      says = cross_pair < kExactly ? Signs::exact : Signs::doubles > (view, pair_.aside, end);
     }
     if (team_.any(says == PairSays::unsure)) {
       state_ = ExactState::unsure;

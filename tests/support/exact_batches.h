@@ -12,6 +12,7 @@
 
 #include "support/exact_pair.h"
 #include "support/host_batch.h"
+#include "support/random_mates.h"
 #include "support/random_pairs.h"
 #include "support/test_meshes.h"
 
@@ -57,7 +58,8 @@ inline std::vector<BatchPair> exact_pairs(unsigned seed, std::size_t count) {
 
 struct Differences {
   double volume = 0, push = 0, turn = 0, centre = 0;
-  std::size_t met = 0;
+  double area = 0, normal = 0;  ///< of the CPU's
+  std::size_t met = 0, touching = 0, flush = 0;
 };
 
 /// From the CPU's answers, in parts of the smaller solid's size.
@@ -79,16 +81,27 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
     worst.volume = std::max(worst.volume, std::abs(gpu.volume - cpu.volume) / (size2 * size));
     worst.push = std::max(worst.push, (gpu.force - cpu.force).norm() / size2);
     worst.turn = std::max(worst.turn, (gpu.torque - cpu.torque).norm() / (size2 * most));
-    if (cpu.volume > 1e-6 * size2 * size)
+    if (cpu.volume > 1e-6 * size2 * size || cpu.contact_area > 1e-6 * size2)
       worst.centre = std::max(worst.centre, (gpu.centroid - cpu.centroid).norm() / size);
+    EXPECT_EQ(gpu.touching, cpu.touching) << i;
+    worst.touching += cpu.touching ? 1 : 0;
+    worst.flush += cpu.contact_area > 0 ? 1 : 0;
+    // What is a rounding of nothing has no digits.
+    const double least = std::max(cpu.contact_area, 1e-9 * size2);
+    worst.area = std::max(worst.area, std::abs(gpu.contact_area - cpu.contact_area) / least);
+    if (cpu.contact_area > 1e-6 * size2)
+      worst.normal = std::max(worst.normal, (gpu.contact_normal - cpu.contact_normal).norm());
     EXPECT_LE(gpu.volume_min, cpu.volume_max) << i;
     EXPECT_GE(gpu.volume_max, cpu.volume_min) << i;
     EXPECT_LE(gpu.volume_max - gpu.volume_min,
               20 * (cpu.volume_max - cpu.volume_min) + 1e-12 * size2 * size)
         << i;
   }
-  std::printf("%zu of %zu meet; volume %.2g, push %.2g, turn %.2g, centroid %.2g\n", worst.met,
-              pairs.size(), worst.volume, worst.push, worst.turn, worst.centre);
+  std::printf(
+      "%zu of %zu meet, %zu touch, %zu in faces; volume %.2g, push %.2g, turn %.2g, centroid %.2g, "
+      "area %.2g, normal %.2g\n",
+      worst.met, pairs.size(), worst.touching, worst.flush, worst.volume, worst.push, worst.turn,
+      worst.centre, worst.area, worst.normal);
   return worst;
 }
 
@@ -97,7 +110,30 @@ inline void expect_near(const Differences& worst) {
   EXPECT_LE(worst.push, 1e-12);
   EXPECT_LE(worst.turn, 1e-12);
   EXPECT_LE(worst.centre, 1e-9);
+  EXPECT_LE(worst.area, 1e-9);
+  EXPECT_LE(worst.normal, 1e-9);
 }
+
+/// Random mates and their assets, each as it is and with A and B in each other's place; one in
+/// three a little off.
+struct MatedBatch {
+  std::vector<Asset> assets;
+  std::vector<BatchPair> pairs;
+
+  MatedBatch(unsigned seed, std::uint32_t count) {
+    RandomMates mates(seed);
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const Mate mate = mates.next(12);
+      for (const Extrusion* of : {&mate.a, &mate.b}) assets.push_back(surface(of->mesh(), "part"));
+      const double off = mates.one_in(3) ? std::ldexp(1.0, -mates.whole(2, 45)) : 0;
+      const Eigen::Vector3d t = mate.t + (mates.one_in(2) ? off : -off) * mate.way;
+      const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
+      const Pose placed = {{mate.q.w(), mate.q.x(), mate.q.y(), mate.q.z()}, {t.x(), t.y(), t.z()}};
+      pairs.push_back({2 * k, 2 * k + 1, still, placed, 1, 1});
+      pairs.push_back({2 * k + 1, 2 * k, placed, still, 1, 1});
+    }
+  }
+};
 
 /// Poses that engineers draw: turned by right angles, moved by parts of a side, scaled by powers of
 /// two, copies in place.

@@ -30,6 +30,18 @@ TEST(GpuExact, AlignedAnswersAreTheCpus) {
   expect_near(worst);
 }
 
+/// Where parts touch, the area and the normal of the faces that lie on each other too.
+TEST(GpuExact, MatesTouchAsOnTheCpu) {
+  const MatedBatch mated(32, 300);
+  HostBatch batch(views_of(mated.assets));
+  const Differences worst =
+      compare_exactly(mated.assets, mated.pairs, batch.run(mated.pairs, Measure::exact));
+  EXPECT_GT(worst.met, 200u);
+  EXPECT_GT(worst.flush, 150u);
+  EXPECT_GT(worst.touching, worst.flush);
+  expect_near(worst);
+}
+
 /// Boxes and slabs are placed in floats, which end long before the range of ratios does.
 TEST(GpuExact, AnyRatioOfSizes) {
   std::vector<BatchPair> pairs;
@@ -85,7 +97,7 @@ TEST(GpuExact, LittleRoomDoesNotShow) {
 /// Which lane does what, and when, must not show.
 TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = exact_pairs(34, 30);
-  for (const BatchPair& pair : aligned_pairs(36, 20)) pairs.push_back(pair);
+  for (const BatchPair& pair : aligned_pairs(36, 40)) pairs.push_back(pair);
   HostBatch batch(exact_solids());
   const std::vector<Penetration> expected = batch.run(pairs, Measure::exact, 1);
   expect_near(compare_exactly(exact_assets(), pairs, expected));
