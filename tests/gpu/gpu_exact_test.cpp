@@ -46,6 +46,8 @@ std::vector<Penetration> ask_device(const std::vector<GpuSolid>& all,
 TEST_F(GpuExactTest, HasTheBitsOfAWarpOnTheHost) {
   std::vector<BatchPair> pairs = exact_pairs(41, 60);
   for (const BatchPair& pair : aligned_pairs(42, 40)) pairs.push_back(pair);
+  const std::vector<BatchPair> grazing = grazing_pairs();
+  for (std::size_t k = 0; k < grazing.size(); k += 12) pairs.push_back(grazing[k]);
   pairs[20].pose_b.t[0] = std::nan("");
   pairs[30].scale_b = -1;
   pairs[40].a = 1000;
@@ -96,6 +98,8 @@ TEST_F(GpuExactTest, MatesTouchAsOnTheCpu) {
       compare_exactly(mated.assets, mated.pairs, ask_device(views_of(mated.assets), mated.pairs));
   EXPECT_GT(worst.flush, 1000u);
   expect_near(worst);
+  const std::vector<BatchPair> grazing = grazing_pairs();
+  expect_near(compare_exactly(exact_assets(), grazing, ask_device(exact_solids(), grazing)));
 }
 
 TEST_F(GpuExactTest, OracleRowsAreTheCpusAndTrue) {
