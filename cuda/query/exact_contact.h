@@ -72,8 +72,8 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
       has ? cross_pair<Signs::settled>(view, of.aside, end, of.reach[0]) : PairSays::apart;
   if (team.any(says == PairSays::crosses)) return false;
   const bool near = says != PairSays::apart;
-  bool touch = near && flush(of.touch, view) && add_common_area(view, memory.contact);
-  touches = team.any(touch) || touches;
+  touches =
+      team.any(near && flush(of.touch, view) && add_common_area(view, memory.contact)) || touches;
   if (!touches) touches = team.any(near && come_within(of.touch, view));
   return true;
 }
