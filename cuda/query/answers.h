@@ -20,6 +20,16 @@ struct PenetrationRow : WorldSums {
   QueryStatus status;
   std::uint32_t node_visits, sphere_pairs;
   double volume_min, volume_max;
+  double contact_area = 0;
+  Vec3 contact_normal = {0, 0, 0};
+  bool touching = false;
+};
+
+/// What another answer becomes where solids touch.
+struct ContactRow {
+  double volume, volume_min, volume_max, contact_area;
+  Vec3 centroid, contact_normal;
+  bool touching;
 };
 
 struct SeparationRow {

@@ -48,6 +48,15 @@ IST_HD inline const SolidRef& solid_of(const SolidPairs& batch, const GpuPlacedS
   return batch.solids[side.solid[i]];
 }
 
+/// [u³] No overlap of pair i is larger.
+IST_HD inline double smaller_volume(const SolidPairs& batch, std::uint32_t i) {
+  const auto volume = [&](const GpuPlacedSolids& side) {
+    const double scale = scale_of(side, i);
+    return solid_of(batch, side, i).volume * (scale * scale * scale);
+  };
+  return std::fmin(volume(batch.pairs.a), volume(batch.pairs.b));
+}
+
 /// Places B of pair i as A sees it; false if it cannot be.
 IST_HD inline bool place_pair(const SolidPairs& batch, const GpuPlacedSolids& a,
                               const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {

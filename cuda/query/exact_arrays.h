@@ -21,6 +21,7 @@ IST_HD constexpr std::size_t exact_room(int pass) {
 /// How the work on a pair stands.
 enum class ExactState : std::uint32_t {
   ok,
+  nothing,  ///< answered, but the volume may be nothing: do they touch?
   unsure,   ///< doubles do not tell
   no_room,  ///< more than the team's memory holds
   later,    ///< others have left no room in this round
@@ -29,14 +30,14 @@ enum class ExactState : std::uint32_t {
 
 /// A round of the first pass takes pairs through its steps, of which each is a small kernel: they
 /// are placed, searched for triangles that may cross, summed by signs in doubles, and where these
-/// do not tell by exact ones. The next round begins where the room for triangles has come to its
-/// end.
+/// do not tell by exact ones; where there is no volume they are searched for faces that touch. The
+/// next round begins where the room for triangles has come to its end.
 struct ExactRound {
-  std::uint32_t first, count;              ///< of the pairs listed
-  std::uint32_t searched, summed, redone;  ///< of them taken
-  std::uint32_t found;                     ///< of them, searches that are done
-  std::uint32_t unsure;                    ///< of them
-  std::uint32_t chunks;                    ///< taken
+  std::uint32_t first, count;                       ///< of the pairs listed
+  std::uint32_t searched, summed, redone, touched;  ///< of them taken
+  std::uint32_t found;                              ///< of them, searches that are done
+  std::uint32_t unsure, nothing;                    ///< of them
+  std::uint32_t chunks;                             ///< taken
 };
 
 /// Zero at first.
@@ -67,9 +68,16 @@ struct ExactFrame {
   PairPlace place;
   exact::Point aside;
   double moved[2];  ///< no point of a surface is further from where it ought to be
+  double touch;     ///< what comes as near touches
   float reach[2];   ///< boxes that are as near are opened: A's frame, B's
   float pad[2];     ///< what rounding does to boxes of A in B's frame, of B in A's
   float slack;      ///< and to slabs
+};
+
+/// What the sums of a pair leave to be asked: A's unit frame.
+struct ExactLeft {
+  double volume, error;
+  double push;  ///< no less than the force's length
 };
 
 /// A pair of a round: what its steps hand on.
@@ -80,6 +88,8 @@ struct ExactQuery {
   std::uint32_t visits;
   ExactChain crossing, near;  ///< triangles that may cross; others whose signs are not settled
   std::uint32_t unsure;       ///< in the k-th query the k-th of the round that doubles do not tell
+  std::uint32_t nothing;      ///< likewise the k-th that may have no volume
+  ExactLeft left;             ///< of such a one
 };
 
 /// A block of which triangles cross others.
@@ -116,7 +126,7 @@ struct ExactRoom {
   std::uint32_t most_waiting;
   ExactPool pool;
 
-  /// What the largest mesh takes, of `blocks`: zero before a pass.
+  /// What the largest mesh takes, of `blocks`: all but the flood is zero before a pass.
   IST_HD static std::size_t fixed(std::uint32_t blocks) {
     const std::size_t words = (blocks + 31) / 32;
     return (4 * (3 * std::size_t{blocks} + 6 * words) + 255) / 256 * 256;

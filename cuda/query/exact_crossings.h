@@ -49,11 +49,11 @@ class ExactCrossings {
 
   /// Blocks of which triangles cross others get records, in the order of the lanes.
   IST_HD void mark(int side, bool crosses, std::uint32_t block) {
+    bool fresh = crosses && room_.record[side][block] == 0;
     for (;;) {
-      const bool fresh = crosses && room_.record[side][block] == 0;
       int waiting = 0;
       const int next = team_.first(fresh, waiting);
-      if (next < 0) return;
+      if (next < 0) break;
       if (records_ == room_.most_records) {
         state_ = ExactState::no_room;
         return;
@@ -65,8 +65,9 @@ class ExactCrossings {
         words[w] = w == 0 ? made : w == 1 ? static_cast<std::uint32_t>(side) << 16 : 0;
       ++records_;
       if (team_.lane() == 0) room_.record[side][made] = records_;
-      team_.sync();
+      fresh = fresh && block != made;
     }
+    team_.sync();
   }
 
   IST_HD void cross(bool has, const std::uint32_t (&pair)[2]) {
@@ -76,7 +77,7 @@ class ExactCrossings {
     if (has) {
       for (int side = 0; side < 2; ++side)
         for (int k = 0; k < 3; ++k) view.set(side, k, pair_.corner(side, pair[side], k));
-      says = cross_pair<kExactly>(view, pair_.aside, end);
+      says = cross_pair < kExactly ? Signs::exact : Signs::doubles > (view, pair_.aside, end);
     }
     if (team_.any(says == PairSays::unsure)) {
       state_ = ExactState::unsure;

@@ -95,6 +95,14 @@ class ExactInsides {
     room_.flood[atomic_add(&memory_.flooded, 1)] = block;
   }
 
+  // A block's neighbours are looked at by lanes side by side: each waits for memory twice.
+  static constexpr std::uint32_t kOfGroup = Team::kWidth < 8 ? 1 : 8;
+  static constexpr std::uint32_t kGroups = static_cast<std::uint32_t>(Team::kWidth) / kOfGroup;
+  IST_HD std::uint32_t group() const { return static_cast<std::uint32_t>(team_.lane()) / kOfGroup; }
+  IST_HD std::uint32_t place_in_group() const {
+    return static_cast<std::uint32_t>(team_.lane()) % kOfGroup;
+  }
+
   /// From blocks whose edges are pierced on, and whole shells.
   IST_HD void flood(int side) {
     const MeshTree& mesh = pair_.mesh[side];
@@ -103,13 +111,12 @@ class ExactInsides {
     if (team_.lane() == 0) memory_.flooded = 0;
     team_.sync();
     bool any = false;
-    for (std::uint32_t r = static_cast<std::uint32_t>(team_.lane()); r < records_;
-         r += static_cast<std::uint32_t>(Team::kWidth)) {
+    for (std::uint32_t r = group(); r < records_; r += kGroups) {
       const CrossedRef& record = room_.records[r];
       if (record.of_b != side || record.all_pierced() == 0) continue;
       any = true;
       const MeshBlock& block = mesh.blocks[record.block];
-      for (std::uint32_t k = 0; k < block.neighbours; ++k) {
+      for (std::uint32_t k = place_in_group(); k < block.neighbours; k += kOfGroup) {
         const std::uint32_t entry = mesh.neighbours[block.first_neighbour + k];
         if ((record.inside >> entry % kWidth & 1) != 0) wait(side, entry / kWidth);
       }
@@ -134,10 +141,9 @@ class ExactInsides {
       const std::uint32_t flooded = memory_.flooded;
       if (done == flooded) break;
       team_.sync();
-      for (std::uint32_t i = done + static_cast<std::uint32_t>(team_.lane()); i < flooded;
-           i += static_cast<std::uint32_t>(Team::kWidth)) {
+      for (std::uint32_t i = done + group(); i < flooded; i += kGroups) {
         const MeshBlock& block = mesh.blocks[room_.flood[i]];
-        for (std::uint32_t k = 0; k < block.neighbours; ++k)
+        for (std::uint32_t k = place_in_group(); k < block.neighbours; k += kOfGroup)
           wait(side, mesh.neighbours[block.first_neighbour + k] / kWidth);
       }
       done = flooded;

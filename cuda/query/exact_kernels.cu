@@ -13,10 +13,11 @@ namespace {
 constexpr unsigned kThreadsEach = 128;  ///< of what one thread does of a pair
 constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr unsigned kWholeWarps = 2;
+constexpr unsigned kWholeWarps = 2;  ///< of kernels that need more memory each
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 // A multiprocessor; more leave too few registers.
-constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4;
+constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4,
+              kTouchBlocks = 5;
 
 /// Lists pairs whose boxes meet.
 __global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays batch) {
@@ -32,7 +33,7 @@ __global__ void __launch_bounds__(kThreadsEach)
     place_meshes(const ExactArrays batch, const std::uint32_t n) {
   const std::uint32_t first = end_of(round_of(batch, n + 1));
   const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x, count = pairs_from(batch, first);
-  if (k == 0) round_of(batch, n) = {first, count, 0, 0, 0, 0, 0, 0};
+  if (k == 0) round_of(batch, n) = {first, count, 0, 0, 0, 0, 0, 0, 0, 0};
   if (k < count) place_query(batch, k, first + k);
 }
 
@@ -58,11 +59,23 @@ __global__ void __launch_bounds__(kThreads, kExactly ? kExactBlocks : kSumBlocks
   const unsigned warp = threadIdx.x / 32;
   ExactRound& round = round_of(batch, n);
   const ExactRoom room = batch.room(0, blockIdx.x * kWarps + warp);
+  if (!kExactly && n == 0) clear_marks(WarpTeam(), room);
   if (kExactly && blockIdx.x == 0 && threadIdx.x == 0) batch.counters->exactly += round.unsure;
   by_warps(kExactly ? round.unsure : searched_of(round), kExactly ? &round.redone : &round.summed,
            [&](const WarpTeam& team, std::uint32_t k) {
              sum_query<kExactly>(team, batch, round, k, room, pair[warp], memory[warp]);
            });
+}
+
+__global__ void __launch_bounds__(kWholeThreads, kTouchBlocks)
+    touch_meshes(const ExactArrays batch, const std::uint32_t n) {
+  __shared__ Raw<ExactPair, kWholeWarps> pair;
+  __shared__ Raw<ExactContactMemory, kWholeWarps> memory;
+  const unsigned warp = threadIdx.x / 32;
+  ExactRound& round = round_of(batch, n);
+  by_warps(round.nothing, &round.touched, [&](const WarpTeam& team, std::uint32_t k) {
+    touch_query(team, batch, k, pair[warp], memory[warp]);
+  });
 }
 
 __global__ void __launch_bounds__(kWholeThreads, kWholeBlocks)
@@ -71,22 +84,23 @@ __global__ void __launch_bounds__(kWholeThreads, kWholeBlocks)
   const unsigned warp = threadIdx.x / 32;
   const ExactRoom room = batch.room(pass, blockIdx.x * kWholeWarps + warp);
   const std::uint32_t listed = load_fresh(&batch.counters->listed[pass]);
-  by_warps(pairs_of_pass(batch, pass, rounds), &batch.counters->taken[pass],
-           [&](const WarpTeam& team, std::uint32_t k) {
-             ask_pass(team, batch, pass, rounds, listed, k, room, memory[warp]);
-           });
+  const std::uint32_t count = pairs_of_pass(batch, pass, rounds);
+  if (count > 0) clear_marks(WarpTeam(), room);
+  by_warps(count, &batch.counters->taken[pass], [&](const WarpTeam& team, std::uint32_t k) {
+    ask_pass(team, batch, pass, rounds, listed, k, room, memory[warp]);
+  });
 }
 
-/// Blocks whose teams of a pass find room, of which the marks of blocks are zero between pairs.
-unsigned ready_rooms(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
-                     int most_blocks, cudaStream_t stream) {
-  const std::size_t each = batch.bytes_of_team(pass);
-  const auto blocks = static_cast<unsigned>(
-      std::clamp(bytes / (warps * each), std::size_t{1}, static_cast<std::size_t>(most_blocks)));
-  check(cudaMemset2DAsync(pass == 0 ? batch.rooms : batch.memory, each, 0,
-                          ExactRoom::fixed(batch.most_blocks), std::size_t{warps} * blocks, stream),
-        "readying a pass");
-  return blocks;
+/// Blocks of so many warps for all pairs, of a grid.
+unsigned blocks_of(const ExactArrays& batch, unsigned warps, int grid) {
+  return std::min(blocks_for(batch.pairs.count, warps), static_cast<unsigned>(grid));
+}
+/// And whose teams of a pass find room.
+unsigned blocks_with_room(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
+                          int grid) {
+  const std::size_t all = bytes / (warps * batch.bytes_of_team(pass));
+  return static_cast<unsigned>(
+      std::clamp(all, std::size_t{1}, std::size_t{blocks_of(batch, warps, grid)}));
 }
 
 }  // namespace
@@ -95,6 +109,7 @@ void find_exact_grids(Grids& grids) {
   grids.exact = {
       blocks_at_a_time(search_meshes, kThreads),
       {blocks_at_a_time(sum_meshes<false>, kThreads), blocks_at_a_time(sum_meshes<true>, kThreads)},
+      blocks_at_a_time(touch_meshes, kWholeThreads),
       blocks_at_a_time(ask_meshes, kWholeThreads)};
 }
 
@@ -121,12 +136,12 @@ void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t str
   const unsigned blocks =
       blocks_for(std::min<std::uint64_t>(batch.pairs.count, batch.query_room), kThreadsEach);
   const unsigned sums =
-      ready_rooms(batch, 0, batch.bytes - static_cast<std::size_t>(batch.rooms - batch.memory),
-                  kWarps, grids.exact.sum[0], stream);
+      blocks_with_room(batch, 0, batch.bytes - static_cast<std::size_t>(batch.rooms - batch.memory),
+                       kWarps, grids.exact.sum[0]);
   for (std::uint32_t n = 0; n < rounds; ++n) {
     place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
     check_launch("placing meshes");
-    search_meshes<<<static_cast<unsigned>(grids.exact.search), kThreads, 0, stream>>>(batch, n);
+    search_meshes<<<blocks_of(batch, kWarps, grids.exact.search), kThreads, 0, stream>>>(batch, n);
     check_launch("searching meshes");
     sum_meshes<false><<<sums, kThreads, 0, stream>>>(batch, n);
     check_launch("summing meshes");
@@ -134,10 +149,13 @@ void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t str
         <<<std::min(sums, static_cast<unsigned>(grids.exact.sum[1])), kThreads, 0, stream>>>(batch,
                                                                                              n);
     check_launch("summing meshes by exact signs");
+    touch_meshes<<<blocks_of(batch, kWholeWarps, grids.exact.touch), kWholeThreads, 0, stream>>>(
+        batch, n);
+    check_launch("looking for faces that touch");
   }
   for (int pass = 1; pass < kExactPasses; ++pass) {
     const unsigned whole =
-        ready_rooms(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole, stream);
+        blocks_with_room(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole);
     ask_meshes<<<whole, kWholeThreads, 0, stream>>>(batch, pass, rounds);
     check_launch("asking what has no room");
   }

@@ -104,6 +104,7 @@ struct ExactSumMemory {
     };
   };
   exact::Point origin;
+  ExactLeft left;
   double sum[ExactSum::kCount][32];
   std::uint32_t flooded;  ///< blocks, of one side
 
@@ -118,11 +119,21 @@ struct ExactSumMemory {
   }
 };
 
-/// Of a team that does both, one after the other.
+/// Of faces that lie on each other, a lane's.
+struct ContactSums {
+  enum { kArea, kNormal, kMoment = kNormal + 3, kCount = kMoment + 3 };
+  double of[kCount][32];
+  CornerMemory corners;
+};
+struct ExactContactMemory : ExactSearchMemory {
+  ContactSums contact;
+};
+
+/// Of a team that does all, one after the other.
 struct ExactWholeMemory {
   ExactPair pair;
   union {
-    ExactSearchMemory search;
+    ExactContactMemory search;
     ExactSumMemory sum;
   };
 };

@@ -6,6 +6,7 @@
 #include "base/team.h"
 #include "cuda/base/atomics.h"
 #include "cuda/query/exact_memory.h"
+#include "cuda/query/exact_pair.h"
 
 namespace ist::gpu {
 
@@ -48,9 +49,6 @@ enum class Apart {
 
 /// Whether the plane of the other side's triangle has a side's on one side.
 IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uint32_t (&pair)[2]) {
-  const auto largest = [](const exact::Point& x) {
-    return std::fmax(std::abs(x.x), std::fmax(std::abs(x.y), std::abs(x.z)));
-  };
   const std::uint32_t other = side == 0 ? pair[1] : pair[0], one = side == 0 ? pair[0] : pair[1];
   const exact::Point o = of.corner(1 - side, other, 0);
   const exact::Point u = of.corner(1 - side, other, 1) - o, v = of.corner(1 - side, other, 2) - o;
@@ -64,8 +62,7 @@ IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uin
     const exact::Point r = of.corner(side, one, k) - o;
     const exact::Determinant height = plane.height(r);
     sum += height.sign;
-    // What the room moves: six products of three numbers; moving aside is within the room too.
-    const double moved = 12 * room * longest * (2 * largest(r) + longest);
+    const double moved = moved_height(2 * room, longest, r);  // moving aside is within the room
     settled = settled && std::abs(height.value) > height.error + moved;
   }
   if (sum != 3 && sum != -3) return Apart::no;
@@ -124,8 +121,10 @@ class ExactSearch {
     }
   }
 
-  /// False where the memory does not hold it.
-  IST_HD bool run() {
+  /// Calls sift(first, count) of pairs of triangles that wait. False where that says so, or where
+  /// the memory does not hold them.
+  template <class Sift>
+  IST_HD bool run(const Sift& sift) {
     while (count_ > 0) {
       if (!open()) return false;
       for (std::uint32_t next = 0; next < found_; ++next) {
@@ -135,11 +134,11 @@ class ExactSearch {
         const int met = meet_triangles(static_cast<int>(left % 256), static_cast<int>(left / 256));
         for (int first = 0; first < met; first += Team::kWidth) {
           test_planes(first, met);
-          if (queued_ >= kBatch && !sift()) return false;
+          if (queued_ >= kBatch && !sift_next(sift)) return false;
         }
       }
     }
-    return queued_ == 0 || sift();
+    return queued_ == 0 || sift_next(sift);
   }
 
   std::uint32_t visits = 0;  ///< pairs of nodes opened
@@ -481,11 +480,12 @@ class ExactSearch {
   }
 
   /// The next that wait.
-  IST_HD bool sift() {
+  template <class Sift>
+  IST_HD bool sift_next(const Sift& sift) {
     const std::uint32_t count = queued_ < kBatch ? queued_ : kBatch, first = head_;
     head_ = (head_ + count) % kExactWaiting;
     queued_ -= count;
-    return sift_triangles(team_, pair_, memory_, first, count);
+    return sift(first, count);
   }
 
   /// Whether a triangle's plane has another, of a side, on one side for certain.

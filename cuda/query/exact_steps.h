@@ -5,6 +5,7 @@
 
 #include "cuda/query/answers.h"
 #include "cuda/query/batch_steps.h"
+#include "cuda/query/exact_contact.h"
 #include "cuda/query/exact_insides.h"
 #include "cuda/query/exact_search.h"
 #include "query/exact/exact_in_world.h"
@@ -69,7 +70,9 @@ IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, Exac
   frame.moved[1] =
       moved_by_poses(pose_of(batch.pairs.a, i).t, offset(batch.pairs.a),
                      pose_of(batch.pairs.b, i).t, offset(batch.pairs.b), b.extent(), place) +
-      place.a_from_b.scale * moved_in_mesh(b) + aside.far;
+      place.a_from_b.scale * moved_in_mesh(b);
+  frame.touch = touching_distance(frame.moved[0] + frame.moved[1], a, b, place.a_from_b);
+  frame.moved[1] += aside.far;
   frame.reach[0] = static_cast<float>(2 * (frame.moved[0] + frame.moved[1]) * (1 + 1e-6));
   frame.reach[1] = frame.reach[0] * static_cast<float>(place.b_from_a.scale) * (1 + 1e-6f);
   frame.pad[0] = placing_pad(place.b_from_a.scale, place.b_from_a.t, a);
@@ -116,9 +119,10 @@ IST_HD void load_query(const Team& team, const ExactArrays& batch, const ExactQu
   load_pair(team, batch, query.pair, pair);
 }
 
-/// Adds what the lanes have summed, always in one order, and answers pair i.
+/// Adds what the lanes have summed, always in one order, and answers pair i; whether its volume is
+/// no more than sums round.
 template <class Team>
-IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_t i,
+IST_HD bool write_exact(const Team& team, const ExactArrays& batch, std::uint32_t i,
                         const ExactPair& pair, ExactSumMemory& memory, std::uint32_t visits,
                         std::uint32_t crossings) {
   team.sync();
@@ -134,21 +138,18 @@ IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   }
   double total[ExactSum::kCount];
   for (int k = ExactSum::kRounding; k < ExactSum::kCount; ++k) total[k] = team.sum(sum[k][lane]);
-  if (lane != 0) return;
+  const double volume = (high + low) / 6, rounding = 1.01 * (total[ExactSum::kRounding] / 6);
+  const bool nothing = team.broadcast(std::abs(volume) <= rounding ? 1 : 0, 0) != 0;
+  if (lane != 0) return nothing;
   const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
-  const double volume = (high + low) / 6;
   const ExactInWorld sums(volume, vector(ExactSum::kMoment), vector(ExactSum::kPush),
                           vector(ExactSum::kTurn), memory.origin, pair.place);
-  const SolidRef &a = solid_of(batch, batch.pairs.a, i), &b = solid_of(batch, batch.pairs.b, i);
-  const auto solid = [&](const SolidRef& of, const GpuPlacedSolids& side) {
-    const double scale = scale_of(side, i);
-    return of.volume * (scale * scale * scale);
-  };
-  const double most = std::fmin(solid(a, batch.pairs.a), solid(b, batch.pairs.b));
-  const double error = (1.01 * (total[ExactSum::kRounding] / 6 + total[ExactSum::kLayers]) +
-                        4 * exact::kHalfUnit * std::abs(volume)) *
-                           pair.place.unit3() +
-                       std::fmax(0.0, -sums.volume);
+  const double most = smaller_volume(batch, i);
+  memory.left.volume = std::abs(volume);
+  memory.left.error = 1.01 * (total[ExactSum::kRounding] / 6 + total[ExactSum::kLayers]) +
+                      4 * exact::kHalfUnit * std::abs(volume);
+  memory.left.push = exact::length_bound(vector(ExactSum::kPush));
+  const double error = memory.left.error * pair.place.unit3() + std::fmax(0.0, -sums.volume);
   PenetrationRow row = {};
   row.volume = std::fmax(0.0, sums.volume);
   row.volume_min = std::fmin(most, std::fmax(0.0, row.volume - error));
@@ -161,6 +162,15 @@ IST_HD void write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   row.node_visits = visits;
   row.sphere_pairs = crossings;
   write_row(batch.answers, i, row);
+  return nothing;
+}
+
+/// Of a room that no pair had yet.
+template <class Team>
+IST_HD void clear_marks(const Team& team, const ExactRoom& room) {
+  const std::ptrdiff_t words = room.flood - room.record[0];
+  for (std::ptrdiff_t w = team.lane(); w < words; w += Team::kWidth) room.record[0][w] = 0;
+  team.sync();
 }
 
 /// Clears what a pair has left in the room.
@@ -177,7 +187,7 @@ IST_HD void clear_room(const Team& team, const ExactRoom& room, std::uint32_t re
   team.sync();
 }
 
-/// Answers pair i if it can, ok, from what was found.
+/// Answers pair i if it can, ok or nothing, from what was found.
 template <bool kExactly, class Team>
 IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
                               const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
@@ -196,7 +206,10 @@ IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::u
                                     crossings.count() > 0)
            .run())
     state = ExactState::unsure;
-  if (state == ExactState::ok) write_exact(team, batch, i, pair, memory, visits, crossings.count());
+  if (state == ExactState::ok &&
+      write_exact(team, batch, i, pair, memory, visits, crossings.count()) &&
+      crossing.count + near.count > 0)
+    state = ExactState::nothing;
   clear_room(team, room, crossings.records());
   return state;
 }
@@ -251,7 +264,9 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
   ExactPool pool = batch.pool;
   pool.taken = &round.chunks;
   ExactSearch<Team> search(team, pair, memory, memory.waiting, ExactSearchMemory::kWaiting, pool);
-  const bool fits = search.run();
+  const bool fits = search.run([&](std::uint32_t first, std::uint32_t count) {
+    return sift_triangles(team, pair, memory, first, count);
+  });
   if (team.lane() == 0) {
     query.state = fits ? ExactState::ok : ExactState::no_room;
     // What others left no chunks for is listed again.
@@ -272,7 +287,7 @@ IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& ro
                       std::uint32_t k, const ExactRoom& room, ExactPair& pair,
                       ExactSumMemory& memory) {
   if constexpr (kExactly) k = batch.queries[k].unsure;
-  const ExactQuery& query = batch.queries[k];
+  ExactQuery& query = batch.queries[k];
   ExactState state = query.state;
   if (state == ExactState::ok) {
     load_query(team, batch, query, pair);
@@ -282,8 +297,21 @@ IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& ro
   if (state == ExactState::ok || state == ExactState::later || team.lane() != 0) return;
   if (!kExactly && state == ExactState::unsure)
     batch.queries[atomic_add(&round.unsure, 1)].unsure = k;
-  else
+  else if (state == ExactState::nothing) {
+    query.left = memory.left;
+    batch.queries[atomic_add(&round.nothing, 1)].nothing = k;
+  } else
     leave_to_next(batch, 0, query.pair);
+}
+
+/// Asks the k-th of a round's pairs without a volume whether they touch.
+template <class Team>
+IST_HD void touch_query(const Team& team, const ExactArrays& batch, std::uint32_t k,
+                        ExactPair& pair, ExactContactMemory& memory) {
+  const ExactQuery& query = batch.queries[batch.queries[k].nothing];
+  load_query(team, batch, query, pair);
+  find_contact(team, batch, query.pair, pair, memory, query.left, memory.waiting,
+               ExactSearchMemory::kWaiting);
 }
 
 /// Pairs that a later pass asks; of the first of them also those after the last of `rounds`.
@@ -313,12 +341,18 @@ IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::
   ExactSearch<Team> search(team, memory.pair, memory.search, room.waiting, room.most_waiting,
                            room.pool);
   ExactState state = ExactState::no_room;
-  if (search.run()) {
+  if (search.run([&](std::uint32_t first, std::uint32_t count) {
+        return sift_triangles(team, memory.pair, memory.search, first, count);
+      })) {
     const ExactChain crossing = memory.search.crossing, near = memory.search.near;
     state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
                               near, search.visits);
   }
-  if (state != ExactState::ok && team.lane() == 0) leave_to_next(batch, pass, i);
+  if (state == ExactState::nothing) {
+    const ExactLeft left = memory.sum.left;
+    find_contact(team, batch, i, memory.pair, memory.search, left, room.waiting, room.most_waiting);
+  } else if (state != ExactState::ok && team.lane() == 0)
+    leave_to_next(batch, pass, i);
 }
 
 }  // namespace ist::gpu

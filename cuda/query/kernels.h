@@ -20,7 +20,7 @@ struct TriangleGrids {
 struct ExactGrids {
   int search;
   int sum[2];  ///< by signs in doubles, by exact ones
-  int whole;
+  int touch, whole;
 };
 
 struct MeshGapGrids {

@@ -35,6 +35,9 @@ class Penetration:
     sphere_pairs: Final[_DeviceArray | None]  # (n,)
     volume_min: Final[_DeviceArray | None]  # (n,) [u³] of the true volume; by spheres: the volume
     volume_max: Final[_DeviceArray | None]  # (n,) [u³]
+    contact_area: Final[_DeviceArray | None]  # (n,) [u²] exact, where they touch: of faces on each other
+    contact_normal: Final[_DeviceArray | None]  # (n, 3) unit, from A to B; zero without faces
+    touching: Final[_DeviceArray | None]  # (n,) bool, exact: they meet and the volume is 0
 
 @final
 class Separation:

@@ -15,6 +15,7 @@ constexpr const char* kKinds[] = {"int", "uint", "float"};  // DLPack's first co
 constexpr std::uint32_t kDlpack = 1;                        // major version
 
 std::string name_of(const ElementType& type) {
+  if (type == py::dtype<bool>()) return "bool";
   if (type.lanes != 1 || type.code >= std::size(kKinds))
     return "of DLPack's code " + std::to_string(type.code);
   return kKinds[type.code] + std::to_string(type.bits);
@@ -111,12 +112,14 @@ Described by_dlpack(const py::object& value, const WantedArray& wanted, int devi
   throw type_error(wanted.name + ": its __dlpack__ does not return a tensor capsule");
 }
 
+/// Of typestr, at the place of DLPack's code.
+constexpr const char* kLetters = "iuf???b";
+
 std::optional<ElementType> type_of(const std::string& typestr) {
   if (typestr.size() < 3 || typestr[0] == '>') return std::nullopt;
-  const char* const kinds = "iuf";
-  const char* const kind = std::strchr(kinds, typestr[1]);
+  const char* const kind = std::strchr(kLetters, typestr[1]);
   if (kind == nullptr || typestr[2] < '1' || typestr[2] > '8') return std::nullopt;
-  return ElementType{static_cast<std::uint8_t>(kind - kinds),
+  return ElementType{static_cast<std::uint8_t>(kind - kLetters),
                      static_cast<std::uint8_t>(8 * (typestr[2] - '0')), 1};
 }
 
@@ -242,7 +245,7 @@ py::object to_dlpack(const py::object& held, const py::object& stream,
 }
 
 std::string typestr_of(const ElementType& type) {
-  return std::string("<") + "iuf"[type.code] + std::to_string(type.bits / 8);
+  return std::string("<") + kLetters[type.code] + std::to_string(type.bits / 8);
 }
 
 py::dict interface_of(const DeviceArray& self) {

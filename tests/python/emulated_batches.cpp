@@ -73,30 +73,32 @@ void write(const std::vector<Answer>& found, const Columns& to) {
 
 }  // namespace
 
-bool gpu_available(int device, std::string*) { return device == 0; }
+bool gpu_available(int device, std::string*) { return device >= 0 && device < 16; }
 GpuInfo gpu_info(int) { return {"emulated", 90, 0, 0}; }
 
 struct GpuSolids::Impl {
   std::vector<GpuSolid> given;
   testing::HostSolids solids;
+  int device;
   Alive alive;
 };
 
-GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings&) {
+GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings) {
   const std::vector<GpuSolid> given(solids.begin(), solids.end());
-  impl_ = std::make_unique<Impl>(Impl{given, given, {}});
+  impl_ = std::make_unique<Impl>(Impl{given, given, settings.device, {}});
 }
 GpuSolids::~GpuSolids() = default;
 std::size_t GpuSolids::size() const noexcept { return impl_->solids.refs().size(); }
 std::size_t GpuSolids::bytes() const noexcept { return impl_->solids.bytes(); }
-int GpuSolids::device() const noexcept { return 0; }
+int GpuSolids::device() const noexcept { return impl_->device; }
 
 struct GpuWorkspace::Impl {
   std::size_t most_pairs;
+  int device;
   Alive alive;
 };
-GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings&)
-    : impl_(std::make_unique<Impl>(Impl{most_pairs, {}})) {}
+GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
+    : impl_(std::make_unique<Impl>(Impl{most_pairs, settings.device, {}})) {}
 GpuWorkspace::~GpuWorkspace() = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 
@@ -107,6 +109,7 @@ template <class Answer, class Write>
 void launch(const GpuSolids& solids, const GpuPairs& pairs, GpuWorkspace& workspace,
             CUstream_st* stream, const Answer& answer, const Write& write) {
   if (pairs.count > workspace.most_pairs()) std::abort();
+  if (solids.device() != workspace.impl().device) std::abort();
   testing::do_later(
       stream, [&impl = solids.impl(), pairs, answer, write, there = solids.impl().alive.shown(),
                room = workspace.impl().alive.shown()] {

@@ -47,6 +47,8 @@ struct BatchColumns {
   std::vector<QueryStatus> status;
   std::vector<std::uint32_t> visits, spheres;
   std::vector<double> least, most;
+  std::vector<double> area, normal;
+  std::vector<std::uint8_t> touching;
 
   /// Room for answers of n pairs.
   static BatchColumns unwritten(std::size_t n) {
@@ -59,7 +61,10 @@ struct BatchColumns {
             std::vector<std::uint32_t>(n),
             std::vector<std::uint32_t>(n),
             std::vector<double>(n),
-            std::vector<double>(n)};
+            std::vector<double>(n),
+            std::vector<double>(n, kUnwritten),
+            std::vector<double>(3 * n),
+            std::vector<std::uint8_t>(n)};
   }
 
   GpuPenetrations answers() {
@@ -67,6 +72,9 @@ struct BatchColumns {
                           status.data(), visits.data(),   spheres.data()};
     to.volume_min = least.data();
     to.volume_max = most.data();
+    to.contact_area = area.data();
+    to.contact_normal = normal.data();
+    to.touching = reinterpret_cast<bool*>(touching.data());
     return to;
   }
 
@@ -85,6 +93,9 @@ struct BatchColumns {
       out[i].status = status[i];
       out[i].node_visits = visits[i];
       out[i].sphere_pairs = spheres[i];
+      out[i].contact_area = area[i];
+      out[i].contact_normal = vector(normal, i);
+      out[i].touching = touching[i] != 0;
     }
     return out;
   }

@@ -74,7 +74,10 @@ class DeviceBatch {
         visits_(size_),
         spheres_(size_),
         least_(size_),
-        most_(size_) {}
+        most_(size_),
+        area_(size_),
+        normal_(3 * size_),
+        touching_(size_) {}
 
   GpuPairs pairs() const {
     return {size_,
@@ -86,12 +89,16 @@ class DeviceBatch {
                           status_.data(), visits_.data(),   spheres_.data()};
     to.volume_min = least_.data();
     to.volume_max = most_.data();
+    to.contact_area = area_.data();
+    to.contact_normal = normal_.data();
+    to.touching = reinterpret_cast<bool*>(touching_.data());
     return to;
   }
 
   std::vector<Penetration> get() const {
-    return BatchColumns{volume_.get(), centroid_.get(), push_.get(),  turn_.get(), status_.get(),
-                        visits_.get(), spheres_.get(),  least_.get(), most_.get()}
+    return BatchColumns{volume_.get(), centroid_.get(), push_.get(),    turn_.get(),
+                        status_.get(), visits_.get(),   spheres_.get(), least_.get(),
+                        most_.get(),   area_.get(),     normal_.get(),  touching_.get()}
         .rows();
   }
 
@@ -110,7 +117,8 @@ class DeviceBatch {
   OnDevice<double> volume_, centroid_, push_, turn_;
   OnDevice<QueryStatus> status_;
   OnDevice<std::uint32_t> visits_, spheres_;
-  OnDevice<double> least_, most_;
+  OnDevice<double> least_, most_, area_, normal_;
+  OnDevice<std::uint8_t> touching_;
 };
 
 }  // namespace ist::testing

@@ -96,13 +96,16 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     if (gpu::sift_exact(batch, i)) lists[0][exact_counters.listed[0]++] = i;
   std::vector<std::uint64_t> bytes;
   const auto room = [&](int pass) {
-    bytes.assign(batch.bytes_of_team(pass) / 8, 0);
+    bytes.assign(batch.bytes_of_team(pass) / 8, ~std::uint64_t{0});
     batch.rooms = batch.memory = reinterpret_cast<std::byte*>(bytes.data());
-    return batch.room(pass, 0);
+    const gpu::ExactRoom of_pass = batch.room(pass, 0);
+    gpu::clear_marks(SerialTeam(), of_pass);
+    return of_pass;
   };
   const auto pair = std::make_unique<gpu::ExactPair>();
   const auto search = std::make_unique<gpu::ExactSearchMemory>();
   const auto sum = std::make_unique<gpu::ExactSumMemory>();
+  const auto contact = std::make_unique<gpu::ExactContactMemory>();
   const auto whole = std::make_unique<gpu::ExactWholeMemory>();
   const gpu::ExactRoom first_room = room(0);
   std::uint32_t n = 0;
@@ -110,7 +113,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
        ++n) {
     gpu::ExactRound& round = gpu::round_of(batch, n);
     const std::uint32_t count = gpu::pairs_from(batch, first);
-    round = {first, count, 0, 0, 0, 0, 0, 0};
+    round = {first, count, 0, 0, 0, 0, 0, 0, 0, 0};
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
     for (; round.searched < count && gpu::goes_on(batch, n); ++round.searched)
       by_team(seed, [&](const auto& team) {
@@ -125,6 +128,8 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     sum_all.template operator()<false>(round.searched);
     sum_all.template operator()<true>(round.unsure);
     exact_counters.exactly += round.unsure;
+    for (std::uint32_t k = 0; k < round.nothing; ++k)
+      by_team(seed, [&](const auto& team) { gpu::touch_query(team, batch, k, *pair, *contact); });
     if (round.searched == 0) throw std::logic_error("a round has no room for a pair");
     first = gpu::end_of(round);
   }

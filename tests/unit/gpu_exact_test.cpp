@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "support/exact_batches.h"
@@ -27,7 +28,50 @@ TEST(GpuExact, AlignedAnswersAreTheCpus) {
       compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));
   EXPECT_GT(batch.exact_counters.exactly, 100u);
   EXPECT_GT(worst.met, 500u);
+  EXPECT_GT(worst.flush, 10u);
+  EXPECT_GT(worst.touching, worst.flush);
   expect_near(worst);
+}
+
+/// Where parts touch, the area and the normal of the faces that lie on each other too.
+TEST(GpuExact, MatesTouchAsOnTheCpu) {
+  const MatedBatch mated(32, 300);
+  HostBatch batch(views_of(mated.assets));
+  const Differences worst =
+      compare_exactly(mated.assets, mated.pairs, batch.run(mated.pairs, Measure::exact));
+  EXPECT_GT(worst.met, 200u);
+  EXPECT_GT(worst.flush, 150u);
+  expect_near(worst);
+}
+
+/// An edge that goes into a face by 1e-9 has next to no volume, but touches no more.
+TEST(GpuExact, WhatGrazesIsToldAsOnTheCpu) {
+  const std::vector<BatchPair> pairs = grazing_pairs();
+  HostBatch batch(exact_solids());
+  const Differences worst =
+      compare_exactly(exact_assets(), pairs, batch.run(pairs, Measure::exact));
+  EXPECT_GT(worst.flush, 15u);
+  EXPECT_GT(worst.touching, worst.flush + 60);
+  EXPECT_GT(worst.met, 40u);
+  expect_near(worst);
+}
+
+/// Of a pin in its hole what sums round is nothing, but not if a needle beside it goes deep.
+TEST(GpuExact, ANeedleBesideFacesIsAVolume) {
+  const TriangleMesh tube = Extrusion::tube(24, 1, 0.5, 0, 1).mesh(),
+                     pin = Extrusion::prism(24, 0.5, 0, 1).mesh(),
+                     needle = box_mesh({0.9, 0.05, 0.4}, {1.2, 0.05 + 3e-8, 0.4 + 3e-8});
+  std::vector<Asset> assets;
+  for (const TriangleMesh& mesh : {tube, pin, joined(pin, needle)})
+    assets.push_back(surface(mesh, "part"));
+  std::vector<BatchPair> pairs(2);
+  pairs[0].b = 1;
+  pairs[1].b = 2;
+  HostBatch batch(views_of(assets));
+  const std::vector<Penetration> answers = batch.run(pairs, Measure::exact);
+  expect_near(compare_exactly(assets, pairs, answers));
+  EXPECT_TRUE(answers[0].touching);
+  EXPECT_FALSE(answers[1].touching);
 }
 
 /// Boxes and slabs are placed in floats, which end long before the range of ratios does.
@@ -86,10 +130,14 @@ TEST(GpuExact, LittleRoomDoesNotShow) {
 TEST(GpuExact, LanesOfAWarpNeedNoLuck) {
   std::vector<BatchPair> pairs = exact_pairs(34, 30);
   for (const BatchPair& pair : aligned_pairs(36, 20)) pairs.push_back(pair);
-  HostBatch batch(exact_solids());
-  const std::vector<Penetration> expected = batch.run(pairs, Measure::exact, 1);
-  expect_near(compare_exactly(exact_assets(), pairs, expected));
-  expect_same_bits(batch.run(pairs, Measure::exact, 2), expected);
+  const MatedBatch mated(36, 5);
+  for (const auto& [assets, asked] : {std::pair(&exact_assets(), &std::as_const(pairs)),
+                                      std::pair(&mated.assets, &mated.pairs)}) {
+    HostBatch batch(views_of(*assets));
+    const std::vector<Penetration> expected = batch.run(*asked, Measure::exact, 1);
+    expect_near(compare_exactly(*assets, *asked, expected));
+    expect_same_bits(batch.run(*asked, Measure::exact, 2), expected);
+  }
 }
 
 TEST(GpuExact, WhatCannotBeAskedSaysSo) {

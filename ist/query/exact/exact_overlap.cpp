@@ -26,10 +26,8 @@ double ExactQuery::nearness() const noexcept {
 void ExactQuery::move_aside() noexcept {
   const MoveAside aside = aside_of(sides_[0].mesh, sides_[1].mesh, a_from_b_);
   search_.aside = aside.by;
-  search_.touch = sides_[0].moved + sides_[1].moved +
-                  4 * kHalfUnit *
-                      (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent() +
-                       length_bound(vec3(a_from_b_.t)));
+  search_.touch = touching_distance(sides_[0].moved + sides_[1].moved, sides_[0].mesh,
+                                    sides_[1].mesh, a_from_b_);
   sides_[1].moved += aside.far;
 }
 

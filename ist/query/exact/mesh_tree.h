@@ -117,4 +117,12 @@ IST_HD inline double moved_by_poses(const double (&t_a)[3], double offset_a, con
           5 * far);
 }
 
+/// What comes as near touches. `moved`: what both surfaces are off by.
+IST_HD inline double touching_distance(double moved, const MeshTree& a, const MeshTree& b,
+                                       const Similarity& a_from_b) noexcept {
+  const double shift =
+      (std::abs(a_from_b.t[0]) + std::abs(a_from_b.t[1])) + std::abs(a_from_b.t[2]);
+  return moved + 4 * exact::kHalfUnit * (a.extent() + a_from_b.scale * b.extent() + shift);
+}
+
 }  // namespace ist

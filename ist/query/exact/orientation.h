@@ -86,10 +86,11 @@ struct FilteredPlane {
     shift = dot(by, normal);
     shift_error = kFilter * absolute_dot(by, size);
   }
-  IST_HD Determinant height(const Point& r) const {
+  /// `moved`: how much its points may change it.
+  IST_HD Determinant height(const Point& r, double moved = 0) const {
     const double value = dot(r, normal), error = kFilter * absolute_dot(r, size);
     const double signed_value = value + shift;
-    const bool certain = std::abs(signed_value) > error + shift_error;
+    const bool certain = std::abs(signed_value) - moved > error + shift_error;
     return {value, error, !certain ? 0 : signed_value > 0 ? 1 : -1};
   }
 };

@@ -31,6 +31,7 @@ IST_HD inline double length_bound(const Vec3& a) {
 #define IST_FORMULA IST_HD inline
 #include "query/exact/careful_cross-inl.h"
 #include "query/exact/edge_gap_formulas-inl.h"
+#include "query/exact/flat_area_formulas-inl.h"
 #include "query/exact/overlap_formulas-inl.h"
 #include "query/exact/triangle_gap_formulas-inl.h"
 #undef IST_FORMULA

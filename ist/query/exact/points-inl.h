@@ -61,6 +61,7 @@ HWY_INLINE V max3(V x, V y, V z) { return hn::Max(x, hn::Max(y, z)); }
 #define IST_FORMULA HWY_INLINE
 #include "query/exact/careful_cross-inl.h"
 #include "query/exact/edge_gap_formulas-inl.h"
+#include "query/exact/flat_area_formulas-inl.h"
 #include "query/exact/overlap_formulas-inl.h"
 #include "query/exact/triangle_gap_formulas-inl.h"
 #undef IST_FORMULA

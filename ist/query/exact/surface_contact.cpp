@@ -9,7 +9,6 @@
 #include <hwy/foreach_target.h>
 
 #include "query/exact/block_meeting-inl.h"
-#include "query/exact/flat_areas-inl.h"
 #include "query/exact/nearest_points.h"
 #include "query/exact/pair_signs-inl.h"
 

@@ -1,0 +1,116 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "base/team.h"
+#include "cuda/query/answers.h"
+#include "cuda/query/batch_steps.h"
+#include "cuda/query/exact_memory.h"
+#include "cuda/query/exact_pair.h"
+#include "cuda/query/exact_search.h"
+#include "query/exact/overlap_formulas.h"
+
+// How two solids touch that have no volume in common: as the CPU's find_contact().
+
+namespace ist::gpu {
+
+/// A lane's pair of triangles in one plane that face each other: adds what they have in common.
+IST_HD_COLD bool add_common_area(const CornerView& view, ContactSums& sums) {
+  const exact::Point a[3] = {view.corner(0, 0), view.corner(0, 1), view.corner(0, 2)},
+                     b[3] = {view.corner(1, 0), view.corner(1, 1), view.corner(1, 2)};
+  const exact::Point normal = cross(a[1] - a[0], a[2] - a[0]);
+  const exact::CommonArea common = exact::common_area(a, b, normal);
+  const double area = common.over_normal * norm(normal);
+  const int lane = view.lane;
+  sums.of[ContactSums::kArea][lane] += area;
+  const exact::Point along = common.over_normal * normal, moment = area * (a[0] + common.centre);
+  for (int k = 0; k < 3; ++k) {
+    sums.of[ContactSums::kNormal + k][lane] += along[k];
+    sums.of[ContactSums::kMoment + k][lane] += moment[k];
+  }
+  return area > 0;
+}
+
+/// Whether a lane's triangles, which do not cross, come as near.
+IST_HD_COLD bool come_within(double distance, const CornerView& view) {
+  exact::Flat flat[2];
+  for (int s = 0; s < 2; ++s) {
+    for (int k = 0; k < 3; ++k) flat[s].corner[k] = view.corner(s, k);
+    exact::flatten(flat[s]);
+  }
+  bool unclear = false;
+  return exact::nearest_points(flat[0], flat[1], 0, unclear).squared < distance * distance;
+}
+
+/// Whether a lane's triangles lie in one plane and face each other.
+IST_HD inline bool flush(double touch, const CornerView& view) {
+  const exact::Point o = view.corner(0, 0), b = view.corner(1, 0);
+  const exact::FilteredPlane plane(view.corner(0, 1) - o, view.corner(0, 2) - o, {0, 0, 0});
+  const double far = touch * norm(plane.normal);
+  bool level = true;
+  for (int k = 0; k < 3; ++k) {
+    const exact::Determinant height = plane.height(view.corner(1, k) - o);
+    level = level && std::abs(height.value) <= far + height.error;
+  }
+  return level && dot(plane.normal, cross(view.corner(1, 1) - b, view.corner(1, 2) - b)) < 0;
+}
+
+/// Looks at the next so many pairs of triangles that wait. False where two cross wherever points
+/// move by the room: there is a volume, however small.
+template <class Team>
+IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactMemory& memory,
+                            std::uint32_t first, std::uint32_t count, bool& touches) {
+  const auto lane = static_cast<std::uint32_t>(team.lane());
+  const bool has = lane < count;
+  const std::uint32_t(&slot)[2] = memory.queue[(first + (has ? lane : 0)) % kExactWaiting];
+  const CornerView view = {memory.contact.corners, team.lane()};
+  for (int side = 0; side < 2; ++side)
+    for (int k = 0; k < 3; ++k) view.set(side, k, of.corner(side, slot[side], k));
+  PiercingEdge end[2];
+  const PairSays says =
+      has ? cross_pair<Signs::settled>(view, of.aside, end, of.reach[0]) : PairSays::apart;
+  if (team.any(says == PairSays::crosses)) return false;
+  const bool near = says != PairSays::apart;
+  touches =
+      team.any(near && flush(of.touch, view) && add_common_area(view, memory.contact)) || touches;
+  if (!touches) touches = team.any(near && come_within(of.touch, view));
+  return true;
+}
+
+/// Of pair i, whose volume may be nothing and is answered as if it were not: whether the solids
+/// touch, and where. What sums round is nothing if it is no thicker than what poses and vertices
+/// round, over the faces that lie on each other or push.
+template <class Team>
+IST_HD void find_contact(const Team& team, const SolidPairs& batch, std::uint32_t i,
+                         const ExactPair& pair, ExactContactMemory& memory, const ExactLeft& left,
+                         std::uint64_t* waiting, std::uint32_t most_waiting) {
+  team.sync();
+  for (auto& sums : memory.contact.of)
+    for (int k = team.lane(); k < 32; k += Team::kWidth) sums[k] = 0;
+  ExactSearch<Team> search(team, pair, memory, waiting, most_waiting, {});
+  bool touches = false;
+  const bool all = search.run([&](std::uint32_t first, std::uint32_t count) {
+    return touch_triangles(team, pair, memory, first, count, touches);
+  });
+  double total[ContactSums::kCount];
+  for (int k = 0; k < ContactSums::kCount; ++k)
+    total[k] = team.sum(memory.contact.of[k][team.lane()]);
+  const double area = total[ContactSums::kArea];
+  if (team.lane() != 0 || !all || !touches || left.volume > 8 * pair.touch * (area + left.push))
+    return;
+  const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
+  const PairPlace& place = pair.place;
+  ContactRow row = {};
+  row.touching = true;
+  row.volume_max = std::fmin(smaller_volume(batch, i), left.error * place.unit3());
+  row.contact_area = area * (place.unit_a * place.unit_a);
+  if (area > 0) row.centroid = place.to_world(vector(ContactSums::kMoment) / area);
+  // Normals that cancel leave what areas round.
+  const Vec3 normal = vector(ContactSums::kNormal);
+  if (const double length = norm(normal); length > 1e-9 * area)
+    row.contact_normal = turned(place.rotation_a, normal / length);
+  write_row(batch.answers, i, row);
+}
+
+}  // namespace ist::gpu
