@@ -330,17 +330,7 @@ void OutputRecord::add(const CacheKey& key, const CacheEntry& entry) {
 }
 
 const char* name_of(JobStatus status) noexcept {
-  switch (status) {
-    case JobStatus::baked:
-      return "baked";
-    case JobStatus::cached:
-      return "cached";
-    case JobStatus::failed:
-      return "failed";
-    case JobStatus::not_baked:
-      return "not_baked";
-  }
-  return "unknown";
+  return word_of(status, {"baked", "cached", "failed", "not_baked"});
 }
 
 RunOutcome run_jobs(const std::vector<Job>& jobs, const RunSettings& settings,
