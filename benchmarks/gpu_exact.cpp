@@ -8,13 +8,11 @@
 #include <ist/gpu_query.h>
 #include <ist/query_tbb.h>
 
-#include "gpu_batch_scenes.h"
 #include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_batch.h"
 #include "support/mated_rows.h"
-#include "timing.h"
 
 namespace {
 
@@ -26,33 +24,11 @@ Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
   return bake_mesh_only(close_mesh(mesh, name), 0);
 }
 
-/// By all cores, M/s.
-double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs,
-                std::vector<Penetration>& answers) {
-  std::vector<PlacedPair> placed;
-  for (const BatchPair& pair : pairs)
-    placed.push_back({{solids.assets[pair.a]->view(), pair.pose_a, pair.scale_a},
-                      {solids.assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
-  PenetrationSettings settings;
-  settings.measure = Measure::exact;
-  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-  answers.resize(pairs.size());
-  double best = 1e30;
-  for (int k = 0; k < 2; ++k) {
-    const double start = benchmark::wall_seconds();
-    penetration_batch(placed, settings, workspaces, answers, tbb_parallel_for());
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(pairs.size()) / best * 1e-6;
-}
-
 /// Reports the rate of pairs drawn from some; false where answers are not the CPU's.
 bool ask(Report& report, const char* table, const std::string& name, const Solids& solids,
          const std::vector<BatchPair>& some, std::size_t count, double target) {
   if (some.empty()) return true;
-  std::mt19937_64 random(1);
-  std::vector<BatchPair> pairs;
-  for (std::size_t k = 0; k < count; ++k) pairs.push_back(some[random() % some.size()]);
+  const std::vector<BatchPair> pairs = drawn(some, count);
   const GpuSolids on_device(solids.views());
   GpuWorkspace workspace(count);
   const DeviceBatch batch(pairs);
@@ -63,8 +39,13 @@ bool ask(Report& report, const char* table, const std::string& name, const Solid
   const std::vector<Penetration> found = batch.get();
   std::vector<BatchPair> asked = pairs;
   asked.resize(std::min<std::size_t>(count, 5'000));
-  std::vector<Penetration> cpu;
-  const double by_cores = cpu_rate(solids, asked, cpu);
+  const std::vector<PlacedPair> placed = solids.placed(asked);
+  std::vector<Penetration> cpu(asked.size());
+  PenetrationSettings settings;
+  settings.measure = Measure::exact;
+  const double by_cores = rate_of_cores(cpu.size(), 2, [&](std::span<Workspace> workspaces) {
+    penetration_batch(placed, settings, workspaces, cpu, tbb_parallel_for());
+  });
   double worst = 0, crossings = 0, visits = 0;
   std::size_t unanswered = 0;
   for (std::size_t i = 0; i < asked.size(); ++i) {
@@ -152,17 +133,12 @@ bool measure(Report& report) {
                 wanted.contains(name) ? wanted.at(name) : 0) &&
             right;
   const Asset bolt = mesh_of(make_sample("bolt"), "bolt"), nut = mesh_of(make_sample("nut"), "nut");
-  std::vector<BatchPair> engaged = nut_poses(400), clear = engaged;
+  std::vector<BatchPair> engaged = nut_poses(400);
   for (BatchPair& pair : engaged) pair.b = 1;
-  for (BatchPair& pair : clear) {
-    pair.b = 1;
-    pair.pose_b.t[0] = pair.pose_b.t[1] = 0;
-    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
-    pair.pose_b.t[2] = 8 + 2 * turn;
-  }
   const Solids thread = {{&bolt, &nut}};
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
-  right = ask(report, "Nut on bolt", "in clearance", thread, clear, many / 2, 2) && right;
+  right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
+          right;
   // Mated parts, as they are and all together.
   std::vector<Asset> parts;
   std::map<std::string, std::uint32_t> number;

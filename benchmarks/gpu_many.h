@@ -4,12 +4,15 @@
 
 #include <cstdio>
 #include <exception>
+#include <span>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <ist/gpu_query.h>
 
 #include "cuda/base/check.h"
+#include "gpu_batch_scenes.h"
 #include "report.h"
 #include "timing.h"
 
@@ -40,8 +43,29 @@ double device_ms(const Work& work) {
   return benchmark::quantile(all, 0.5);
 }
 
+/// [M/s] of all cores: ask(workspaces) answers `count` pairs; the best of some rounds.
+template <class Ask>
+double rate_of_cores(std::size_t count, int rounds, const Ask& ask) {
+  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
+  double best = 1e30;
+  for (int k = 0; k < rounds; ++k) {
+    const double start = wall_seconds();
+    ask(std::span(workspaces));
+    best = std::min(best, wall_seconds() - start);
+  }
+  return static_cast<double>(count) / best * 1e-6;
+}
+
 struct Solids {
   std::vector<const Asset*> assets;
+
+  std::vector<PlacedPair> placed(const std::vector<BatchPair>& pairs) const {
+    std::vector<PlacedPair> out;
+    for (const BatchPair& pair : pairs)
+      out.push_back({{assets[pair.a]->view(), pair.pose_a, pair.scale_a},
+                     {assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
+    return out;
+  }
   std::vector<GpuSolid> views() const {
     std::vector<GpuSolid> out;
     for (const Asset* asset : assets) out.emplace_back(asset->view());
