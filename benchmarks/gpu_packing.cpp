@@ -2,7 +2,6 @@
 // host memory: upload and hierarchy every time, only context and memory pool kept.
 #include <ist/bake.h>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <string>

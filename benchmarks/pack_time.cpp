@@ -2,7 +2,6 @@
 // places that are equally good, and thinner than any cell.
 #include <ist/bake.h>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <string>
 #include <vector>

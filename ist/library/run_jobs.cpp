@@ -13,9 +13,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <fstream>
-#include <mutex>
 #include <new>
-#include <optional>
 #include <string_view>
 #include <system_error>
 #include <thread>
@@ -24,6 +22,7 @@
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
+#include "library/settings/spelling.h"
 #include "robots/description/link_mesh.h"
 
 namespace ist {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <type_traits>
-#include <utility>
 
 #include "library/settings/numbers.h"
+#include "library/settings/spelling.h"
 
 namespace ist {
 namespace {
