@@ -149,15 +149,19 @@ inline std::vector<BatchPair> poses_of_copies(const Asset& body, double most) {
   return out;
 }
 
+/// `b`: the number of its second solid.
+inline BatchPair pair_of(const testing::OracleRow& row, std::uint32_t b = 0) {
+  BatchPair pair;
+  pair.b = b;
+  pair.pose_b = row.pose;
+  pair.scale_b = row.scale_b;
+  return pair;
+}
+
 inline std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
   std::vector<BatchPair> out;
-  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
-    if (row.pose_class != pose_class) continue;
-    BatchPair pair;
-    pair.pose_b = row.pose;
-    pair.scale_b = row.scale_b;
-    out.push_back(pair);
-  }
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino"))
+    if (row.pose_class == pose_class) out.push_back(pair_of(row));
   return out;
 }
 

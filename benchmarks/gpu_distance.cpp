@@ -14,7 +14,6 @@
 #include "report.h"
 #include "support/device_batch.h"
 #include "support/device_separations.h"
-#include "support/mated_rows.h"
 
 namespace {
 
@@ -93,11 +92,7 @@ bool measure(Report& report) {
     std::vector<double> distances;
     const std::vector<ist::testing::OracleRow> rows = ist::testing::read_oracle_rows(key);
     for (const ist::testing::OracleRow& row : rows) {
-      BatchPair pair;
-      pair.b = 1;
-      pair.pose_b = row.pose;
-      pair.scale_b = row.scale_b;
-      classes[row.pose_class].push_back(pair);
+      classes[row.pose_class].push_back(pair_of(row, 1));
       if (row.pose_class == "sep") distances.push_back(row.surface_distance);
     }
     const Solids two = {{asset(rows[0].mesh_a), asset(rows[0].mesh_b)}};
@@ -119,24 +114,11 @@ bool measure(Report& report) {
               many / 10) &&
           right;
   // Mated parts, in place and moved along the mate by up to a tenth.
-  std::map<std::string, std::uint32_t> number;
-  std::map<std::string, std::vector<BatchPair>> mates;
-  Solids mated;
-  std::map<std::string, Asset> parts;
-  for (const ist::testing::MatedRow& row : ist::testing::read_mated_rows()) {
-    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
-      if (number.try_emplace(mesh, static_cast<std::uint32_t>(number.size())).second) {
-        const TriangleMesh from = load_mesh(ist::testing::mated_mesh_path(mesh));
-        mated.assets.push_back(&parts.emplace(mesh, baked(from, mesh, 1000, true)).first->second);
-      }
-    BatchPair pair;
-    pair.a = number[row.mesh_a];
-    pair.b = number[row.mesh_b];
-    pair.pose_b = row.pose;
-    mates[row.name].push_back(pair);
-  }
-  for (const auto& [name, poses] : mates)
-    right = ask(report, "Mated parts", name, mated, poses, many / 50) && right;
+  const MatedParts mated([](const TriangleMesh& mesh,
+                            const std::string& name) { return baked(mesh, name, 1000, true); },
+                         [](const ist::testing::MatedRow& row) { return row.name; });
+  for (const auto& [name, poses] : mated.mates)
+    right = ask(report, "Mated parts", name, mated.solids, poses, many / 50) && right;
   return right;
 }
 

@@ -12,7 +12,6 @@
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_batch.h"
-#include "support/mated_rows.h"
 
 namespace {
 
@@ -120,11 +119,7 @@ bool measure(Report& report) {
                              : share < 1e-2                ? "0.1 to 1 %"
                              : share < 1e-1                ? "1 to 10 %"
                                                            : "deep";
-    BatchPair pair;
-    pair.b = 1;
-    pair.pose_b = row.pose;
-    pair.scale_b = row.scale_b;
-    classes[name].push_back(pair);
+    classes[name].push_back(pair_of(row, 1));
   }
   const std::map<std::string, double> wanted = {
       {"0.01 to 0.1 %", 8}, {"0.1 to 1 %", 4}, {"1 to 10 %", 1}, {"deep", 0.7}};
@@ -140,28 +135,11 @@ bool measure(Report& report) {
   right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
           right;
   // Mated parts, as they are and all together.
-  std::vector<Asset> parts;
-  std::map<std::string, std::uint32_t> number;
-  std::map<std::string, std::vector<BatchPair>> mates;
-  const std::vector<ist::testing::MatedRow> rows = ist::testing::read_mated_rows();
-  for (const ist::testing::MatedRow& row : rows)
-    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
-      if (number.try_emplace(mesh, static_cast<std::uint32_t>(parts.size())).second)
-        parts.push_back(mesh_of(load_mesh(ist::testing::mated_mesh_path(mesh)), mesh));
-  Solids mated;
-  for (const Asset& part : parts) mated.assets.push_back(&part);
-  for (const ist::testing::MatedRow& row : rows) {
-    BatchPair pair;
-    pair.a = number[row.mesh_a];
-    pair.b = number[row.mesh_b];
-    pair.pose_b = row.pose;
-    mates[row.name + (row.moved == 0     ? ", in place"
-                      : row.moved < 1e-2 ? ", near"
-                                         : ", moved")]
-        .push_back(pair);
-  }
-  for (const auto& [name, poses] : mates)
-    right = ask(report, "Mated parts", name, mated, poses, many / 50, 0) && right;
+  const MatedParts mated(mesh_of, [](const ist::testing::MatedRow& row) {
+    return row.name + (row.moved == 0 ? ", in place" : row.moved < 1e-2 ? ", near" : ", moved");
+  });
+  for (const auto& [name, poses] : mated.mates)
+    right = ask(report, "Mated parts", name, mated.solids, poses, many / 50, 0) && right;
   for (const std::size_t triangles : {8u, 24u, 80u, 200u}) {
     const Asset a = mesh_of(small_body(triangles, 1), "body"),
                 b = mesh_of(small_body(triangles, 2), "body");

@@ -3,7 +3,9 @@
 #include <cuda_runtime_api.h>
 
 #include <cstdio>
+#include <deque>
 #include <exception>
+#include <map>
 #include <span>
 #include <string>
 #include <thread>
@@ -14,6 +16,7 @@
 #include "cuda/base/check.h"
 #include "gpu_batch_scenes.h"
 #include "report.h"
+#include "support/mated_rows.h"
 #include "timing.h"
 
 // What programs that ask a GPU about many pairs begin with.
@@ -71,6 +74,36 @@ struct Solids {
     for (const Asset* asset : assets) out.emplace_back(asset->view());
     return out;
   }
+};
+
+/// The oracle's mated parts and their poses.
+struct MatedParts {
+  Solids solids;
+  std::map<std::string, std::vector<BatchPair>> mates;  ///< by their name
+
+  /// `bake(mesh, name)` makes an asset; `name_of(row)` names a mate.
+  template <class Bake, class NameOf>
+  MatedParts(const Bake& bake, const NameOf& name_of) {
+    const auto number = [&](const std::string& mesh) {
+      const auto [known, fresh] =
+          numbers_.try_emplace(mesh, static_cast<std::uint32_t>(parts_.size()));
+      if (fresh)
+        solids.assets.push_back(
+            &parts_.emplace_back(bake(load_mesh(testing::mated_mesh_path(mesh)), mesh)));
+      return known->second;
+    };
+    for (const testing::MatedRow& row : testing::read_mated_rows()) {
+      BatchPair pair;
+      pair.a = number(row.mesh_a);
+      pair.b = number(row.mesh_b);
+      pair.pose_b = row.pose;
+      mates[name_of(row)].push_back(pair);
+    }
+  }
+
+ private:
+  std::map<std::string, std::uint32_t> numbers_;
+  std::deque<Asset> parts_;
 };
 
 /// main() of such a program: measure(report) says whether all answers are the CPU's.
