@@ -2,8 +2,6 @@
 // how far their centroids move, what they cost beside the plain query, and how well they sum up.
 
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <string>
 #include <vector>
 

@@ -6,7 +6,12 @@
 #include <ist/bake.h>
 
 #include <cstdio>
+#include <filesystem>
+#include <initializer_list>
 #include <string>
+
+#include "report.h"
+#include "support/shared_data.h"
 
 namespace ist::benchmark {
 
@@ -17,6 +22,21 @@ inline std::string fingerprint(const SpherePacking& packing) {
                 static_cast<unsigned long long>(
                     XXH3_64bits(packing.spheres.data(), packing.spheres.size() * sizeof(Sphere))));
   return text;
+}
+
+/// visit(name, closed mesh) of each of these files of shared data; a missing one is a remark.
+template <class Visit>
+void for_shared_meshes(Report& report, std::initializer_list<const char*> files,
+                       const Visit& visit) {
+  for (const char* file : files) {
+    const std::filesystem::path path = testing::shared_path(file);
+    if (!std::filesystem::exists(path)) {
+      report.remark("missing: " + std::string(file));
+      continue;
+    }
+    const std::string name = path.stem().string();
+    visit(name, close_mesh(load_mesh(path.string()), name));
+  }
 }
 
 }  // namespace ist::benchmark

@@ -68,7 +68,7 @@ class Batches {
   double median_ms(const Scene& scene, std::size_t count) {
     const GpuSolid a = scene.field != nullptr ? GpuSolid(*scene.field) : scene.a->view();
     const GpuSolids solids(std::vector<GpuSolid>{a, scene.b->view()});
-    const DeviceBatch batch(drawn(scene.poses, count));
+    const DeviceBatch batch(drawn_of_two(scene.poses, count));
     const double ms = median_ms([&] {
       penetration_batch(solids, batch.pairs(), {Measure::matched, scene.pair_budget},
                         workspace(count), batch.answers(), stream_.get());
@@ -79,7 +79,7 @@ class Batches {
   /// Likewise.
   double median_separation_ms(const Scene& scene, std::size_t count) {
     const GpuSolids solids(std::vector<GpuSolid>{scene.a->view(), scene.b->view()});
-    const DeviceBatch batch(drawn(scene.poses, count));
+    const DeviceBatch batch(drawn_of_two(scene.poses, count));
     const DeviceSeparations answers(count);
     const double ms = median_ms([&] {
       separation_batch(solids, batch.pairs(), {}, workspace(count), answers.answers(),
@@ -92,7 +92,7 @@ class Batches {
   /// Likewise.
   double median_patches_ms(const Scene& scene, std::size_t count, std::uint32_t most) {
     const GpuSolids solids(std::vector<GpuSolid>{scene.a->view(), scene.b->view()});
-    const DeviceBatch batch(drawn(scene.poses, count));
+    const DeviceBatch batch(drawn_of_two(scene.poses, count));
     const DevicePatches patches(count, most);
     const double ms = median_ms([&] {
       contact_patches_batch(solids, batch.pairs(), Measure::matched, workspace(count),

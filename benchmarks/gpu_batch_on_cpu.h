@@ -2,15 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
+#include <span>
 #include <vector>
 
 #include <ist/query_tbb.h>
 #include <ist/shapes.h>
 
 #include "gpu_batch_scenes.h"
+#include "gpu_many.h"
 #include "support/patch_columns.h"
-#include "timing.h"
 
 // The same scenes by all cores of the machine, and how far the answers differ.
 
@@ -34,41 +34,20 @@ inline double cpu_rate(const Scene& scene, std::size_t count, std::vector<Penetr
   PenetrationSettings settings;
   settings.spheres_only = true;
   settings.pair_budget = scene.pair_budget;
-  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
   answers.resize(count);
-  double best = 1e30;
-  for (int k = 0; k < 3; ++k) {
-    const double start = benchmark::wall_seconds();
+  return rate_of_cores(count, 3, [&](std::span<Workspace> workspaces) {
     penetration_batch(pairs, settings, workspaces, answers, tbb_parallel_for());
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(count) / best * 1e-6;
+  });
 }
 
 /// Separations by all cores, M/s; `answers` of as many.
 inline double cpu_separation_rate(const Scene& scene, std::size_t count,
                                   std::vector<Separation>& answers) {
-  struct Batch {
-    std::vector<PlacedPair> pairs;
-    std::vector<Workspace> workspaces;
-    std::vector<Separation>& answers;
-  };
+  const std::vector<PlacedPair> pairs = placed(scene, count);
   answers.resize(count);
-  Batch batch{placed(scene, count), std::vector<Workspace>(std::thread::hardware_concurrency()),
-              answers};
-  const auto work = [](void* of, std::size_t worker) {
-    Batch& all = *static_cast<Batch*>(of);
-    for (std::size_t i = worker; i < all.pairs.size(); i += all.workspaces.size())
-      all.answers[i] = separation(all.pairs[i].a, all.pairs[i].b, {}, all.workspaces[worker]);
-  };
-  const ParallelFor threads = tbb_parallel_for();
-  double best = 1e30;
-  for (int k = 0; k < 3; ++k) {
-    const double start = benchmark::wall_seconds();
-    threads.run(threads.pool, batch.workspaces.size(), work, &batch);
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(count) / best * 1e-6;
+  return rate_of_cores(count, 3, [&](std::span<Workspace> workspaces) {
+    separation_batch(pairs, {}, workspaces, answers, tbb_parallel_for());
+  });
 }
 
 /// Contact patches by all cores.
@@ -82,14 +61,9 @@ struct CpuPatches {
     const std::vector<PlacedPair> pairs = placed(scene, count);
     ContactSettings settings;
     settings.spheres_only = true;
-    std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-    double best = 1e30;
-    for (int k = 0; k < 3; ++k) {
-      const double start = benchmark::wall_seconds();
+    rate = rate_of_cores(count, 3, [&](std::span<Workspace> workspaces) {
       contact_patches_batch(pairs, settings, workspaces, answers, patches, tbb_parallel_for());
-      best = std::min(best, benchmark::wall_seconds() - start);
-    }
-    rate = static_cast<double>(count) / best * 1e-6;
+    });
   }
 };
 

@@ -59,6 +59,17 @@ inline std::vector<BatchPair> nut_poses(std::size_t count) {
   return out;
 }
 
+/// The same turns in the middle of the gap, B the second solid.
+inline std::vector<BatchPair> clear_nut_poses(std::size_t count) {
+  std::vector<BatchPair> out = nut_poses(count);
+  for (BatchPair& pair : out) {
+    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
+    pair.b = 1;
+    pair.pose_b = {{pair.pose_b.q[0], 0, 0, pair.pose_b.q[3]}, {0, 0, 8 + 2 * turn}};
+  }
+  return out;
+}
+
 /// Rolling ground about z = 0, as large as all poses.
 class Ground {
  public:
@@ -138,15 +149,19 @@ inline std::vector<BatchPair> poses_of_copies(const Asset& body, double most) {
   return out;
 }
 
+/// `b`: the number of its second solid.
+inline BatchPair pair_of(const testing::OracleRow& row, std::uint32_t b = 0) {
+  BatchPair pair;
+  pair.b = b;
+  pair.pose_b = row.pose;
+  pair.scale_b = row.scale_b;
+  return pair;
+}
+
 inline std::vector<BatchPair> oracle_poses(const std::string& pose_class) {
   std::vector<BatchPair> out;
-  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino")) {
-    if (row.pose_class != pose_class) continue;
-    BatchPair pair;
-    pair.pose_b = row.pose;
-    pair.scale_b = row.scale_b;
-    out.push_back(pair);
-  }
+  for (const testing::OracleRow& row : testing::read_oracle_rows("eledino"))
+    if (row.pose_class == pose_class) out.push_back(pair_of(row));
   return out;
 }
 
@@ -155,10 +170,14 @@ inline std::vector<BatchPair> drawn(const std::vector<BatchPair>& poses, std::si
   std::mt19937_64 random(1);
   std::vector<BatchPair> out;
   out.reserve(count);
-  for (std::size_t k = 0; k < count; ++k) {
-    out.push_back(poses[random() % poses.size()]);
-    out.back().b = 1;
-  }
+  for (std::size_t k = 0; k < count; ++k) out.push_back(poses[random() % poses.size()]);
+  return out;
+}
+
+/// B is the second solid.
+inline std::vector<BatchPair> drawn_of_two(const std::vector<BatchPair>& poses, std::size_t count) {
+  std::vector<BatchPair> out = drawn(poses, count);
+  for (BatchPair& pair : out) pair.b = 1;
   return out;
 }
 

@@ -9,14 +9,11 @@
 #include <ist/gpu_query.h>
 #include <ist/query_tbb.h>
 
-#include "gpu_batch_scenes.h"
 #include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_batch.h"
 #include "support/device_separations.h"
-#include "support/mated_rows.h"
-#include "timing.h"
 
 namespace {
 
@@ -25,34 +22,12 @@ using namespace ist::benchmark;
 using ist::testing::DeviceBatch;
 using ist::testing::DeviceSeparations;
 
-/// By all cores, M/s.
-double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs, double max_distance,
-                std::vector<Separation>& answers) {
-  std::vector<PlacedPair> placed;
-  for (const BatchPair& pair : pairs)
-    placed.push_back({{solids.assets[pair.a]->view(), pair.pose_a, pair.scale_a},
-                      {solids.assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
-  SeparationSettings settings;
-  settings.max_distance = max_distance;
-  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-  answers.resize(pairs.size());
-  double best = 1e30;
-  for (int k = 0; k < 2; ++k) {
-    const double start = benchmark::wall_seconds();
-    separation_batch(placed, settings, workspaces, answers, tbb_parallel_for());
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(pairs.size()) / best * 1e-6;
-}
-
 /// Reports the rate of pairs drawn from some; false where answers are not the CPU's.
 bool ask(Report& report, const char* table, const std::string& name, const Solids& solids,
          const std::vector<BatchPair>& some, std::size_t count, double target = 0,
          double max_distance = 0) {
   if (some.empty()) return true;
-  std::mt19937_64 random(1);
-  std::vector<BatchPair> pairs;
-  for (std::size_t k = 0; k < count; ++k) pairs.push_back(some[random() % some.size()]);
+  const std::vector<BatchPair> pairs = drawn(some, count);
   const GpuSolids on_device(solids.views());
   GpuWorkspace workspace(count);
   const DeviceBatch batch(pairs);
@@ -64,8 +39,13 @@ bool ask(Report& report, const char* table, const std::string& name, const Solid
   const std::vector<Separation> found = answers.get();
   std::vector<BatchPair> asked = pairs;
   asked.resize(std::min<std::size_t>(count, 5'000));
-  std::vector<Separation> cpu;
-  const double by_cores = cpu_rate(solids, asked, max_distance, cpu);
+  const std::vector<PlacedPair> placed = solids.placed(asked);
+  std::vector<Separation> cpu(asked.size());
+  SeparationSettings settings;
+  settings.max_distance = max_distance;
+  const double by_cores = rate_of_cores(cpu.size(), 2, [&](std::span<Workspace> workspaces) {
+    separation_batch(placed, settings, workspaces, cpu, tbb_parallel_for());
+  });
   double worst = 0, visits = 0, tests = 0;
   std::size_t apart = 0;
   bool right = true;
@@ -112,11 +92,7 @@ bool measure(Report& report) {
     std::vector<double> distances;
     const std::vector<ist::testing::OracleRow> rows = ist::testing::read_oracle_rows(key);
     for (const ist::testing::OracleRow& row : rows) {
-      BatchPair pair;
-      pair.b = 1;
-      pair.pose_b = row.pose;
-      pair.scale_b = row.scale_b;
-      classes[row.pose_class].push_back(pair);
+      classes[row.pose_class].push_back(pair_of(row, 1));
       if (row.pose_class == "sep") distances.push_back(row.surface_distance);
     }
     const Solids two = {{asset(rows[0].mesh_a), asset(rows[0].mesh_b)}};
@@ -134,33 +110,15 @@ bool measure(Report& report) {
   }
   const Asset bolt = baked(make_sample("bolt"), "bolt", kSpheres, true),
               nut = baked(make_sample("nut"), "nut", kSpheres, true);
-  std::vector<BatchPair> clear = nut_poses(400);
-  for (BatchPair& pair : clear) {
-    pair.b = 1;
-    pair.pose_b.t[0] = pair.pose_b.t[1] = 0;
-    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
-    pair.pose_b.t[2] = 8 + 2 * turn;
-  }
-  right = ask(report, "Nut on bolt", "in clearance", {{&bolt, &nut}}, clear, many / 10) && right;
+  right = ask(report, "Nut on bolt", "in clearance", {{&bolt, &nut}}, clear_nut_poses(400),
+              many / 10) &&
+          right;
   // Mated parts, in place and moved along the mate by up to a tenth.
-  std::map<std::string, std::uint32_t> number;
-  std::map<std::string, std::vector<BatchPair>> mates;
-  Solids mated;
-  std::map<std::string, Asset> parts;
-  for (const ist::testing::MatedRow& row : ist::testing::read_mated_rows()) {
-    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
-      if (number.try_emplace(mesh, static_cast<std::uint32_t>(number.size())).second) {
-        const TriangleMesh from = load_mesh(ist::testing::mated_mesh_path(mesh));
-        mated.assets.push_back(&parts.emplace(mesh, baked(from, mesh, 1000, true)).first->second);
-      }
-    BatchPair pair;
-    pair.a = number[row.mesh_a];
-    pair.b = number[row.mesh_b];
-    pair.pose_b = row.pose;
-    mates[row.name].push_back(pair);
-  }
-  for (const auto& [name, poses] : mates)
-    right = ask(report, "Mated parts", name, mated, poses, many / 50) && right;
+  const MatedParts mated([](const TriangleMesh& mesh,
+                            const std::string& name) { return baked(mesh, name, 1000, true); },
+                         [](const ist::testing::MatedRow& row) { return row.name; });
+  for (const auto& [name, poses] : mated.mates)
+    right = ask(report, "Mated parts", name, mated.solids, poses, many / 50) && right;
   return right;
 }
 

@@ -10,13 +10,10 @@
 #include <ist/query_tbb.h>
 
 #include "cuda/base/queue.h"
-#include "gpu_batch_scenes.h"
 #include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/device_batch.h"
-#include "support/mated_rows.h"
-#include "timing.h"
 
 namespace {
 
@@ -26,33 +23,6 @@ using ist::testing::DeviceBatch;
 
 Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
   return bake_mesh_only(close_mesh(mesh, name), 0);
-}
-
-/// By all cores, M/s.
-double cpu_rate(const Solids& solids, const std::vector<BatchPair>& pairs,
-                std::vector<Penetration>& answers) {
-  std::vector<PlacedPair> placed;
-  for (const BatchPair& pair : pairs)
-    placed.push_back({{solids.assets[pair.a]->view(), pair.pose_a, pair.scale_a},
-                      {solids.assets[pair.b]->view(), pair.pose_b, pair.scale_b}});
-  PenetrationSettings settings;
-  settings.measure = Measure::exact;
-  std::vector<Workspace> workspaces(std::thread::hardware_concurrency());
-  answers.resize(pairs.size());
-  double best = 1e30;
-  for (int k = 0; k < 2; ++k) {
-    const double start = benchmark::wall_seconds();
-    penetration_batch(placed, settings, workspaces, answers, tbb_parallel_for());
-    best = std::min(best, benchmark::wall_seconds() - start);
-  }
-  return static_cast<double>(pairs.size()) / best * 1e-6;
-}
-
-std::vector<BatchPair> drawn(const std::vector<BatchPair>& some, std::size_t count) {
-  std::mt19937_64 random(1);
-  std::vector<BatchPair> pairs;
-  for (std::size_t k = 0; k < count; ++k) pairs.push_back(some[random() % some.size()]);
-  return pairs;
 }
 
 /// [ms] of the device.
@@ -123,8 +93,13 @@ bool ask(Report& report, const char* table, const std::string& name, const Solid
   const std::vector<Penetration> found = batch.get();
   std::vector<BatchPair> asked = pairs;
   asked.resize(std::min<std::size_t>(count, 5'000));
-  std::vector<Penetration> cpu;
-  const double by_cores = cpu_rate(solids, asked, cpu);
+  const std::vector<PlacedPair> placed = solids.placed(asked);
+  std::vector<Penetration> cpu(asked.size());
+  PenetrationSettings settings;
+  settings.measure = Measure::exact;
+  const double by_cores = rate_of_cores(cpu.size(), 2, [&](std::span<Workspace> workspaces) {
+    penetration_batch(placed, settings, workspaces, cpu, tbb_parallel_for());
+  });
   double worst = 0, crossings = 0, visits = 0;
   std::size_t unanswered = 0, touching = 0, otherwise = 0;
   for (std::size_t i = 0; i < asked.size(); ++i) {
@@ -207,11 +182,7 @@ bool measure(Report& report) {
                              : share < 1e-2                ? "0.1 to 1 %"
                              : share < 1e-1                ? "1 to 10 %"
                                                            : "deep";
-    BatchPair pair;
-    pair.b = 1;
-    pair.pose_b = row.pose;
-    pair.scale_b = row.scale_b;
-    classes[name].push_back(pair);
+    classes[name].push_back(pair_of(row, 1));
   }
   const std::map<std::string, double> wanted = {
       {"0.01 to 0.1 %", 8}, {"0.1 to 1 %", 4}, {"1 to 10 %", 1}, {"deep", 0.7}};
@@ -223,42 +194,20 @@ bool measure(Report& report) {
     ask_few(report, name, two, classes.at(name));
   ask_cards(report, two, classes.at("1 to 10 %"), many);
   const Asset bolt = mesh_of(make_sample("bolt"), "bolt"), nut = mesh_of(make_sample("nut"), "nut");
-  std::vector<BatchPair> engaged = nut_poses(400), clear = engaged;
+  std::vector<BatchPair> engaged = nut_poses(400);
   for (BatchPair& pair : engaged) pair.b = 1;
-  for (BatchPair& pair : clear) {
-    pair.b = 1;
-    pair.pose_b.t[0] = pair.pose_b.t[1] = 0;
-    const double turn = std::atan2(pair.pose_b.q[3], pair.pose_b.q[0]) / std::numbers::pi;
-    pair.pose_b.t[2] = 8 + 2 * turn;
-  }
   const Solids thread = {{&bolt, &nut}};
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
-  right = ask(report, "Nut on bolt", "in clearance", thread, clear, many / 2, 2) && right;
+  right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
+          right;
   // Mated parts, as they are and all together.
-  std::vector<Asset> parts;
-  std::map<std::string, std::uint32_t> number;
-  std::map<std::string, std::vector<BatchPair>> mates;
-  const std::vector<ist::testing::MatedRow> rows = ist::testing::read_mated_rows();
-  for (const ist::testing::MatedRow& row : rows)
-    for (const std::string& mesh : {row.mesh_a, row.mesh_b})
-      if (number.try_emplace(mesh, static_cast<std::uint32_t>(parts.size())).second)
-        parts.push_back(mesh_of(load_mesh(ist::testing::mated_mesh_path(mesh)), mesh));
-  Solids mated;
-  for (const Asset& part : parts) mated.assets.push_back(&part);
-  for (const ist::testing::MatedRow& row : rows) {
-    BatchPair pair;
-    pair.a = number[row.mesh_a];
-    pair.b = number[row.mesh_b];
-    pair.pose_b = row.pose;
-    mates[row.name + (row.moved == 0     ? ", in place"
-                      : row.moved < 1e-2 ? ", near"
-                                         : ", moved")]
-        .push_back(pair);
-  }
+  const MatedParts mated(mesh_of, [](const ist::testing::MatedRow& row) {
+    return row.name + (row.moved == 0 ? ", in place" : row.moved < 1e-2 ? ", near" : ", moved");
+  });
   for (const char* name : {"bolt_in_plate, in place", "plate_on_plate, in place"})
-    ask_few(report, name, mated, mates.at(name));
-  for (const auto& [name, poses] : mates)
-    right = ask(report, "Mated parts", name, mated, poses, many / 50, 0) && right;
+    ask_few(report, name, mated.solids, mated.mates.at(name));
+  for (const auto& [name, poses] : mated.mates)
+    right = ask(report, "Mated parts", name, mated.solids, poses, many / 50, 0) && right;
   for (const std::size_t triangles : {8u, 24u, 80u, 200u}) {
     const Asset a = mesh_of(small_body(triangles, 1), "body"),
                 b = mesh_of(small_body(triangles, 2), "body");

@@ -2,9 +2,7 @@
 // host memory: upload and hierarchy every time, only context and memory pool kept.
 #include <ist/bake.h>
 #include <cstdio>
-#include <cstdlib>
 #include <exception>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -13,7 +11,6 @@
 #include "fingerprint.h"
 #include "mesh/mesh_solid.h"
 #include "report.h"
-#include "support/shared_data.h"
 #include "timing.h"
 
 namespace {
@@ -107,18 +104,15 @@ int main(int argc, char** argv) {
       report.quick() ? std::vector<std::size_t>{100, 1'000, 10'000}
                      : std::vector<std::size_t>{100, 1'000, 10'000, 100'000};
   try {
-    for (const char* file : {"oracle/meshes/dino.off", "meshes/dev/dragon_871k.ply",
-                             "oracle/meshes/elephant.off", "meshes/dev/unit_cube.stl"}) {
-      const std::filesystem::path path = ist::testing::shared_path(file);
-      if (!std::filesystem::exists(path)) {
-        report.remark("missing: " + std::string(file));
-        continue;
-      }
-      const std::string name = path.stem().string();
-      const ist::MeshSolid solid(ist::close_mesh(ist::load_mesh(path.string()), name));
-      measure(name, solid, counts, 10, report);
-      if (name == "dragon_871k" && !report.quick()) measure(name, solid, {1'000'000}, 10, report);
-    }
+    ist::benchmark::for_shared_meshes(report,
+                                      {"oracle/meshes/dino.off", "meshes/dev/dragon_871k.ply",
+                                       "oracle/meshes/elephant.off", "meshes/dev/unit_cube.stl"},
+                                      [&](const std::string& name, const ist::ClosedMesh& mesh) {
+                                        const ist::MeshSolid solid(mesh);
+                                        measure(name, solid, counts, 10, report);
+                                        if (name == "dragon_871k" && !report.quick())
+                                          measure(name, solid, {1'000'000}, 10, report);
+                                      });
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "cuda/base/queue.h"
+#include "fingerprint.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
 #include "support/grid_history.h"
-#include "support/shared_data.h"
 #include "timing.h"
 
 namespace {
@@ -222,15 +222,9 @@ int main(int argc, char** argv) {
     mesh.medial();
   };
   measure("bolt", ist::close_mesh(ist::make_sample("bolt"), "bolt"));
-  for (const char* file : {"oracle/meshes/dino.off", "oracle/meshes/elephant.off",
-                           "meshes/dev/dragon_174k.ply", "meshes/dev/dragon_871k.ply"}) {
-    const std::filesystem::path path = ist::testing::shared_path(file);
-    if (!std::filesystem::exists(path)) {
-      report.remark("missing: " + std::string(file));
-      continue;
-    }
-    const std::string name = path.stem().string();
-    measure(name, ist::close_mesh(ist::load_mesh(path.string()), name));
-  }
+  ist::benchmark::for_shared_meshes(report,
+                                    {"oracle/meshes/dino.off", "oracle/meshes/elephant.off",
+                                     "meshes/dev/dragon_174k.ply", "meshes/dev/dragon_871k.ply"},
+                                    measure);
   return report.write();
 }

@@ -2,15 +2,12 @@
 // places that are equally good, and thinner than any cell.
 #include <ist/bake.h>
 #include <chrono>
-#include <cstdio>
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "fingerprint.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
-#include "support/shared_data.h"
 
 namespace {
 
@@ -48,18 +45,14 @@ int main(int argc, char** argv) {
                                               : std::vector<std::size_t>{100, 1'000, 10'000};
   for (const char* name : {"bolt", "nut", "gear"})
     measure(name, ist::close_mesh(ist::make_sample(name), name), counts, report);
-  for (const char* file :
-       {"oracle/meshes/dino.off", "oracle/meshes/elephant.off", "oracle/meshes/ico1k.off",
-        "oracle/meshes/ico20k.off", "meshes/dev/unit_cube.stl", "meshes/dev/mug.ply",
-        "meshes/dev/dragon_174k.ply", "meshes/dev/dragon_871k.ply", "meshes/bad/hollow_sphere.obj",
-        "meshes/bad/plate_1e-6.obj", "meshes/bad/needle_1e6.obj"}) {
-    const std::filesystem::path path = ist::testing::shared_path(file);
-    if (!std::filesystem::exists(path)) {
-      report.remark("missing: " + std::string(file));
-      continue;
-    }
-    const std::string name = path.stem().string();
-    measure(name, ist::close_mesh(ist::load_mesh(path.string()), name), counts, report);
-  }
+  ist::benchmark::for_shared_meshes(
+      report,
+      {"oracle/meshes/dino.off", "oracle/meshes/elephant.off", "oracle/meshes/ico1k.off",
+       "oracle/meshes/ico20k.off", "meshes/dev/unit_cube.stl", "meshes/dev/mug.ply",
+       "meshes/dev/dragon_174k.ply", "meshes/dev/dragon_871k.ply", "meshes/bad/hollow_sphere.obj",
+       "meshes/bad/plate_1e-6.obj", "meshes/bad/needle_1e6.obj"},
+      [&](const std::string& name, const ist::ClosedMesh& mesh) {
+        measure(name, mesh, counts, report);
+      });
   return report.write();
 }

@@ -2,7 +2,6 @@
 
 // What benchmarks/trade.cpp asks about: pairs of solids, rows with the truth, kept assets.
 
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>

@@ -1,6 +1,5 @@
 // How exact the answers are: bakes the oracle's meshes and asks all of its rows.
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>

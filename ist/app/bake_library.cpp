@@ -15,7 +15,6 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -28,7 +27,6 @@
 #include "library/asset_summary.h"
 #include "library/manifest.h"
 #include "library/run_jobs.h"
-#include "library/summary.h"
 #include "library/text.h"
 
 namespace ist::app {

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <ist/asset_layout.h>
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
@@ -10,8 +11,6 @@
 #include <ctime>
 #include <memory>
 #include <vector>
-
-#include <ist/asset_layout.h>
 
 #include "app/commands.h"
 #include "app/glb_scene.h"
@@ -39,23 +38,20 @@ using Triangle = std::array<Vector3d, 3>;
 /// The triangles of a part in its place.
 std::vector<Triangle> triangles_of(const PlacedAsset& solid) {
   const AssetHeader& asset = solid.asset.header();
-  const char* const bytes = reinterpret_cast<const char*>(&asset);
-  const auto& mesh = *reinterpret_cast<const MeshHeader*>(bytes + asset.mesh);
-  const auto* const vertices = reinterpret_cast<const double*>(bytes + mesh.vertices);
-  const auto* const blocks = reinterpret_cast<const MeshBlock*>(bytes + mesh.level[0].blocks);
+  const auto& mesh = *at<MeshHeader>(asset, asset.mesh);
+  const double* const vertices = at<double>(asset, mesh.vertices);
   const Eigen::Isometry3d place = to_isometry(solid.pose);
   const double size = std::ldexp(1.0, asset.exponent);
   std::vector<Triangle> out;
-  for (std::uint32_t b = 0; b < mesh.level[0].count; ++b)
-    for (std::uint32_t t = 0; t < blocks[b].triangles; ++t) {
-      Triangle& triangle = out.emplace_back();
-      for (std::size_t k = 0; k < 3; ++k)
-        triangle[k] =
-            place *
-            Vector3d(solid.scale *
-                     (size * Vector3d(vertices + 3 * blocks[b].vertex[blocks[b].corner[k][t]]) +
-                      Vector3d(asset.centre)));
-    }
+  for (std::uint32_t b = 0; b < mesh.level[0].count; ++b) {
+    const MeshBlock& block = at<MeshBlock>(asset, mesh.level[0].blocks)[b];
+    const auto corner = [&](int k, std::uint32_t t) -> Vector3d {
+      const Vector3d unit(vertices + 3 * std::size_t{block.vertex[block.corner[k][t]]});
+      return place * (solid.scale * (size * unit + Vector3d(asset.centre)));
+    };
+    for (std::uint32_t t = 0; t < block.triangles; ++t)
+      out.push_back({corner(0, t), corner(1, t), corner(2, t)});
+  }
   return out;
 }
 
@@ -204,37 +200,25 @@ void add_clash(CLI::App& app) {
             ".mjcf: links are)");
   add_number(command, "--clearance", options->settings.clearance, {.least = 0},
              "Also list pairs that are nearer than this, in u");
-  add_parsed(
-      command, "--tolerance", "a finite number ≥ 0",
-      [options](const std::string& text) {
-        return take_number(text, {.least = 0}, false, options->tolerance);
-      },
+  add_number(
+      command, "--tolerance", options->tolerance, {.least = 0},
       "Accepted volume of an overlap, in u³: each pair is certainly above it, certainly below, or "
       "undecided. What is certainly below is no clash")
-      ->type_name("NUMBER");
-  add_parsed(
-      command, "--touch-within", "a finite number ≥ 0",
-      [options](const std::string& text) {
-        return take_number(text, {.least = 0}, false, options->settings.touch_within);
-      },
+      ->default_str("");
+  add_number(
+      command, "--touch-within", options->settings.touch_within, {.least = 0},
       "Parts that reach no further into each other than this, in u, or are no further apart, "
       "touch. Default: what rounding to the file's float32 or float64 comes to")
-      ->type_name("NUMBER");
-  add_input(command, "--rules", options->assembly.rules,
-            "A TOML with [[ignore]] and [[group]], for scenes and robots")
-      ->required(false)
-      ->type_name("FILE");
-  add_input(command, "--baseline", options->baseline,
-            "An earlier --json: pairs are added, persistent or resolved, and only added ones end "
-            "with exit code 3")
-      ->required(false)
-      ->type_name("FILE");
+      ->default_str("");
+  add_file(command, "--rules", options->assembly.rules,
+           "A TOML with [[ignore]] and [[group]], for scenes and robots");
+  add_file(command, "--baseline", options->baseline,
+           "An earlier --json: pairs are added, persistent or resolved, and only added ones end "
+           "with exit code 3");
   CLI::Option* const poses =
-      add_input(command, "--poses", options->assembly.poses,
-                "CSV of poses to sweep: id,part,qw,qx,qy,qz,tx,ty,tz, or of a robot a column a "
-                "joint. The worst of each pair is listed, with its id")
-          ->required(false)
-          ->type_name("FILE");
+      add_file(command, "--poses", options->assembly.poses,
+               "CSV of poses to sweep: id,part,qw,qx,qy,qz,tx,ty,tz, or of a robot a column a "
+               "joint. The worst of each pair is listed, with its id");
   command
       ->add_option_function<std::vector<std::string>>(
           "--pose",
@@ -252,11 +236,8 @@ void add_clash(CLI::App& app) {
   add_setting_options(command, options->closing, closing_settings());
   add_whole(command, "--threads", options->settings.threads,
             "Number of threads; 0 = all cores. The result does not depend on it", 0u, 1024u);
-  const auto add_file = [&](const std::string& name, std::string& path, const std::string& help) {
-    add_input(command, name, path, help)->required(false)->type_name("FILE");
-  };
-  add_file("--bcf", options->bcf, "Write the clashes as a BCF 2.1 archive, a topic each");
-  add_file("--glb", options->glb, "Write a scene: parts in grey, overlaps in red");
+  add_file(command, "--bcf", options->bcf, "Write the clashes as a BCF 2.1 archive, a topic each");
+  add_file(command, "--glb", options->glb, "Write a scene: parts in grey, overlaps in red");
   CLI::Option* const json = command->add_flag("--json", options->json, "Print JSON");
   command->add_flag("--csv", options->csv, "Print CSV")->excludes(json);
   command->footer(

@@ -1,6 +1,5 @@
 #include "app/glb_scene.h"
 
-#include <Eigen/Geometry>
 #include <bit>
 #include <cstring>
 #include <utility>

@@ -118,22 +118,23 @@ std::string describe_closing(const MeshReport& report) {
 }
 
 nlohmann::ordered_json closing_json(const MeshReport& report) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const char* name : {"method", "confidence", "agreement", "agreement_error", "kept_surface",
-                           "volume_ratio", "input_mean", "input_max", "made_mean", "made_max"})
+  using Quality = RepairQuality;
+  constexpr std::pair<const char*, double Quality::*> kNumbers[] = {
+      {"confidence", &Quality::confidence},
+      {"agreement", &Quality::agreement},
+      {"agreement_error", &Quality::agreement_error},
+      {"kept_surface", &Quality::kept_surface},
+      {"volume_ratio", &Quality::volume_ratio},
+      {"input_mean", &Quality::input_mean},
+      {"input_max", &Quality::input_max},
+      {"made_mean", &Quality::made_mean},
+      {"made_max", &Quality::made_max}};
+  nlohmann::ordered_json json = {{"method", nullptr}};
+  if (report.judged) json["method"] = report.wrapped ? "wrap" : "repair";
+  for (const auto& [name, number] : kNumbers) {
     json[name] = nullptr;
-  if (!report.judged) return json;
-  const RepairQuality& judged = *report.judged;
-  json["method"] = report.wrapped ? "wrap" : "repair";
-  json["confidence"] = judged.confidence;
-  json["agreement"] = judged.agreement;
-  json["agreement_error"] = judged.agreement_error;
-  json["kept_surface"] = judged.kept_surface;
-  json["volume_ratio"] = judged.volume_ratio;
-  json["input_mean"] = judged.input_mean;
-  json["input_max"] = judged.input_max;
-  json["made_mean"] = judged.made_mean;
-  json["made_max"] = judged.made_max;
+    if (report.judged) json[name] = (*report.judged).*number;
+  }
   return json;
 }
 

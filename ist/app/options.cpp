@@ -109,6 +109,11 @@ CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& 
       });
 }
 
+CLI::Option* add_file(CLI::App* command, const std::string& name, std::string& path,
+                      const std::string& help) {
+  return add_input(command, name, path, help)->required(false)->type_name("FILE");
+}
+
 CLI::Option* add_output(CLI::App* command, std::string& path, const std::string& help, Dash dash) {
   return command->add_option("-o,--output", path, help)
       ->required()

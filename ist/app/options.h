@@ -49,6 +49,10 @@ bool is_robot_file(const std::string& path);
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,
                        const std::string& help);
 
+/// An option that names such a file, and need not be given.
+CLI::Option* add_file(CLI::App* command, const std::string& name, std::string& path,
+                      const std::string& help);
+
 /// Whether "-" may stand for standard output.
 enum class Dash { refused, standard_output };
 

@@ -16,7 +16,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -256,14 +255,6 @@ std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer
   for (int k = 0; k < 3; ++k)
     out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
   return out;
-}
-
-/// In quotes where it would be more than one field.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + '"';
 }
 
 }  // namespace

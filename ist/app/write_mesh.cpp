@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <iterator>
-#include <string>
+#include <string_view>
+#include <utility>
 
 #include <ist/types.h>
 
@@ -70,20 +70,27 @@ std::string stl(const TriangleMesh& mesh) {
   return out;
 }
 
-}  // namespace
+using Writer = std::string (*)(const TriangleMesh&);
 
-bool has_mesh_ending(const std::string& path) {
-  const std::string ending = ending_of(path);
-  return ending == ".obj" || ending == ".off" || ending == ".ply" || ending == ".stl";
+/// Null for another ending.
+Writer writer_of(const std::string& path) {
+  constexpr std::pair<std::string_view, Writer> kWriters[] = {
+      {".obj", obj}, {".off", off}, {".ply", ply}, {".stl", stl}};
+  for (const auto& [ending, writer] : kWriters)
+    if (ending == ending_of(path)) return writer;
+  return nullptr;
 }
 
+}  // namespace
+
+bool has_mesh_ending(const std::string& path) { return writer_of(path) != nullptr; }
+
 void write_mesh(const TriangleMesh& mesh, const std::string& path) {
-  const std::string ending = ending_of(path);
-  if (ending == ".obj") return write_atomically(path, obj(mesh));
-  if (ending == ".off") return write_atomically(path, off(mesh));
-  if (ending == ".ply") return write_atomically(path, ply(mesh));
-  if (ending == ".stl") return write_atomically(path, stl(mesh));
-  throw Error(path + ": unknown mesh format '" + ending + "'; use .obj, .ply, .off or .stl");
+  const Writer writer = writer_of(path);
+  if (writer == nullptr)
+    throw Error(path + ": unknown mesh format '" + ending_of(path) +
+                "'; use .obj, .ply, .off or .stl");
+  write_atomically(path, writer(mesh));
 }
 
 }  // namespace ist::app

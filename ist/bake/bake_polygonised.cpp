@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <memory>
 #include <numbers>
-#include <string>
 #include <vector>
 
 #include "bake/backend/make_backend.h"

@@ -14,7 +14,6 @@
 #include <optional>
 #include <string>
 #include <typeinfo>
-#include <vector>
 
 #include <ist/bullet/convert.h>
 

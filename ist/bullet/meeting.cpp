@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include <ist/bullet/convert.h>
 #include <ist/contact_law.h>

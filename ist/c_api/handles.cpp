@@ -1,6 +1,5 @@
 #include "c_api/handles.h"
 
-#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -13,32 +12,12 @@
 namespace ist::c_api {
 namespace {
 
-ist_status_t asset_status_of(AssetStatus status) noexcept {
-  switch (status) {
-    case AssetStatus::ok:
-      return IST_OK;
-    case AssetStatus::too_short:
-      return IST_TOO_SHORT;
-    case AssetStatus::misaligned:
-      return IST_MISALIGNED;
-    case AssetStatus::not_an_asset:
-      return IST_NOT_AN_ASSET;
-    case AssetStatus::other_version:
-      return IST_OTHER_FORMAT;
-    case AssetStatus::corrupt_hash:
-      return IST_CORRUPT_HASH;
-    case AssetStatus::corrupt_layout:
-      break;
-  }
-  return IST_CORRUPT_LAYOUT;
-}
-
 ist_status_t make_tree(const void* bytes, std::size_t size, ist_asset_t& asset) noexcept {
   AssetHandle& handle = *new (&asset) AssetHandle{};
   const AssetStatus status =
       AssetView::from_bytes({static_cast<const std::byte*>(bytes), size}, handle.view);
   if (status == AssetStatus::ok) handle.mark = handle.expected_mark();
-  return asset_status_of(status);
+  return status_of(status);
 }
 
 struct CloseFile {

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <cstring>
-#include <new>
 
 #include <ist/c.h>
 #include <ist/deadline.h>

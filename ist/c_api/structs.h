@@ -50,19 +50,27 @@ inline void write(const Pose& found, ist_pose_t& out) noexcept {
   std::copy_n(found.t, 3, out.t);
 }
 
+/// By QueryStatus.
+inline constexpr ist_status_t kStatuses[] = {IST_OK, IST_BUDGET_EXHAUSTED, IST_INVALID_INPUT,
+                                             IST_MISSING_DATA, IST_ERROR_EXCEEDED};
 inline ist_status_t status_of(QueryStatus status) noexcept {
-  return status == QueryStatus::ok                 ? IST_OK
-         : status == QueryStatus::budget_exhausted ? IST_BUDGET_EXHAUSTED
-         : status == QueryStatus::error_exceeded   ? IST_ERROR_EXCEEDED
-         : status == QueryStatus::missing_data     ? IST_MISSING_DATA
-                                                   : IST_INVALID_INPUT;
+  return kStatuses[static_cast<std::uint32_t>(status)];
 }
 inline QueryStatus query_status(ist_status_t status) noexcept {
-  return status == IST_OK                 ? QueryStatus::ok
-         : status == IST_BUDGET_EXHAUSTED ? QueryStatus::budget_exhausted
-         : status == IST_ERROR_EXCEEDED   ? QueryStatus::error_exceeded
-         : status == IST_MISSING_DATA     ? QueryStatus::missing_data
-                                          : QueryStatus::invalid_input;
+  const auto* const found = std::find(std::begin(kStatuses), std::end(kStatuses), status);
+  return found == std::end(kStatuses) ? QueryStatus::invalid_input
+                                      : static_cast<QueryStatus>(found - kStatuses);
+}
+
+// What an asset's bytes lack has the same order in both, downwards.
+static_assert(IST_TOO_SHORT - IST_CORRUPT_LAYOUT == static_cast<int>(AssetStatus::corrupt_layout) -
+                                                        static_cast<int>(AssetStatus::too_short));
+inline ist_status_t status_of(AssetStatus status) noexcept {
+  return status == AssetStatus::ok ? IST_OK : IST_TOO_SHORT + 1 - static_cast<int>(status);
+}
+/// Of one from IST_TOO_SHORT to IST_CORRUPT_LAYOUT.
+inline AssetStatus asset_status_of(ist_status_t status) noexcept {
+  return static_cast<AssetStatus>(IST_TOO_SHORT + 1 - status);
 }
 
 /// Copies an answer from C++ to C or back. What lies between a struct's numbers is 0, so that its

@@ -5,7 +5,6 @@
 #include <fnmatch.h>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <set>
 #include <string_view>
 

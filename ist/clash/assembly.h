@@ -1,10 +1,7 @@
 #pragma once
 
-#include <map>
 #include <memory>
-#include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <ist/asset.h>

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
-#include <sstream>
 
 #include <ist/types.h>
 
@@ -19,14 +17,6 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kSchema = "ist.clash/1";
 
 Json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-/// A field of a CSV, in quotes where it must be.
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string out = "\"";
-  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
-  return out + "\"";
-}
 
 }  // namespace
 
@@ -103,7 +93,7 @@ std::string clashes_csv(const ClashReport& report) {
       out += fmt::format(",{}", column);
   out += "\n";
   const auto field = [](const Json& value) {
-    return value.is_string()   ? quoted(value.get<std::string>())
+    return value.is_string()   ? csv_field(value.get<std::string>())
            : value.is_null()   ? std::string()
            : value.is_number() ? fmt::format("{:.17g}", value.get<double>())
                                : value.dump();

@@ -10,6 +10,7 @@
 #include <ist/asset_layout.h>
 #include <ist/mass_properties.h>
 #include "bake/predict/trial_poses.h"
+#include "library/settings/spelling.h"
 #include "library/text.h"
 
 namespace ist {
@@ -107,18 +108,10 @@ nlohmann::ordered_json target_json(const AssetView& tree) {
 }
 
 const char* why_missed(StopReason stop) {
-  switch (stop) {
-    case StopReason::coverage:
-      return "the requested coverage ended the packing";
-    case StopReason::min_radius:
-      return "the requested smallest radius ended the packing";
-    case StopReason::time_limit:
-      return "the time limit ended the search";
-    case StopReason::exhausted:
-      return "no more spheres fit";
-    default:
-      return "no more spheres are allowed";
-  }
+  constexpr const char* kCount = "no more spheres are allowed";
+  return word_of(stop, {kCount, "the requested coverage ended the packing",
+                        "the requested smallest radius ended the packing",
+                        "the time limit ended the search", kCount, "no more spheres fit"});
 }
 
 /// The file ends with the mesh.

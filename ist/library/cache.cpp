@@ -11,10 +11,8 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <algorithm>
-#include <cerrno>
 #include <fstream>
 #include <span>
-#include <string_view>
 #include <system_error>
 #include <type_traits>
 #include <utility>

@@ -13,9 +13,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <fstream>
-#include <mutex>
 #include <new>
-#include <optional>
 #include <string_view>
 #include <system_error>
 #include <thread>
@@ -24,6 +22,7 @@
 #include "bake/asset/atomic_file.h"
 #include "library/input_mesh.h"
 #include "library/job_queue.h"
+#include "library/settings/spelling.h"
 #include "robots/description/link_mesh.h"
 
 namespace ist {
@@ -330,17 +329,7 @@ void OutputRecord::add(const CacheKey& key, const CacheEntry& entry) {
 }
 
 const char* name_of(JobStatus status) noexcept {
-  switch (status) {
-    case JobStatus::baked:
-      return "baked";
-    case JobStatus::cached:
-      return "cached";
-    case JobStatus::failed:
-      return "failed";
-    case JobStatus::not_baked:
-      return "not_baked";
-  }
-  return "unknown";
+  return word_of(status, {"baked", "cached", "failed", "not_baked"});
 }
 
 RunOutcome run_jobs(const std::vector<Job>& jobs, const RunSettings& settings,

@@ -5,11 +5,9 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <optional>
-#include <string_view>
 
 #include <ist/types.h>
 

@@ -4,10 +4,19 @@
 
 #include <nlohmann/json.hpp>
 
+#include "library/settings/spelling.h"
+
 namespace ist {
 
 std::string json_text(const nlohmann::ordered_json& json, int indent) {
   return json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + '"';
 }
 
 std::string grouped(std::uint64_t count) {
@@ -22,55 +31,17 @@ std::string short_vector(const Eigen::Vector3d& v) {
 }
 
 const char* name_of(StopReason reason) noexcept {
-  switch (reason) {
-    case StopReason::sphere_count:
-      return "sphere_count";
-    case StopReason::coverage:
-      return "coverage";
-    case StopReason::min_radius:
-      return "min_radius";
-    case StopReason::time_limit:
-      return "time_limit";
-    case StopReason::cancelled:
-      return "cancelled";
-    case StopReason::exhausted:
-      return "exhausted";
-  }
-  return "unknown";
+  return word_of(
+      reason, {"sphere_count", "coverage", "min_radius", "time_limit", "cancelled", "exhausted"});
 }
 
 const char* name_of(QueryStatus status) noexcept {
-  switch (status) {
-    case QueryStatus::ok:
-      return "ok";
-    case QueryStatus::budget_exhausted:
-      return "budget_exhausted";
-    case QueryStatus::invalid_input:
-      return "invalid_input";
-    case QueryStatus::missing_data:
-      return "missing_data";
-    case QueryStatus::error_exceeded:
-      return "error_exceeded";
-  }
-  return "unknown";
+  return word_of(status,
+                 {"ok", "budget_exhausted", "invalid_input", "missing_data", "error_exceeded"});
 }
 
 const char* name_of(TrialPartner partner) noexcept {
-  switch (partner) {
-    case TrialPartner::copy:
-      return "copy";
-    case TrialPartner::plane:
-      return "plane";
-    case TrialPartner::ball:
-      return "ball";
-    case TrialPartner::edge:
-      return "edge";
-    case TrialPartner::corner:
-      return "corner";
-    case TrialPartner::plate:
-      return "plate";
-  }
-  return "unknown";
+  return word_of(partner, {"copy", "plane", "ball", "edge", "corner", "plate"});
 }
 
 }  // namespace ist

@@ -17,6 +17,8 @@ namespace ist {
 /// For files and --json. Names that are not UTF-8 are written with replacement characters.
 std::string json_text(const nlohmann::ordered_json& json, int indent = 2);
 
+/// A field of a CSV, in quotes where it must be.
+std::string csv_field(const std::string& text);
 std::string grouped(std::uint64_t count);  ///< 10,000
 std::string short_vector(const Eigen::Vector3d& v);
 

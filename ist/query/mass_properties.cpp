@@ -1,7 +1,6 @@
 #include <ist/mass_properties.h>
 
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include <ist/asset_layout.h>

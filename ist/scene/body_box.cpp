@@ -1,7 +1,5 @@
 #include "scene/body_box.h"
 
-#include <cmath>
-
 #include "query/base/relative_pose.h"
 
 namespace ist {

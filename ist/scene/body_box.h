@@ -1,12 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
 #include "query/find_solid_box.h"
-#include "scene/box_kernel.h"
 #include "scene/box_tree.h"
 
 namespace ist {
@@ -26,6 +26,20 @@ struct BoxWidths {
   bool by_spheres = false;  ///< by what matched spheres stick out
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
+
+/// Boxes of several bodies, side by side.
+struct BodyBlock {
+  static constexpr std::size_t kCount = 8;
+
+  // What of a body does not change [u], and its pose.
+  double middle[3][kCount], half[3][kCount], wider[kCount];
+  double q[4][kCount], t[3][kCount];
+  // What place_boxes() writes: the same bits as SolidBox::placed() and WorldBox::write().
+  float low[3][kCount], high[3][kCount];
+  std::uint32_t placed;  ///< bit k: the k-th pose is usable and floats hold its box
+};
+
+void place_boxes(BodyBlock& block) noexcept;
 
 /// What of a body's box does not change with its pose.
 class BodyBox {

@@ -1,4 +1,4 @@
-#include "scene/box_kernel.h"
+#include "scene/body_box.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "scene/box_kernel.cpp"

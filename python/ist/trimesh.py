@@ -230,6 +230,9 @@ class _Pairs:
     def __init__(self, of_a, of_b, first, second, gap):
         self.of_a, self.of_b, self.first, self.second, self.gap = of_a, of_b, first, second, gap
 
+    def only(self, kept):
+        return _Pairs(self.of_a, self.of_b, self.first[kept], self.second[kept], self.gap[kept])
+
     def ask(self, query, chosen, poses=None, **settings):
         """The query of some of them, in one call. poses: of B; None: its own."""
         first, second = self.first[chosen], self.second[chosen]
@@ -298,17 +301,12 @@ def _all_of(of_a, of_b):
 
 def _all_within(objects):
     pairs = _all_of(objects, objects)
-    kept = pairs.first < pairs.second
-    return _Pairs(objects, objects, pairs.first[kept], pairs.second[kept], pairs.gap[kept])
-
-
-def _meeting(pairs):
-    kept = pairs.gap == 0
-    return _Pairs(pairs.of_a, pairs.of_b, pairs.first[kept], pairs.second[kept], pairs.gap[kept])
+    return pairs.only(pairs.first < pairs.second)
 
 
 def _pairs_of(of_a, of_b):
-    return _meeting(_all_of(of_a, of_b))
+    pairs = _all_of(of_a, of_b)
+    return pairs.only(pairs.gap == 0)
 
 
 def _collide(pairs, with_names, with_data):

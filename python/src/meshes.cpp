@@ -3,13 +3,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
-#include <memory>
 #include <string>
 
-#include <ist/mesh.h>
-
-#include "arrays.h"
 #include "mesh/samples/samples.h"
 #include "meshes.h"
 #include "module.h"

@@ -1,7 +1,6 @@
 #include "offline.h"
 
 #include <atomic>
-#include <chrono>
 #include <condition_variable>
 #include <exception>
 #include <mutex>

@@ -1,8 +1,6 @@
 #include "penetration.h"
 
-#include <algorithm>
 #include <cmath>
-#include <memory>
 
 #include <ist/contact_law.h>
 #include <ist/shapes.h>

@@ -44,6 +44,22 @@ struct Penetrations {
   void write(std::size_t i, const Row& row, const Penetration& answer) const;
 };
 
+/// Separations as columns.
+struct Separations {
+  Shape rows;
+  Column<double> distance{rows}, distance_min{rows}, distance_max{rows};
+  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
+  Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
+};
+
+/// Times of impact as columns.
+struct Impacts {
+  Shape rows;
+  Column<double> time{rows}, distance_min{rows}, distance_max{rows};
+  Column<double, 3> point_a{rows}, point_b{rows}, normal{rows};
+  Column<std::uint32_t> kind{rows}, status{rows}, node_visits{rows}, surface_pairs{rows};
+};
+
 /// The parts of answers of a class that a pickle holds.
 template <class Class>
 struct Pickled {

@@ -2,8 +2,6 @@
 #include <ist/lenses.h>
 #include <ist/mass_properties.h>
 
-#include <algorithm>
-#include <cmath>
 #include <memory>
 #include <vector>
 

@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstring>
 #include <functional>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>

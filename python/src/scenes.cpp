@@ -11,9 +11,7 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/unique_ptr.h>
 
-#include "impacts.h"
 #include "penetration.h"
-#include "separation.h"
 #include "surfaces.h"
 
 namespace ist::python {

@@ -1,7 +1,6 @@
 #include "solid_rows.h"
 
 #include <charconv>
-#include <utility>
 
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>

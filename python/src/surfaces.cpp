@@ -1,6 +1,5 @@
 #include <ist/raycast.h>
 
-#include <algorithm>
 #include <limits>
 #include <memory>
 

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <memory>
 
-#include "impacts.h"
 #include "penetration.h"
 
 namespace ist::python {

@@ -14,9 +14,9 @@ namespace ist {
 template <class Result>
 class Aside {
  public:
-  /// `threads`: 0 = all cores. `time_limit` [s] from now, after which it is stopped; 0: none.
-  Aside(unsigned threads, std::function<Result(const WorkStop&)> work, double time_limit = 0)
-      : threads_(threads), work_(std::move(work)), stop_(time_limit) {}
+  /// `threads`: 0 = all cores.
+  Aside(unsigned threads, std::function<Result(const WorkStop&)> work)
+      : threads_(threads), work_(std::move(work)) {}
   ~Aside() { stop_.stop(); }
   Aside(const Aside&) = delete;
   Aside& operator=(const Aside&) = delete;

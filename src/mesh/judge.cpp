@@ -19,7 +19,6 @@
 #include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
-#include "mesh/two_meshes.h"
 
 namespace ist {
 namespace {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
-#include <cmath>
 #include <exception>
 #include <set>
 #include <span>

@@ -10,7 +10,8 @@
 #include <atomic>
 #include <cmath>
 
-#include "mesh/exact_closest_point.h"
+#include "mesh/geometry/closest_point.h"
+#include "mesh/geometry/exact_triangle.h"
 #include "mesh/hierarchy/winding.h"
 
 namespace ist {
@@ -55,6 +56,34 @@ std::uint64_t hash_mesh(const UnitFrame& frame, const RawArray<double>& vertices
   const std::uint64_t hash = XXH3_64bits_digest(state);
   XXH3_freeState(state);
   return hash;
+}
+
+/// Closest point by the double formula over every triangle, the smaller index among equals. The
+/// float hierarchy and the float distances only rule triangles out, with a margin for their error.
+/// If nothing is closer than `limit`: distance = limit, triangle = kNoTriangle.
+ClosestPoint exact_closest_point(const MeshView& mesh, const Eigen::Vector3d& p, double limit) {
+  const ExactReach reach(p.data());
+  ClosestPoint best;
+  best.distance = limit;
+  best.triangle = kNoTriangle;
+  double best2 = limit * limit;
+  float radius2 = reach.reach2(best2);
+  for_triangles_near(mesh, reach.p, radius2, [&](const NearTriangle& near) {
+    const std::uint32_t* t = mesh.triangles + 3 * std::size_t{near.triangle};
+    const auto corner = [&](int i) { return mesh.vertices + 3 * std::size_t{t[i]}; };
+    double point[3];
+    const double distance2 = exact_closest_in({corner(0), corner(1), corner(2)}, p.data(), point);
+    if (distance2 < best2 ||
+        (distance2 == best2 && near.triangle < best.triangle && best.triangle != kNoTriangle)) {
+      best2 = distance2;
+      best.triangle = near.triangle;
+      best.point = {point[0], point[1], point[2]};
+      radius2 = reach.reach2(best2);
+    }
+    return radius2;
+  });
+  if (best.triangle != kNoTriangle) best.distance = std::sqrt(best2);
+  return best;
 }
 
 }  // namespace

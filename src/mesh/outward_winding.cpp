@@ -6,13 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdint>
 #include <limits>
 #include <numbers>
-#include <utility>
-#include <vector>
 
-#include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/shells.h"
 #include "mesh/connectivity/surface_reduction.h"

@@ -2,21 +2,17 @@
 
 #include <ist/types.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
 #include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"
 #include "mesh/connectivity/border_vertices.h"
 #include "mesh/connectivity/disjoint_sets.h"
-#include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/shells.h"
 #include "mesh/connectivity/surface_reduction.h"
 #include "mesh/connectivity/usable_mesh.h"

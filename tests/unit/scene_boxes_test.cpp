@@ -7,7 +7,7 @@
 #include <random>
 
 #include "query/base/solid_box.h"
-#include "scene/box_kernel.h"
+#include "scene/body_box.h"
 
 // Boxes of bodies by vectors: the bits of one body's, on every instruction set.
 

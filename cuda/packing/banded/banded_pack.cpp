@@ -1,7 +1,6 @@
 #include "cuda/packing/banded/banded_pack.h"
 
 #include <chrono>
-#include <memory>
 #include <thread>
 
 #include "cuda/base/device_array.h"

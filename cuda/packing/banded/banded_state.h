@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
 #include "cuda/packing/banded/sphere_lists.h"
 #include "packing/banded/band_schedule.h"

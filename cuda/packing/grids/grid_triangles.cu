@@ -1,7 +1,5 @@
 #include "cuda/packing/grids/grid_triangles.h"
 
-#include <algorithm>
-
 #include "cuda/base/launch.h"
 #include "packing/grids/local_winding.h"
 

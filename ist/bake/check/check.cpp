@@ -8,7 +8,6 @@
 #include <random>
 #include <vector>
 
-#include "bake/check/check_kept_mesh.h"
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_tally.h"
 #include "bake/check/checked_mesh.h"

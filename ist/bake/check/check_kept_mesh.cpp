@@ -1,5 +1,3 @@
-#include "bake/check/check_kept_mesh.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 
 #include <ist/asset.h>
 
+#include "bake/check/check_spheres.h"
 #include "bake/check/check_tally.h"
 #include "bake/mesh/kept_mesh.h"
 

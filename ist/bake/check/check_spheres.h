@@ -4,7 +4,6 @@
 #include <ist/bake.h>
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "bake/check/checked_mesh.h"
@@ -28,6 +27,14 @@ std::vector<Invariant> check_matched(const AssetHeader& asset, std::uint32_t det
 
 /// Every point of the solid lies in some cover ball: proven by subdivision.
 Invariant check_cover(const AssetHeader& asset, const CheckedSolid& checked);
+
+/// The mesh of an asset that has one, against the mesh that was baked and by itself: its triangles
+/// and errors, closed, its blocks, neighbours, shells and boxes.
+///
+/// `baked`: what was baked, or made in the solid's place; `checked`: the same in the unit frame,
+/// `frame`.
+std::vector<Invariant> check_kept_mesh(const AssetHeader& asset, const ClosedMesh& baked,
+                                       const UnitFrame& frame, const CheckedMesh& checked);
 
 /// For every sphere, the others that it overlaps.
 std::vector<std::vector<std::uint32_t>> overlapping_pairs(const Sphere* spheres, std::size_t count);

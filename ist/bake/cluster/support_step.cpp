@@ -1,6 +1,5 @@
 #include "bake/cluster/support_step.h"
 
-#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>

@@ -1,12 +1,9 @@
 #include "bake/predict/partner_trials.h"
 
 #include <ist/bake.h>
-#include <ist/query.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numbers>
 #include <optional>

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cctype>
 #include <type_traits>
-#include <utility>
 
 #include "library/settings/numbers.h"
+#include "library/settings/spelling.h"
 
 namespace ist {
 namespace {
@@ -342,18 +342,7 @@ const char* name_of(GridMode mode) noexcept {
 }
 
 const char* name_of(MeshState state) noexcept {
-  switch (state) {
-    case MeshState::own:
-      return "own";
-    case MeshState::resolved:
-      return "resolved";
-    case MeshState::polygonised:
-      return "polygonised";
-    case MeshState::unresolved:
-      return "unresolved";
-    default:
-      return "none";
-  }
+  return word_of(state, {"none", "own", "resolved", "polygonised", "unresolved"});
 }
 
 }  // namespace ist

@@ -1,14 +1,11 @@
 #include <ist/asset.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 
 #include <ist/asset_layout.h>
 #include "query/asset/content_hash.h"
 #include "query/asset/valid_values.h"
-#include "query/asset/validate_mass.h"
-#include "query/asset/validate_mesh.h"
 
 namespace ist {
 namespace {

@@ -29,18 +29,15 @@ struct SphereTree {
   };
 
   SphereTree(const AssetHeader& asset, const TreeHeader& tree) noexcept
-      : header(&tree), top(static_cast<int>(tree.level_count) - 1) {
+      : header(&tree),
+        top(static_cast<int>(tree.level_count) - 1),
+        sphere_cover(tree.sphere_cover != 0 ? at<float>(asset, tree.sphere_cover) : nullptr) {
     for (int i = 0; i <= top; ++i) {
       const LevelHeader& from = tree.level[i];
       level[i] = {at<BallBlock>(asset, from.blocks), at<Origin>(asset, from.origins),
                   at<NodeBlock>(asset, from.nodes), from.count};
     }
-    sphere_cover = tree.sphere_cover != 0 ? at<float>(asset, tree.sphere_cover) : nullptr;
   }
-
-  /// A tree of balls that stand for something else than spheres: levels are set by the caller.
-  explicit SphereTree(const TreeHeader& tree) noexcept
-      : header(&tree), top(static_cast<int>(tree.level_count) - 1), sphere_cover(nullptr) {}
 
   /// Unit frame, at full precision.
   NodeBall ball(int at_level, std::uint32_t block) const noexcept {

@@ -34,4 +34,14 @@ inline bool sound_origin(const Origin& origin) noexcept {
   return is_offset(origin.x) && is_offset(origin.y) && is_offset(origin.z);
 }
 
+/// The mass properties and bounds of an asset could be those of some solid.
+bool sound_mass(const AssetHeader& header) noexcept;
+
+/// The counts by which the mesh's sections are placed.
+bool sound_mesh_counts(const MeshHeader& mesh) noexcept;
+
+/// The rest, once its sections are where they should be: every index that a query follows leads
+/// into its array, every number is finite, neighbours know each other.
+bool sound_mesh(const AssetHeader& header, const MeshHeader& mesh) noexcept;
+
 }  // namespace ist

@@ -1,5 +1,3 @@
-#include "query/asset/validate_mass.h"
-
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <algorithm>

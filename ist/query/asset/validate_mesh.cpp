@@ -1,5 +1,3 @@
-#include "query/asset/validate_mesh.h"
-
 #include <algorithm>
 
 #include "query/asset/mesh_parts.h"

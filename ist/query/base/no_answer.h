@@ -2,7 +2,6 @@
 
 #include <limits>
 #include <type_traits>
-#include <variant>
 
 #include <ist/query.h>
 #include <ist/shapes.h>

@@ -1,9 +1,5 @@
 #include "query/contact/write_patches.h"
 
-#include <Eigen/Geometry>
-#include <algorithm>
-#include <cmath>
-
 #include "query/contact/contact_division.h"
 
 namespace ist {

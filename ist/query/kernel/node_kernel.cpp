@@ -1,8 +1,5 @@
 #include "query/kernel/node_kernel.h"
 
-#include <algorithm>
-#include <cmath>
-
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/kernel/node_kernel.cpp"
 #include <hwy/foreach_target.h>

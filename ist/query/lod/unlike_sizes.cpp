@@ -2,7 +2,6 @@
 
 #include <ist/mass_properties.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>

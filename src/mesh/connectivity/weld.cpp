@@ -2,16 +2,12 @@
 
 #include <tbb/parallel_for.h>
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <numeric>
-#include <vector>
 
 namespace ist {
 namespace {

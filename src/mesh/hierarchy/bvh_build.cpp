@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <limits>
-#include <memory>
 #include <span>
 #include <utility>
 #include <vector>

@@ -8,7 +8,7 @@
 #include "mesh/hierarchy/wide_traversal.h"
 
 // Distance queries of a WideTree, by a team: one thread or a warp (base/team.h). The answers
-// are those of closest_point.h and exact_closest_point.h, bit for bit. All lanes ask the same and
+// are those of closest_point.h and exact_triangle.h, bit for bit. All lanes ask the same and
 // get the same.
 
 namespace ist {

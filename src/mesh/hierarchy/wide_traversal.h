@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstring>
-
 #include "mesh/hierarchy/wide_tree.h"
 
 namespace ist {

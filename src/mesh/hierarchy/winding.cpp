@@ -9,7 +9,6 @@
 
 #include "mesh/geometry/closest_point.h"
 #include "mesh/geometry/exact_triangle.h"
-#include "mesh/geometry/mesh_view.h"
 #include "mesh/hierarchy/line_lattice.h"
 
 namespace ist {

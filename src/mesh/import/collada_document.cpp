@@ -1,6 +1,5 @@
 #include "mesh/import/collada_document.h"
 
-#include <algorithm>
 #include <string>
 
 #include "mesh/import/text_scanner.h"

@@ -1,12 +1,10 @@
 #include "mesh/import/source_file.h"
 
-#include <algorithm>
 #include <array>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
-#include <utility>
 
 #include <ist/types.h>
 

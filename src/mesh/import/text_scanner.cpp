@@ -1,6 +1,5 @@
 #include "mesh/import/text_scanner.h"
 
-#include <charconv>
 #include <limits>
 #include <string>
 #include <system_error>

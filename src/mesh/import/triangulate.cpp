@@ -1,5 +1,4 @@
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <vector>
 
 #include "mesh/import/polygon_mesh.h"

@@ -4,8 +4,6 @@
 #include <string>
 #include <utility>
 
-#include <ist/types.h>
-
 #include "base/stage.h"
 #include "mesh/level_set/dual_mesh.h"
 #include "mesh/level_set/surface_cells.h"

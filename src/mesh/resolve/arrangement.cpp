@@ -2,9 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include "mesh/connectivity/disjoint_sets.h"

@@ -3,7 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
-#include <cstddef>
 #include <cstdint>
 #include <unordered_map>
 #include <vector>

@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
-#include <utility>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/item_groups.h"

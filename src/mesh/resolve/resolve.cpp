@@ -11,8 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include <ist/types.h>
-
 #include "base/message_text.h"
 #include "base/stage.h"
 #include "base/thread_arena.h"

@@ -1,11 +1,9 @@
 #include "packing/calibrate/calibration.h"
 
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <numeric>
 #include <utility>

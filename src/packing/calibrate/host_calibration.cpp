@@ -7,7 +7,6 @@
 #include <atomic>
 #include <cmath>
 
-#include "packing/calibrate/column_lattice.h"
 #include "packing/calibrate/power_kernel.h"
 #include "packing/calibrate/protrusion.h"
 

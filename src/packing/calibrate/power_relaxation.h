@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <numbers>
-#include <vector>
 
 #include "base/roots.h"
 #include "packing/backend/tasks.h"

@@ -1,6 +1,5 @@
 #include "packing/cover/cover.h"
 
-#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 

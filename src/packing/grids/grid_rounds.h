@@ -1,8 +1,6 @@
 #pragma once
 
-#include <cstddef>
 #include <functional>
-#include <vector>
 
 #include "packing/grids/ascent.h"
 
