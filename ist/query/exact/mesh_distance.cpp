@@ -21,8 +21,12 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 class MeshGapSearch {
-  /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
-  static constexpr double kMargin = 1.2;
+  // Of a motion, in steps: how far a search looks for what it keeps, and up to where it opens that;
+  // how far triangles of blocks that are looked at again are measured by their bounds.
+  static constexpr double kSteps = 6, kEarly = 4, kAgain = 4;
+  /// What is kept is found anew when B has gone so often as far as it is complete: bounds are
+  /// floats, and what was opened stays in the list.
+  static constexpr double kFarGone = 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
   static constexpr std::uint32_t kFew = 4;
 
@@ -58,35 +62,32 @@ class MeshGapSearch {
       add(kept->nearest);
       measure_added();
     }
-    if (kept != nullptr && ring.serves(*kept, b_, asked_.a_from_b, 0)) {
-      for (std::uint32_t n = 0; n < kept->count && !done(); n += 2) {
-        const double least = double{float_of(static_cast<std::uint32_t>(ring.pair(*kept, n + 1)))};
-        if (least - kept->moved > limit_) continue;
-        const std::uint64_t blocks = ring.pair(*kept, n);
-        measure(static_cast<std::uint32_t>(blocks >> 32), static_cast<std::uint32_t>(blocks));
-      }
-      measure_added();
+    if (kept != nullptr && best_.pair != NearestTriangles::kNone && ring.holds(*kept, b_) &&
+        nearest_limit_ + kept->moved < kept->horizon && kept->gone < kFarGone * kept->horizon) {
+      follow(*kept);
     } else {
       if (kept != nullptr) {
-        ring.begin(*kept, a_, b_, 0);
-        kept->margin *= kMargin;
+        const double largest = largest_margin(a_, b_, scale_, nearest_limit_);
+        ring.begin(*kept, std::clamp(kSteps * kept->step, 0.05 * largest, largest));
         if (kept->margin > 0) keep_ = kept;
-        limit_to(nearest_limit_);
+        early_ = std::min(kEarly * kept->step, kept->margin);
+        look_ahead(2 * kept->margin);
       }
       if (budget_.limited()) {  // what is stopped has an answer
         add(0);
         measure_added();
       }
-      search();
+      search_all();
       if (best_.pair == NearestTriangles::kNone && asked_.likely < asked_.most) {
         limit_to(most_);
-        search();
+        search_all();
       }
     }
     // What ended early has not come to all that is near.
     const bool whole = !done();
     finish();
     if (kept != nullptr) {
+      if (keep_ != nullptr) kept->horizon = limit_;
       kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
       if (!whole || out_.overlap || out_.farther) kept->margin = 0;
     }
@@ -96,7 +97,7 @@ class MeshGapSearch {
  private:
   /// `toward`: unit, or zero: then solids are seen along the axes of A.
   void look_along(const exact::Point& toward) {
-    toward_ = toward;
+    toward_ = level_ = toward;
     const bool known = dot(toward, toward) > 0;
     axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
@@ -105,36 +106,81 @@ class MeshGapSearch {
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
 
-  /// Farther pairs decide nothing; of those that are kept what comes as near by the next search.
+  /// Farther pairs decide nothing; what comes as near by later steps is kept.
   void limit_to(double distance) {
     nearest_limit_ = distance;
-    limit_ = distance;
-    if (keep_ != nullptr) limit_ += 2 * keep_->margin;
+    visited_ = distance + early_;
+    visited_ *= visited_;
+    limit_ = distance + ahead_;
     squared_limit_ = limit_ * limit_;
+  }
+  void look_ahead(double by) {
+    ahead_ = by;
+    limit_to(nearest_limit_);
+  }
+
+  /// What is kept of the last steps: pairs of nodes, each with what it is apart at least and how
+  /// far B had come then. What may have come near is looked at again, and the children of what is
+  /// opened are kept in its place.
+  void follow(KeptPairs& kept) {
+    KeptRing& ring = scratch_.near;
+    look_ahead(kAgain * kept.step);
+    const double horizon = kept.horizon + kept.moved;
+    for (std::uint32_t n = 0; n < kept.count && !done(); n += 2) {
+      const double least =
+          double{float_of(static_cast<std::uint32_t>(ring.pair(kept, n + 1)))} - kept.gone;
+      if (least > nearest_limit_) continue;
+      const GapPair pair = pair_of(ring.pair(kept, n), std::max(0.0, least));
+      if (pair.level_a == 0 && pair.level_b == 0) {
+        budget_.grant(1);
+        const double found = measure(pair);
+        ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone);
+      } else if (ring.grows(kept, 2 * kWidth)) {
+        budget_.grant(1);
+        squared_limit_ = horizon * horizon;
+        size_ = 0;
+        open(pair, single_a_, single_b_);
+        ring.pair(kept, n + 1) = kept_least(HUGE_VAL);
+        while (size_ > 0) {
+          const GapPair& child = waiting_[--size_];
+          keep(kept, child, std::sqrt(child.squared) + kept.gone);
+        }
+      } else {
+        search(pair);
+      }
+    }
+    measure_added();
+  }
+
+  void search_all() {
+    search(pair_of(std::uint64_t{MeshNode::at(a_.top, 0).word} << 32 | MeshNode::at(b_.top, 0).word,
+                   0));
+    measure_added();
   }
 
   /// Depth first, the nearest child on top: the spheres' distance, by which most is left out from
   /// the start, is seldom far off.
-  void search() {
+  void search(const GapPair& root) {
     size_ = 0;
-    push({0, 0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)}, 0);
+    push(root, 0);
     while (size_ > 0 && !done()) {
       const GapPair pair = waiting_[size_ - 1];
-      if (pair.squared <= squared_limit_) {
+      const bool near = pair.squared <= visited_;
+      if (near) {
         out_.stopped = budget_.grant(1) == 0;
         if (out_.stopped) break;
       }
       --size_;
-      if (pair.squared <= squared_limit_) visit(pair);
+      const double least = near ? visit(pair) : std::sqrt(pair.squared);
+      if (keep_ != nullptr && least <= limit_) look_later(pair, least);
     }
-    measure_added();
   }
 
   bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
   double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
 
   void finish() {
-    out_.overlap = out_.overlap || holds(false) || holds(true);
+    out_.overlap = out_.overlap || (!asked_.outside && (holds(false) || holds(true)));
     out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
     if (out_.overlap || out_.farther) return;
     out_.a = best_.on_a;
@@ -162,16 +208,16 @@ class MeshGapSearch {
     waiting_[place] = pair;
   }
 
-  void visit(const GapPair& pair) {
+  /// What the pair is apart at least; of one that was opened nothing is left.
+  double visit(const GapPair& pair) {
     if (pair.level_a == 0 && pair.level_b == 0) {
-      measure(pair.a, pair.b);
+      const double least = measure(pair);
       // A few pairs wait until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
-    } else if (single_) {
-      open(pair, single_a_, single_b_);
-    } else {
-      open(pair, double_a_, double_b_);
+      return least;
     }
+    single_ ? open(pair, single_a_, single_b_) : open(pair, double_a_, double_b_);
+    return HUGE_VAL;
   }
 
   /// Whether a solid holds a shell of the other, B or A.
@@ -224,11 +270,15 @@ class MeshGapSearch {
                 : placed_vertices(a_, number, nullptr, *scratch_.placed_a);
   }
 
-  /// The triangles of two blocks that may be near enough.
-  void measure(std::uint32_t number_a, std::uint32_t number_b) {
+  /// The triangles of two blocks that may be near enough. None is nearer than what comes back, or
+  /// than `limit_`.
+  double measure(const GapPair& pair) {
+    const std::uint32_t number_a = pair.a, number_b = pair.b;
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
-    if (cannot_answer(of_a, of_b, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
-      return;
+    const double ahead = ahead_of(of_a, of_b);
+    if (cannot_answer(ahead, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
+      return std::sqrt(pair.squared);
+    if (single_ && ahead - slack_ > limit_) return ahead - slack_;
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
     const auto take = [&](std::uint32_t i, std::uint32_t lanes) {
@@ -239,26 +289,21 @@ class MeshGapSearch {
     if (!single_) {
       for (std::uint32_t left = all_a; left != 0; left &= left - 1)
         take(static_cast<std::uint32_t>(std::countr_zero(left)), all_b);
-      return;
+      return 0;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
-    const TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
+    TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
     float least = HUGE_VALF;
     for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
-      take(i, culls.lanes(i, nearest_limit_, least) & all_b);
+      take(i, culls.lanes(i, nearest_limit_, limit_, least) & all_b);
     }
-    if (keep_ != nullptr && double{least} <= squared_limit_)
-      keep(std::uint64_t{number_a} << 32 | number_b, (1 - 1e-6) * std::sqrt(double{least}));
+    return std::sqrt(std::max(pair.squared, double{least}));
   }
 
-  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
-  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
-  bool cannot_answer(const PlacedVertices& of_a, const PlacedVertices& of_b,
-                     std::uint64_t first) const {
-    const double distance = std::sqrt(best_.least);
-    if (keep_ != nullptr || !(best_.pair < first) || distance < 4 * best_.rounding) return false;
+  /// How far all of B's block is beyond all of A's, along the normal of level faces or toward.
+  double ahead_of(const PlacedVertices& of_a, const PlacedVertices& of_b) const {
     const D d;
     const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
     const auto along = [&](const PlacedVertices& of, std::size_t l) {
@@ -270,8 +315,15 @@ class MeshGapSearch {
       last = hn::Max(last, along(of_a, l));
       next = hn::Min(next, along(of_b, l));
     }
-    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last)) >=
-           distance - 0.5 * best_.rounding;
+    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
+  }
+
+  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
+  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
+  bool cannot_answer(double ahead, std::uint64_t first) const {
+    const double distance = std::sqrt(best_.least);
+    return best_.pair < first && distance >= 4 * best_.rounding &&
+           ahead >= distance - 0.5 * best_.rounding;
   }
 
   void add(std::uint64_t pair) {
@@ -305,8 +357,10 @@ class MeshGapSearch {
     out_.tests += count;
     PairGaps gaps;
     std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
-    for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1)
-      out_.overlap = crosses(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
+    for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(unclear));
+      out_.overlap = !apart_along(pairs, gaps, n) && crosses(pairs, n);
+    }
     if (out_.overlap) return;
     const double before = best_.least;
     for (std::uint32_t n = 0; n < count; ++n) {
@@ -322,7 +376,6 @@ class MeshGapSearch {
     limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kGapsAlike) * distance));
     if (distance > 0) {
       look_along((1 / distance) * best_.between);
-      level_ = toward_;
       for (std::uint32_t n = 0; n < count; ++n)
         if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
           for (int side = 0; side < 2; ++side) {
@@ -332,17 +385,33 @@ class MeshGapSearch {
     }
   }
 
-  /// Two blocks, no nearer than `least`, which the next steps look at again.
-  void keep(std::uint64_t blocks, double least) {
-    KeptRing& ring = scratch_.near;
-    if (keep_->count + 2 > ring.most()) {
+  static GapPair pair_of(std::uint64_t nodes, double least) {
+    const MeshNode a{static_cast<std::uint32_t>(nodes >> 32)}, b{static_cast<std::uint32_t>(nodes)};
+    return {least * least,
+            0,
+            a.number(),
+            b.number(),
+            static_cast<std::uint8_t>(a.level()),
+            static_cast<std::uint8_t>(b.level())};
+  }
+  static std::uint64_t kept_least(double least) {
+    return bits_of(static_cast<float>((1 - 1e-6) * std::min(least, 1e30)));
+  }
+  void keep(KeptPairs& kept, const GapPair& pair, double least) {
+    scratch_.near.add(kept, std::uint64_t{MeshNode::at(pair.level_a, pair.a).word} << 32 |
+                                MeshNode::at(pair.level_b, pair.b).word);
+    scratch_.near.add(kept, kept_least(least));
+  }
+  /// Two nodes that the next steps look at.
+  void look_later(const GapPair& pair, double least) {
+    if (keep_->count + 2 > scratch_.near.most()) {
       KeptRing::give_up(*keep_);
       keep_ = nullptr;
-      limit_to(nearest_limit_);
-      return;
+      early_ = 0;
+      look_ahead(0);
+    } else {
+      keep(*keep_, pair, least);
     }
-    ring.add(*keep_, blocks);
-    ring.add(*keep_, bits_of(static_cast<float>(least)));
   }
 
   using Corners = std::array<exact::Point, 3>;
@@ -354,6 +423,15 @@ class MeshGapSearch {
     return at;
   }
 
+  /// Whether a plane square to the way between the points that were found parts the triangles: it
+  /// does if these are the nearest, but for roundings.
+  bool apart_along(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n) const {
+    const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
+    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
+    const double last = std::max({dot(way, a[0]), dot(way, a[1]), dot(way, a[2])}),
+                 next = std::min({dot(way, b[0]), dot(way, b[1]), dot(way, b[2])});
+    return next - last > 4 * slack_ * std::sqrt(gaps.squared[n]);
+  }
   static bool crosses(const TrianglePairs& pairs, std::uint32_t n) {
     const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
     return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
@@ -372,7 +450,8 @@ class MeshGapSearch {
   const double blur_;   ///< likewise of boxes
   BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
   BoxLook<double, double> double_a_, double_b_;
-  double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
+  double most_, nearest_limit_ = 0, visited_ = 0, ahead_ = 0, early_ = 0, limit_ = 0;
+  double squared_limit_ = 0;
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};
   WayAxes axes_;
