@@ -297,7 +297,7 @@ class SurfaceGap {
       // Surfaces that have not come together on the way hold what they held.
       question_.outside = kept.step + error_ < apart;
       // A long step: what was near says less than the spheres do.
-      if (!(kept.step < largest_margin(mesh_a_, mesh_b_, pose.a_from_b.scale, apart)))
+      if (!is_short(kept.step, mesh_a_, mesh_b_, pose.a_from_b.scale, apart))
         kept.nearest = KeptPairs::kNone;
     }
   }

@@ -37,9 +37,9 @@ constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
 }  // namespace
 
-double largest_margin(const MeshTree& a, const MeshTree& b, double scale,
-                      double distance) noexcept {
-  return std::max(kMost * side_of(a, b, scale), 0.25 * distance);
+bool is_short(double step, const MeshTree& a, const MeshTree& b, double scale,
+              double distance) noexcept {
+  return step < std::max(kMost * side_of(a, b, scale), 0.25 * distance);
 }
 
 KeptRing::KeptRing(std::size_t capacity, const MemoryHooks& hooks)
@@ -76,14 +76,11 @@ bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, double room) const noe
 
 void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {
   const double side = side_of(a, b, kept.last.scale);
-  begin(kept, std::clamp(kept.steps * kept.step, kLeast * kept.steps * side, kMost * side));
-  kept.room = room;
-}
-
-void KeptRing::begin(KeptPairs& kept, double margin) noexcept {
-  kept.margin = margin < HUGE_VAL && margin >= kLeastSteps * kept.step ? margin : 0;
+  kept.margin = std::clamp(kept.steps * kept.step, kLeast * kept.steps * side, kMost * side);
+  if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
   kept.steps = std::min(1.1 * kept.steps, kMostSteps);
   kept.found_at = kept.last;
+  kept.room = room;
   kept.first = written_;
   kept.count = 0;
   kept.gone = 0;

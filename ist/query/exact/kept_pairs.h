@@ -29,13 +29,14 @@ struct KeptPairs {
   double apart = 0;               ///< of distances: that of the last query, or less; 0: unknown
   double horizon = 0;  ///< of distances: what is not kept was no nearer when the pairs were found
   double gone = 0;     ///< of distances: how far B has gone since, step by step
+  std::uint32_t visits = 0;  ///< of distances: of the search that found the pairs
   /// Of crossings that all hang together, and of what they go around: see ExactParts. 0: unknown.
   std::uint64_t one = 0;
 };
 
-/// Of distances: a larger margin does not pay. A part of a triangle's side, as if they tiled a
-/// cube, or of the distance.
-double largest_margin(const MeshTree& a, const MeshTree& b, double scale, double distance) noexcept;
+/// Whether after a step so long, from a distance, what was near before still says much.
+bool is_short(double step, const MeshTree& a, const MeshTree& b, double scale,
+              double distance) noexcept;
 
 /// What exact queries keep from call to call: pairs of triangles of many pairs of solids. The
 /// oldest are overwritten.
@@ -53,7 +54,6 @@ class KeptRing {
   /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
   /// their order. 0: keeping would not pay.
   void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
-  void begin(KeptPairs& kept, double margin) noexcept;  ///< likewise, with this margin or 0
   /// Whether so many may be added to a list, which is moved if others have come after it.
   bool grows(KeptPairs& kept, std::uint32_t by) noexcept;
   std::uint64_t most() const noexcept { return mask_ + 1; }  ///< that one list may have

@@ -21,12 +21,14 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 class MeshGapSearch {
-  // Of a motion, in steps: how far a search looks for what it keeps, and up to where it opens that;
-  // how far triangles of blocks that are looked at again are measured by their bounds.
-  static constexpr double kSteps = 6, kEarly = 4, kAgain = 4;
+  // Of a motion: the margin, of that which crossings have, and up to where in it a search opens
+  // what it keeps; how many steps the bounds of blocks that are looked at again may reach ahead.
+  static constexpr double kMargin = 2, kEarly = 0.5, kAgain = 4;
   /// What is kept is found anew when B has gone so often as far as it is complete: bounds are
   /// floats, and what was opened stays in the list.
   static constexpr double kFarGone = 32;
+  /// Of a kept bound: a later step found it, and how far B had gone by then is added.
+  static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
   static constexpr std::uint32_t kFew = 4;
 
@@ -67,10 +69,10 @@ class MeshGapSearch {
       follow(*kept);
     } else {
       if (kept != nullptr) {
-        const double largest = largest_margin(a_, b_, scale_, nearest_limit_);
-        ring.begin(*kept, std::clamp(kSteps * kept->step, 0.05 * largest, largest));
+        ring.begin(*kept, a_, b_, 0);
+        kept->margin *= kMargin;
         if (kept->margin > 0) keep_ = kept;
-        early_ = std::min(kEarly * kept->step, kept->margin);
+        early_ = kEarly * kept->margin;
         look_ahead(2 * kept->margin);
       }
       if (budget_.limited()) {  // what is stopped has an answer
@@ -87,7 +89,7 @@ class MeshGapSearch {
     const bool whole = !done();
     finish();
     if (kept != nullptr) {
-      if (keep_ != nullptr) kept->horizon = limit_;
+      if (keep_ != nullptr) kept->horizon = limit_, kept->visits = budget_.visits();
       kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
       if (!whole || out_.overlap || out_.farther) kept->margin = 0;
     }
@@ -119,22 +121,23 @@ class MeshGapSearch {
     limit_to(nearest_limit_);
   }
 
-  /// What is kept of the last steps: pairs of nodes, each with what it is apart at least and how
-  /// far B had come then. What may have come near is looked at again, and the children of what is
-  /// opened are kept in its place.
+  /// What is kept of the last steps: pairs of nodes, each with what it was apart at least when the
+  /// search found it. What may have come near since is looked at again, and the children of what is
+  /// opened are kept in its place: with what they are apart, and how far B had gone by then.
   void follow(KeptPairs& kept) {
     KeptRing& ring = scratch_.near;
     look_ahead(kAgain * kept.step);
     const double horizon = kept.horizon + kept.moved;
     for (std::uint32_t n = 0; n < kept.count && !done(); n += 2) {
-      const double least =
-          double{float_of(static_cast<std::uint32_t>(ring.pair(kept, n + 1)))} - kept.gone;
+      const std::uint64_t bound = ring.pair(kept, n + 1);
+      const double least = double{float_of(static_cast<std::uint32_t>(bound))} -
+                           ((bound & kFoundAgain) != 0 ? kept.gone : kept.moved);
       if (least > nearest_limit_) continue;
       const GapPair pair = pair_of(ring.pair(kept, n), std::max(0.0, least));
       if (pair.level_a == 0 && pair.level_b == 0) {
         budget_.grant(1);
         const double found = measure(pair);
-        ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone);
+        ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone) | kFoundAgain;
       } else if (ring.grows(kept, 2 * kWidth)) {
         budget_.grant(1);
         squared_limit_ = horizon * horizon;
@@ -143,13 +146,15 @@ class MeshGapSearch {
         ring.pair(kept, n + 1) = kept_least(HUGE_VAL);
         while (size_ > 0) {
           const GapPair& child = waiting_[--size_];
-          keep(kept, child, std::sqrt(child.squared) + kept.gone);
+          keep(kept, child, kept_least(std::sqrt(child.squared) + kept.gone) | kFoundAgain);
         }
       } else {
         search(pair);
       }
     }
     measure_added();
+    // Where too much is near, less is kept the next time.
+    if (budget_.visits() > kept.visits / 2) KeptRing::give_up(kept);
   }
 
   void search_all() {
@@ -397,10 +402,10 @@ class MeshGapSearch {
   static std::uint64_t kept_least(double least) {
     return bits_of(static_cast<float>((1 - 1e-6) * std::min(least, 1e30)));
   }
-  void keep(KeptPairs& kept, const GapPair& pair, double least) {
+  void keep(KeptPairs& kept, const GapPair& pair, std::uint64_t bound) {
     scratch_.near.add(kept, std::uint64_t{MeshNode::at(pair.level_a, pair.a).word} << 32 |
                                 MeshNode::at(pair.level_b, pair.b).word);
-    scratch_.near.add(kept, kept_least(least));
+    scratch_.near.add(kept, bound);
   }
   /// Two nodes that the next steps look at.
   void look_later(const GapPair& pair, double least) {
@@ -410,7 +415,7 @@ class MeshGapSearch {
       early_ = 0;
       look_ahead(0);
     } else {
-      keep(*keep_, pair, least);
+      keep(*keep_, pair, kept_least(least));
     }
   }
 
