@@ -101,6 +101,19 @@ TEST_F(SeparationLoop, ThroughWalls) {
   EXPECT_GT(meet_, 100);
 }
 
+/// A solid turns beside another: what was beyond all that is kept comes near, again and again.
+TEST_F(SeparationLoop, OfWhatRolls) {
+  const Asset ball = testing::surface(testing::icosphere_mesh(4));
+  const Asset ring = testing::surface(testing::torus_mesh(1, 0.25, 64, 32));
+  for (const double step : {1e-3, 5e-3})
+    expect_same(ball, ring, 1, 800, [&](int i) {
+      const double half = 0.5 * step * i;
+      return Pose{{std::cos(half), 0.6 * std::sin(half), 0.8 * std::sin(half), 0}, {2.5, 0, 0}};
+    });
+  EXPECT_EQ(apart_, 1600);
+  EXPECT_LT(visits_, visits_from_scratch_);
+}
+
 /// Any motion of solids with spheres: small steps, larger ones, and jumps to somewhere else.
 TEST_F(SeparationLoop, OfAnyMotion) {
   std::mt19937_64 random(57);
