@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <utility>
 
 namespace ist {
 namespace {
@@ -84,16 +83,6 @@ void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, doub
   kept.first = written_;
   kept.count = 0;
   kept.gone = 0;
-}
-
-bool KeptRing::grows(KeptPairs& kept, std::uint32_t by) noexcept {
-  if (2 * std::uint64_t{kept.count} + by > most()) return false;
-  if (kept.first + kept.count != written_) {
-    const std::uint64_t first = std::exchange(kept.first, written_);
-    for (std::uint32_t i = 0; i < kept.count; ++i)
-      ring_[written_++ & mask_] = ring_[(first + i) & mask_];
-  }
-  return true;
 }
 
 void KeptRing::give_up(KeptPairs& kept) noexcept {

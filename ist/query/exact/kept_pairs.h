@@ -29,7 +29,6 @@ struct KeptPairs {
   double apart = 0;               ///< of distances: that of the last query, or less; 0: unknown
   double horizon = 0;  ///< of distances: what is not kept was no nearer when the pairs were found
   double gone = 0;     ///< of distances: how far B has gone since, step by step
-  std::uint32_t visits = 0;  ///< of distances: of the search that found the pairs
   /// Of crossings that all hang together, and of what they go around: see ExactParts. 0: unknown.
   std::uint64_t one = 0;
 };
@@ -54,8 +53,6 @@ class KeptRing {
   /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
   /// their order. 0: keeping would not pay.
   void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
-  /// Whether so many may be added to a list, which is moved if others have come after it.
-  bool grows(KeptPairs& kept, std::uint32_t by) noexcept;
   std::uint64_t most() const noexcept { return mask_ + 1; }  ///< that one list may have
   /// There are too many: none are kept, and the next margin will be less.
   static void give_up(KeptPairs& kept) noexcept;

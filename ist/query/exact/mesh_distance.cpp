@@ -21,12 +21,8 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 class MeshGapSearch {
-  // Of a motion: the margin, of that which crossings have, and up to where in it a search opens
-  // what it keeps; how many steps the bounds of blocks that are looked at again may reach ahead.
-  static constexpr double kMargin = 2, kEarly = 0.5, kAgain = 4;
-  /// What is kept is found anew when B has gone so often as far as it is complete: bounds are
-  /// floats, and what was opened stays in the list.
-  static constexpr double kFarGone = 32;
+  /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
+  static constexpr double kMargin = 1.2;
   /// Of a kept bound: a later step found it, and how far B had gone by then is added.
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
@@ -65,31 +61,30 @@ class MeshGapSearch {
       measure_added();
     }
     if (kept != nullptr && best_.pair != NearestTriangles::kNone && ring.holds(*kept, b_) &&
-        nearest_limit_ + kept->moved < kept->horizon && kept->gone < kFarGone * kept->horizon) {
+        nearest_limit_ + kept->moved < kept->horizon) {
       follow(*kept);
     } else {
       if (kept != nullptr) {
         ring.begin(*kept, a_, b_, 0);
         kept->margin *= kMargin;
         if (kept->margin > 0) keep_ = kept;
-        early_ = kEarly * kept->margin;
         look_ahead(2 * kept->margin);
       }
       if (budget_.limited()) {  // what is stopped has an answer
         add(0);
         measure_added();
       }
-      search_all();
+      search();
       if (best_.pair == NearestTriangles::kNone && asked_.likely < asked_.most) {
         limit_to(most_);
-        search_all();
+        search();
       }
     }
     // What ended early has not come to all that is near.
     const bool whole = !done();
     finish();
     if (kept != nullptr) {
-      if (keep_ != nullptr) kept->horizon = limit_, kept->visits = budget_.visits();
+      if (keep_ != nullptr) kept->horizon = limit_;
       kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
       if (!whole || out_.overlap || out_.farther) kept->margin = 0;
     }
@@ -111,8 +106,6 @@ class MeshGapSearch {
   /// Farther pairs decide nothing; what comes as near by later steps is kept.
   void limit_to(double distance) {
     nearest_limit_ = distance;
-    visited_ = distance + early_;
-    visited_ *= visited_;
     limit_ = distance + ahead_;
     squared_limit_ = limit_ * limit_;
   }
@@ -121,64 +114,41 @@ class MeshGapSearch {
     limit_to(nearest_limit_);
   }
 
-  /// What is kept of the last steps: pairs of nodes, each with what it was apart at least when the
-  /// search found it. What may have come near since is looked at again, and the children of what is
-  /// opened are kept in its place: with what they are apart, and how far B had gone by then.
+  /// What is kept: pairs of blocks, each with what it was apart at least when the search found it.
+  /// What may have come near since is measured again, and gets a new bound: that, and how far B had
+  /// gone by then.
   void follow(KeptPairs& kept) {
     KeptRing& ring = scratch_.near;
-    look_ahead(kAgain * kept.step);
-    const double horizon = kept.horizon + kept.moved;
+    look_ahead(kept.step);
     for (std::uint32_t n = 0; n < kept.count && !done(); n += 2) {
       const std::uint64_t bound = ring.pair(kept, n + 1);
       const double least = double{float_of(static_cast<std::uint32_t>(bound))} -
                            ((bound & kFoundAgain) != 0 ? kept.gone : kept.moved);
       if (least > nearest_limit_) continue;
-      const GapPair pair = pair_of(ring.pair(kept, n), std::max(0.0, least));
-      if (pair.level_a == 0 && pair.level_b == 0) {
-        budget_.grant(1);
-        const double found = measure(pair);
-        ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone) | kFoundAgain;
-      } else if (ring.grows(kept, 2 * kWidth)) {
-        budget_.grant(1);
-        squared_limit_ = horizon * horizon;
-        size_ = 0;
-        open(pair, single_a_, single_b_);
-        ring.pair(kept, n + 1) = kept_least(HUGE_VAL);
-        while (size_ > 0) {
-          const GapPair& child = waiting_[--size_];
-          keep(kept, child, kept_least(std::sqrt(child.squared) + kept.gone) | kFoundAgain);
-        }
-      } else {
-        search(pair);
-      }
+      budget_.grant(1);
+      const std::uint64_t blocks = ring.pair(kept, n);
+      const double found = measure(static_cast<std::uint32_t>(blocks >> 32),
+                                   static_cast<std::uint32_t>(blocks), std::max(0.0, least));
+      ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone) | kFoundAgain;
     }
-    measure_added();
-    // Where too much is near, less is kept the next time.
-    if (budget_.visits() > kept.visits / 2) KeptRing::give_up(kept);
-  }
-
-  void search_all() {
-    search(pair_of(std::uint64_t{MeshNode::at(a_.top, 0).word} << 32 | MeshNode::at(b_.top, 0).word,
-                   0));
     measure_added();
   }
 
   /// Depth first, the nearest child on top: the spheres' distance, by which most is left out from
   /// the start, is seldom far off.
-  void search(const GapPair& root) {
+  void search() {
     size_ = 0;
-    push(root, 0);
+    push({0, 0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)}, 0);
     while (size_ > 0 && !done()) {
       const GapPair pair = waiting_[size_ - 1];
-      const bool near = pair.squared <= visited_;
-      if (near) {
+      if (pair.squared <= squared_limit_) {
         out_.stopped = budget_.grant(1) == 0;
         if (out_.stopped) break;
       }
       --size_;
-      const double least = near ? visit(pair) : std::sqrt(pair.squared);
-      if (keep_ != nullptr && least <= limit_) look_later(pair, least);
+      if (pair.squared <= squared_limit_) visit(pair);
     }
+    measure_added();
   }
 
   bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
@@ -213,16 +183,18 @@ class MeshGapSearch {
     waiting_[place] = pair;
   }
 
-  /// What the pair is apart at least; of one that was opened nothing is left.
-  double visit(const GapPair& pair) {
+  void visit(const GapPair& pair) {
     if (pair.level_a == 0 && pair.level_b == 0) {
-      const double least = measure(pair);
+      const double least = measure(pair.a, pair.b, std::sqrt(pair.squared));
+      if (keep_ != nullptr && least <= limit_)
+        keep(std::uint64_t{pair.a} << 32 | pair.b, kept_least(least));
       // A few pairs wait until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
-      return least;
+    } else if (single_) {
+      open(pair, single_a_, single_b_);
+    } else {
+      open(pair, double_a_, double_b_);
     }
-    single_ ? open(pair, single_a_, single_b_) : open(pair, double_a_, double_b_);
-    return HUGE_VAL;
   }
 
   /// Whether a solid holds a shell of the other, B or A.
@@ -275,14 +247,13 @@ class MeshGapSearch {
                 : placed_vertices(a_, number, nullptr, *scratch_.placed_a);
   }
 
-  /// The triangles of two blocks that may be near enough. None is nearer than what comes back, or
-  /// than `limit_`.
-  double measure(const GapPair& pair) {
-    const std::uint32_t number_a = pair.a, number_b = pair.b;
+  /// The triangles of two blocks, no nearer than `known`, that may be near enough. None is nearer
+  /// than what comes back, or than `limit_`.
+  double measure(std::uint32_t number_a, std::uint32_t number_b, double known) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
     const double ahead = ahead_of(of_a, of_b);
     if (cannot_answer(ahead, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
-      return std::sqrt(pair.squared);
+      return known;
     if (single_ && ahead - slack_ > limit_) return ahead - slack_;
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
@@ -304,7 +275,7 @@ class MeshGapSearch {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
       take(i, culls.lanes(i, nearest_limit_, limit_, least) & all_b);
     }
-    return std::sqrt(std::max(pair.squared, double{least}));
+    return std::max(known, std::sqrt(double{least}));
   }
 
   /// How far all of B's block is beyond all of A's, along the normal of level faces or toward.
@@ -390,33 +361,20 @@ class MeshGapSearch {
     }
   }
 
-  static GapPair pair_of(std::uint64_t nodes, double least) {
-    const MeshNode a{static_cast<std::uint32_t>(nodes >> 32)}, b{static_cast<std::uint32_t>(nodes)};
-    return {least * least,
-            0,
-            a.number(),
-            b.number(),
-            static_cast<std::uint8_t>(a.level()),
-            static_cast<std::uint8_t>(b.level())};
-  }
   static std::uint64_t kept_least(double least) {
     return bits_of(static_cast<float>((1 - 1e-6) * std::min(least, 1e30)));
   }
-  void keep(KeptPairs& kept, const GapPair& pair, std::uint64_t bound) {
-    scratch_.near.add(kept, std::uint64_t{MeshNode::at(pair.level_a, pair.a).word} << 32 |
-                                MeshNode::at(pair.level_b, pair.b).word);
-    scratch_.near.add(kept, bound);
-  }
-  /// Two nodes that the next steps look at.
-  void look_later(const GapPair& pair, double least) {
-    if (keep_->count + 2 > scratch_.near.most()) {
+  /// Two blocks that the next steps look at again.
+  void keep(std::uint64_t blocks, std::uint64_t bound) {
+    KeptRing& ring = scratch_.near;
+    if (keep_->count + 2 > ring.most()) {
       KeptRing::give_up(*keep_);
       keep_ = nullptr;
-      early_ = 0;
       look_ahead(0);
-    } else {
-      keep(*keep_, pair, kept_least(least));
+      return;
     }
+    ring.add(*keep_, blocks);
+    ring.add(*keep_, bound);
   }
 
   using Corners = std::array<exact::Point, 3>;
@@ -455,7 +413,7 @@ class MeshGapSearch {
   const double blur_;   ///< likewise of boxes
   BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
   BoxLook<double, double> double_a_, double_b_;
-  double most_, nearest_limit_ = 0, visited_ = 0, ahead_ = 0, early_ = 0, limit_ = 0;
+  double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;
   double squared_limit_ = 0;
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};
