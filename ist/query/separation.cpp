@@ -204,18 +204,14 @@ bool is_seen_within(const SphereTree& tree, const Eigen::Vector3d& point, double
     const auto [level, block, depth] = stack[--size];
     const BallBlock& balls = tree.level[level].blocks[block];
     const Origin& origin = tree.level[level].origins[block];
-    const auto x = static_cast<float>(point.x() - origin.x),
-               y = static_cast<float>(point.y() - origin.y),
-               z = static_cast<float>(point.z() - origin.z);
+    const float at[3] = {static_cast<float>(point.x() - origin.x),
+                         static_cast<float>(point.y() - origin.y),
+                         static_cast<float>(point.z() - origin.z)};
     float inside[kWidth];
-    for (std::size_t k = 0; k < kWidth; ++k) {
-      const float dx = x - balls.x[k], dy = y - balls.y[k], dz = z - balls.z[k];
-      const float r = std::max(balls.r[k], 0.0f);
-      inside[k] = r * r - (dx * dx + dy * dy + dz * dz);
-    }
     const std::size_t first = size, below = tree.count(level - 1) - std::size_t{kWidth} * block;
-    for (std::uint32_t k = 0; k < std::min<std::size_t>(kWidth, below); ++k) {
-      if (!(inside[k] > 0)) continue;
+    const std::uint32_t used = (1u << std::min<std::size_t>(kWidth, below)) - 1;
+    for (std::uint32_t left = balls_around(balls, at, inside) & used; left != 0; left &= left - 1) {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
       if (level == 0) {
         const NodeBall sphere = tree.sphere(block, k);
         if ((vector(sphere.centre) - point).norm() < sphere.r - margin) return true;
@@ -294,8 +290,16 @@ class SurfaceGap {
         error_(gap_error(mesh_a_, mesh_b_, pose, moved_by_poses(a, b, mesh_b_, pose))) {
     if (settings.max_distance > 0) question_.most = settings.max_distance / pose.unit_a + error_;
     if (enough > 0) question_.enough = enough / pose.unit_a - error_;
-    if (settings.pair_id != 0 && settings.max_visits == 0)
-      question_.kept = &scratch.exact.near.of(settings.pair_id, mesh_a_, mesh_b_, pose.a_from_b);
+    if (settings.pair_id != 0 && settings.max_visits == 0) {
+      KeptPairs& kept = scratch.exact.near.of(settings.pair_id, mesh_a_, mesh_b_, pose.a_from_b);
+      question_.kept = &kept;
+      const double apart = std::exchange(kept.apart, 0);
+      // Surfaces that have not come together on the way hold what they held.
+      question_.outside = kept.step + error_ < apart;
+      // A long step: what was near says less than the spheres do.
+      if (!is_short(kept.step, mesh_a_, mesh_b_, pose.a_from_b.scale, apart))
+        kept.nearest = KeptPairs::kNone;
+    }
   }
 
   Separation find() {
@@ -314,6 +318,7 @@ class SurfaceGap {
     const MeshGap found = mesh_gap(question_, budget, scratch_.exact);
     visits_ += budget.visits();
     pairs_ += found.tests;
+    if (question_.kept != nullptr && !found.overlap) question_.kept->apart = found.least;
     return answer(found);
   }
 

@@ -207,7 +207,7 @@ bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) n
   scratch_.forget(a.hash);
   if (pair_id != 0 && max_visits == 0) {
     kept_ = &scratch_.kept.of(pair_id, a, b, a_from_b_);
-    if (scratch_.kept.serves(*kept_, b, a_from_b_, room)) {
+    if (scratch_.kept.serves(*kept_, b, room)) {
       serves_ = true;
       return true;
     }

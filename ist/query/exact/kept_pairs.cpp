@@ -24,10 +24,22 @@ double largest_motion(const MeshTree& b, const Similarity& from, const Similarit
   return std::sqrt(squared);
 }
 
+/// The side of a triangle, as if they tiled a cube.
+double side_of(const MeshTree& a, const MeshTree& b, double scale) {
+  return 0.5 * std::min(1 / std::sqrt(a.level[0].count), scale / std::sqrt(b.level[0].count));
+}
+
+// Of such a side.
+constexpr double kLeast = 0.007, kMost = 0.3;
 // Steps that a margin is made for. Its pairs grow with it, and searches become rarer.
 constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
 }  // namespace
+
+bool is_short(double step, const MeshTree& a, const MeshTree& b, double scale,
+              double distance) noexcept {
+  return step < std::max(kMost * side_of(a, b, scale), 0.25 * distance);
+}
 
 KeptRing::KeptRing(std::size_t capacity, const MemoryHooks& hooks)
     : mask_(std::bit_floor(capacity) - 1),
@@ -45,24 +57,24 @@ KeptPairs& KeptRing::of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
       kept.last.scale != pose.scale)
     kept = {{a.hash, b.hash}, pose, HUGE_VAL, 0, kMostSteps, pose, 0, 0, 0, 0, 0};
   else
-    kept.step = largest_motion(b, kept.last, pose);
+    kept.gone += kept.step = largest_motion(b, kept.last, pose);
   kept.last = pose;
   ids_[slot] = id;
   return kept;
 }
 
-bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, const Similarity& pose,
-                      double room) const noexcept {
+bool KeptRing::holds(KeptPairs& kept, const MeshTree& b) const noexcept {
   if (!(kept.margin > 0) || written_ - kept.first > mask_) return false;
-  kept.moved = largest_motion(b, kept.found_at, pose);
-  return kept.moved + std::max(0.0, room - kept.room) < kept.margin;
+  kept.moved = largest_motion(b, kept.found_at, kept.last);
+  return true;
+}
+
+bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, double room) const noexcept {
+  return holds(kept, b) && kept.moved + std::max(0.0, room - kept.room) < kept.margin;
 }
 
 void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {
-  // Sides of triangles, as if they tiled a cube.
-  const double side = 0.5 * std::min(1 / std::sqrt(a.level[0].count),
-                                     kept.last.scale / std::sqrt(b.level[0].count));
-  constexpr double kLeast = 0.007, kMost = 0.3;
+  const double side = side_of(a, b, kept.last.scale);
   kept.margin = std::clamp(kept.steps * kept.step, kLeast * kept.steps * side, kMost * side);
   if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
   kept.steps = std::min(1.1 * kept.steps, kMostSteps);
@@ -70,6 +82,7 @@ void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, doub
   kept.room = room;
   kept.first = written_;
   kept.count = 0;
+  kept.gone = 0;
 }
 
 void KeptRing::give_up(KeptPairs& kept) noexcept {

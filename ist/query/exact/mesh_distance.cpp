@@ -23,6 +23,8 @@ namespace ist::HWY_NAMESPACE {
 class MeshGapSearch {
   /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
   static constexpr double kMargin = 1.2;
+  /// Of a kept bound: a later step found it, and how far B had gone by then is added.
+  static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
   static constexpr std::uint32_t kFew = 4;
 
@@ -58,20 +60,15 @@ class MeshGapSearch {
       add(kept->nearest);
       measure_added();
     }
-    if (kept != nullptr && ring.serves(*kept, b_, asked_.a_from_b, 0)) {
-      for (std::uint32_t n = 0; n < kept->count && !done(); n += 2) {
-        const double least = double{float_of(static_cast<std::uint32_t>(ring.pair(*kept, n + 1)))};
-        if (least - kept->moved > limit_) continue;
-        const std::uint64_t blocks = ring.pair(*kept, n);
-        measure(static_cast<std::uint32_t>(blocks >> 32), static_cast<std::uint32_t>(blocks));
-      }
-      measure_added();
+    if (kept != nullptr && best_.pair != NearestTriangles::kNone && ring.holds(*kept, b_) &&
+        nearest_limit_ + kept->moved < kept->horizon) {
+      follow(*kept);
     } else {
       if (kept != nullptr) {
         ring.begin(*kept, a_, b_, 0);
         kept->margin *= kMargin;
         if (kept->margin > 0) keep_ = kept;
-        limit_to(nearest_limit_);
+        look_ahead(2 * kept->margin);
       }
       if (budget_.limited()) {  // what is stopped has an answer
         add(0);
@@ -87,6 +84,7 @@ class MeshGapSearch {
     const bool whole = !done();
     finish();
     if (kept != nullptr) {
+      if (keep_ != nullptr) kept->horizon = limit_;
       kept->nearest = out_.overlap ? KeptPairs::kNone : best_.pair;
       if (!whole || out_.overlap || out_.farther) kept->margin = 0;
     }
@@ -96,7 +94,7 @@ class MeshGapSearch {
  private:
   /// `toward`: unit, or zero: then solids are seen along the axes of A.
   void look_along(const exact::Point& toward) {
-    toward_ = toward;
+    toward_ = level_ = toward;
     const bool known = dot(toward, toward) > 0;
     axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
@@ -105,12 +103,35 @@ class MeshGapSearch {
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
 
-  /// Farther pairs decide nothing; of those that are kept what comes as near by the next search.
+  /// Farther pairs decide nothing; what comes as near by later steps is kept.
   void limit_to(double distance) {
     nearest_limit_ = distance;
-    limit_ = distance;
-    if (keep_ != nullptr) limit_ += 2 * keep_->margin;
+    limit_ = distance + ahead_;
     squared_limit_ = limit_ * limit_;
+  }
+  void look_ahead(double by) {
+    ahead_ = by;
+    limit_to(nearest_limit_);
+  }
+
+  /// What is kept: pairs of blocks, each with what it was apart at least when the search found it.
+  /// What may have come near since is measured again, and gets a new bound: that, and how far B had
+  /// gone by then.
+  void follow(KeptPairs& kept) {
+    KeptRing& ring = scratch_.near;
+    look_ahead(kept.step);
+    for (std::uint32_t n = 0; n < kept.count && !done(); n += 2) {
+      const std::uint64_t bound = ring.pair(kept, n + 1);
+      const double least = double{float_of(static_cast<std::uint32_t>(bound))} -
+                           ((bound & kFoundAgain) != 0 ? kept.gone : kept.moved);
+      if (least > nearest_limit_) continue;
+      budget_.grant(1);
+      const std::uint64_t blocks = ring.pair(kept, n);
+      const double found = measure(static_cast<std::uint32_t>(blocks >> 32),
+                                   static_cast<std::uint32_t>(blocks), std::max(0.0, least));
+      ring.pair(kept, n + 1) = kept_least(std::min(found, limit_) + kept.gone) | kFoundAgain;
+    }
+    measure_added();
   }
 
   /// Depth first, the nearest child on top: the spheres' distance, by which most is left out from
@@ -134,7 +155,7 @@ class MeshGapSearch {
   double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
 
   void finish() {
-    out_.overlap = out_.overlap || holds(false) || holds(true);
+    out_.overlap = out_.overlap || (!asked_.outside && (holds(false) || holds(true)));
     out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
     if (out_.overlap || out_.farther) return;
     out_.a = best_.on_a;
@@ -164,7 +185,9 @@ class MeshGapSearch {
 
   void visit(const GapPair& pair) {
     if (pair.level_a == 0 && pair.level_b == 0) {
-      measure(pair.a, pair.b);
+      const double least = measure(pair.a, pair.b, std::sqrt(pair.squared));
+      if (keep_ != nullptr && least <= limit_)
+        keep(std::uint64_t{pair.a} << 32 | pair.b, kept_least(least));
       // A few pairs wait until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
     } else if (single_) {
@@ -224,11 +247,14 @@ class MeshGapSearch {
                 : placed_vertices(a_, number, nullptr, *scratch_.placed_a);
   }
 
-  /// The triangles of two blocks that may be near enough.
-  void measure(std::uint32_t number_a, std::uint32_t number_b) {
+  /// The triangles of two blocks, no nearer than `known`, that may be near enough. None is nearer
+  /// than what comes back, or than `limit_`.
+  double measure(std::uint32_t number_a, std::uint32_t number_b, double known) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
-    if (cannot_answer(of_a, of_b, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
-      return;
+    const double ahead = ahead_of(of_a, of_b);
+    if (cannot_answer(ahead, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
+      return known;
+    if (single_ && ahead - slack_ > limit_) return ahead - slack_;
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
     const auto take = [&](std::uint32_t i, std::uint32_t lanes) {
@@ -239,26 +265,21 @@ class MeshGapSearch {
     if (!single_) {
       for (std::uint32_t left = all_a; left != 0; left &= left - 1)
         take(static_cast<std::uint32_t>(std::countr_zero(left)), all_b);
-      return;
+      return 0;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
-    const TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
+    TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
     float least = HUGE_VALF;
     for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
-      take(i, culls.lanes(i, nearest_limit_, least) & all_b);
+      take(i, culls.lanes(i, nearest_limit_, limit_, least) & all_b);
     }
-    if (keep_ != nullptr && double{least} <= squared_limit_)
-      keep(std::uint64_t{number_a} << 32 | number_b, (1 - 1e-6) * std::sqrt(double{least}));
+    return std::max(known, std::sqrt(double{least}));
   }
 
-  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
-  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
-  bool cannot_answer(const PlacedVertices& of_a, const PlacedVertices& of_b,
-                     std::uint64_t first) const {
-    const double distance = std::sqrt(best_.least);
-    if (keep_ != nullptr || !(best_.pair < first) || distance < 4 * best_.rounding) return false;
+  /// How far all of B's block is beyond all of A's, along the normal of level faces or toward.
+  double ahead_of(const PlacedVertices& of_a, const PlacedVertices& of_b) const {
     const D d;
     const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
     const auto along = [&](const PlacedVertices& of, std::size_t l) {
@@ -270,8 +291,15 @@ class MeshGapSearch {
       last = hn::Max(last, along(of_a, l));
       next = hn::Min(next, along(of_b, l));
     }
-    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last)) >=
-           distance - 0.5 * best_.rounding;
+    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
+  }
+
+  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
+  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
+  bool cannot_answer(double ahead, std::uint64_t first) const {
+    const double distance = std::sqrt(best_.least);
+    return best_.pair < first && distance >= 4 * best_.rounding &&
+           ahead >= distance - 0.5 * best_.rounding;
   }
 
   void add(std::uint64_t pair) {
@@ -305,8 +333,10 @@ class MeshGapSearch {
     out_.tests += count;
     PairGaps gaps;
     std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
-    for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1)
-      out_.overlap = crosses(pairs, static_cast<std::uint32_t>(std::countr_zero(unclear)));
+    for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1) {
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(unclear));
+      out_.overlap = !apart_along(pairs, gaps, n) && crosses(pairs, n);
+    }
     if (out_.overlap) return;
     const double before = best_.least;
     for (std::uint32_t n = 0; n < count; ++n) {
@@ -322,7 +352,6 @@ class MeshGapSearch {
     limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kGapsAlike) * distance));
     if (distance > 0) {
       look_along((1 / distance) * best_.between);
-      level_ = toward_;
       for (std::uint32_t n = 0; n < count; ++n)
         if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
           for (int side = 0; side < 2; ++side) {
@@ -332,17 +361,20 @@ class MeshGapSearch {
     }
   }
 
-  /// Two blocks, no nearer than `least`, which the next steps look at again.
-  void keep(std::uint64_t blocks, double least) {
+  static std::uint64_t kept_least(double least) {
+    return bits_of(static_cast<float>((1 - 1e-6) * std::min(least, 1e30)));
+  }
+  /// Two blocks that the next steps look at again.
+  void keep(std::uint64_t blocks, std::uint64_t bound) {
     KeptRing& ring = scratch_.near;
     if (keep_->count + 2 > ring.most()) {
       KeptRing::give_up(*keep_);
       keep_ = nullptr;
-      limit_to(nearest_limit_);
+      look_ahead(0);
       return;
     }
     ring.add(*keep_, blocks);
-    ring.add(*keep_, bits_of(static_cast<float>(least)));
+    ring.add(*keep_, bound);
   }
 
   using Corners = std::array<exact::Point, 3>;
@@ -354,6 +386,15 @@ class MeshGapSearch {
     return at;
   }
 
+  /// Whether a plane square to the way between the points that were found parts the triangles: it
+  /// does if these are the nearest, but for roundings.
+  bool apart_along(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n) const {
+    const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
+    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
+    const double last = std::max({dot(way, a[0]), dot(way, a[1]), dot(way, a[2])}),
+                 next = std::min({dot(way, b[0]), dot(way, b[1]), dot(way, b[2])});
+    return next - last > 4 * slack_ * std::sqrt(gaps.squared[n]);
+  }
   static bool crosses(const TrianglePairs& pairs, std::uint32_t n) {
     const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
     return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
@@ -372,7 +413,8 @@ class MeshGapSearch {
   const double blur_;   ///< likewise of boxes
   BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
   BoxLook<double, double> double_a_, double_b_;
-  double most_, nearest_limit_ = 0, limit_ = 0, squared_limit_ = 0;
+  double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;
+  double squared_limit_ = 0;
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};
   WayAxes axes_;

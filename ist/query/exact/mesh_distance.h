@@ -21,6 +21,7 @@ struct GapQuestion {
   double likely = HUGE_VAL;         ///< it is no more than this, unless a solid holds the other
   exact::Point toward = {0, 0, 0};  ///< unit, from A to B near where they are nearest; or zero
   KeptPairs* kept = nullptr;        ///< what is kept of this pair; null: nothing
+  bool outside = false;             ///< no solid holds a shell of the other, unless surfaces cross
 };
 
 /// The gap between two meshes, A's unit frame.

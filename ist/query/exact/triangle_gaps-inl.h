@@ -29,51 +29,137 @@ class TriangleCulls {
   }
 
   /// Of A's triangles those that may be within of one of B's.
-  std::uint32_t rows(double limit) const {
-    float least = 0;
-    return near(of_a_, low_b_, high_b_, limit, 0, kWidth, least);
+  std::uint32_t rows(double limit) {
+    const F d;
+    const auto most = hn::Set(d, rounded_up(limit) * rounded_up(limit));
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
+      bits |= mask_bits(d, apart(of_a_, low_b_, high_b_, l) <= most) << l;
+    if (bits == 0) return 0;
+    invert(a_, inverse_a_);
+    invert(b_, inverse_b_);
+    return bits;
   }
 
-  /// Of B's triangles those that may be within of A's triangle i: by their extents along three
-  /// axes, then by the planes of both. `least`, squared: no triangle is nearer by the axes.
-  std::uint32_t lanes(std::uint32_t i, double limit, float& least) const {
+  /// Of B's triangles those that may be within `limit` of A's triangle i: by their extents along
+  /// three axes, by the planes of both, and by those through A's sides. `least`, squared: none is
+  /// nearer, or than `wide`, which is no less than the limit.
+  std::uint32_t lanes(std::uint32_t i, double limit, double wide, float& least) {
     const F d;
-    const float far = rounded_up(limit) + blur_, size = a_.size + b_.size + far;
-    // Heights are off by what the normal is, and coordinates are.
-    const auto over_a = hn::Set(d, far * length(i) + a_.slack[i] * size);
+    using V = hn::Vec<F>;
+    const float far = rounded_up(wide) + blur_, size = a_.size + b_.size + far;
+    const float over = a_.slack[i] * size;
+    const auto zero = hn::Zero(d), blur = hn::Set(d, blur_), sizes = hn::Set(d, size),
+               most = hn::Set(d, rounded_up(limit) * rounded_up(limit)),
+               far_squared = hn::Set(d, far * far), inverse = hn::Set(d, inverse_a_[i]);
     float low[3], high[3];
     for (int k = 0; k < 3; ++k)
       low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      const std::uint32_t near_here = near(of_b_, low, high, limit, l, l + hn::Lanes(d), least);
-      if (near_here == 0) continue;
-      const hn::Vec<F> n[3] = {hn::Load(d, b_.normal[0] + l), hn::Load(d, b_.normal[1] + l),
-                               hn::Load(d, b_.normal[2] + l)};
-      hn::Vec<F> of_a[3], of_b[3];
+      V squared = apart(of_b_, low, high, l);
+      const auto smallest = [&] {
+        least = std::min(least, hn::GetLane(hn::MinOfLanes(d, squared)));
+        return least;
+      };
+      if (hn::AllTrue(d, squared > far_squared)) {
+        smallest();
+        continue;
+      }
+      const V n[3] = {hn::Load(d, b_.normal[0] + l), hn::Load(d, b_.normal[1] + l),
+                      hn::Load(d, b_.normal[2] + l)};
+      V corner[3][3], of_a[3], of_b[3];
       for (int c = 0; c < 3; ++c) {
-        of_a[c] = ((hn::Set(d, a_.normal[0][i]) * hn::Load(d, b_.corner[c][0] + l) +
-                    hn::Set(d, a_.normal[1][i]) * hn::Load(d, b_.corner[c][1] + l)) +
-                   hn::Set(d, a_.normal[2][i]) * hn::Load(d, b_.corner[c][2] + l)) -
+        for (int k = 0; k < 3; ++k) corner[c][k] = hn::Load(d, b_.corner[c][k] + l);
+        of_a[c] = ((hn::Set(d, a_.normal[0][i]) * corner[c][0] +
+                    hn::Set(d, a_.normal[1][i]) * corner[c][1]) +
+                   hn::Set(d, a_.normal[2][i]) * corner[c][2]) -
                   hn::Set(d, a_.offset[i]);
         of_b[c] = ((n[0] * hn::Set(d, a_.corner[c][0][i]) + n[1] * hn::Set(d, a_.corner[c][1][i])) +
                    n[2] * hn::Set(d, a_.corner[c][2][i])) -
                   hn::Load(d, b_.offset + l);
       }
-      const auto length_b = hn::Sqrt((n[0] * n[0] + n[1] * n[1]) + n[2] * n[2]);
-      const auto over_b =
-          hn::Set(d, far * kLonger) * length_b + hn::Load(d, b_.slack + l) * hn::Set(d, size);
-      bits |= near_here & mask_bits(d, hn::And(reaches(of_a, over_a), reaches(of_b, over_b))) << l;
+      // Heights are off by what the normal is, and coordinates are.
+      const V over_a = hn::Max(zero, (beyond(of_a) - hn::Set(d, over)) * inverse - blur),
+              over_b = hn::Max(zero, (beyond(of_b) - hn::Load(d, b_.slack + l) * sizes) *
+                                             hn::Load(d, inverse_b_ + l) -
+                                         blur);
+      squared = hn::Max(squared, hn::Max(over_a * over_a, over_b * over_b));
+      if (!hn::AllTrue(d, squared > most)) {
+        if (!has_sides_) find_sides();
+        V aside = zero;
+        for (const auto& side : sides_) {
+          V out[3];
+          for (int c = 0; c < 3; ++c)
+            out[c] =
+                (hn::Set(d, side[0][i]) * corner[c][0] + hn::Set(d, side[1][i]) * corner[c][1]) +
+                hn::Set(d, side[2][i]) * corner[c][2];
+          aside = hn::Max(aside, hn::Min(out[0], hn::Min(out[1], out[2])) - hn::Set(d, side[3][i]));
+        }
+        squared = hn::Max(squared, over_a * over_a + aside * aside);
+      }
+      squared = squared * hn::Set(d, 1 - 1e-5f);
+      bits |= mask_bits(d, squared <= most) << l;
+      smallest();
     }
     return bits;
   }
 
  private:
   static constexpr float kLonger = 1 + 2e-6f;  ///< than a length in floats
-  /// Whether three heights are not all beyond.
-  static hn::Mask<F> reaches(const hn::Vec<F> (&height)[3], hn::Vec<F> over) {
-    return hn::And(hn::Min(height[0], hn::Min(height[1], height[2])) <= over,
-                   hn::Max(height[0], hn::Max(height[1], height[2])) >= hn::Neg(over));
+  /// How far three heights are all on one side; else below zero.
+  static hn::Vec<F> beyond(const hn::Vec<F> (&height)[3]) {
+    return hn::Max(hn::Min(height[0], hn::Min(height[1], height[2])),
+                   hn::Neg(hn::Max(height[0], hn::Max(height[1], height[2]))));
+  }
+  /// Of lengths of normals, or less; 0 of what has none.
+  static void invert(const PlacedTriangles& t, float (&inverse)[kWidth]) {
+    const F d;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      const auto x = hn::Load(d, t.normal[0] + l), y = hn::Load(d, t.normal[1] + l),
+                 z = hn::Load(d, t.normal[2] + l);
+      const auto length = hn::Sqrt((x * x + y * y) + z * z) * hn::Set(d, kLonger);
+      hn::Store(inverse_of_length(length), d, inverse + l);
+    }
+  }
+  static hn::Vec<F> inverse_of_length(hn::Vec<F> length) {
+    const F d;
+    const auto one = hn::Set(d, 1.0f);
+    const auto some = length > hn::Set(d, 1e-15f);
+    return hn::IfThenElseZero(some, one / hn::IfThenElse(some, length, one));
+  }
+  /// Of A's triangles: unit vectors in them, square to their sides and outward, and where the side
+  /// is along that, or more.
+  void find_sides() {
+    has_sides_ = true;
+    const F d;
+    using V = hn::Vec<F>;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
+      for (int e = 0; e < 3; ++e) {
+        V side[3], n[3], out[3];
+        for (int k = 0; k < 3; ++k) {
+          side[k] = hn::Load(d, a_.corner[(e + 1) % 3][k] + l) - hn::Load(d, a_.corner[e][k] + l);
+          n[k] = hn::Load(d, a_.normal[k] + l) * hn::Load(d, inverse_a_ + l);
+        }
+        for (int k = 0; k < 3; ++k) {
+          const int x = (k + 1) % 3, y = (k + 2) % 3;
+          out[k] = side[x] * n[y] - side[y] * n[x];
+        }
+        const V squared = (out[0] * out[0] + out[1] * out[1]) + out[2] * out[2],
+                side_squared = (side[0] * side[0] + side[1] * side[1]) + side[2] * side[2];
+        // Of slivers, whose normals have no digits, nothing is told.
+        const V inverse =
+            hn::IfThenElseZero(squared > hn::Set(d, 0.9f) * side_squared,
+                               inverse_of_length(hn::Sqrt(squared) * hn::Set(d, kLonger)));
+        V last;
+        for (int c = 0; c < 3; ++c) {
+          V at = hn::Zero(d);
+          for (int k = 0; k < 3; ++k) at = at + inverse * out[k] * hn::Load(d, a_.corner[c][k] + l);
+          last = c == 0 ? at : hn::Max(last, at);
+        }
+        for (int k = 0; k < 3; ++k) hn::Store(inverse * out[k], d, sides_[e][k] + l);
+        hn::Store(last + hn::Set(d, 2 * blur_), d, sides_[e][3] + l);
+      }
   }
   struct alignas(64) Extents {
     float low[kWidth], high[kWidth];
@@ -94,38 +180,29 @@ class TriangleCulls {
     }
     return out;
   }
-  /// Of lanes [from, to) those that may be within of one box.
-  static std::uint32_t near(const Extents (&of)[3], const float (&low)[3], const float (&high)[3],
-                            double limit, std::size_t from, std::size_t to, float& least) {
+  /// Squared distances of the lanes from `from` on to one box.
+  static hn::Vec<F> apart(const Extents (&of)[3], const float (&low)[3], const float (&high)[3],
+                          std::size_t from) {
     const F d;
-    const auto most = hn::Set(d, rounded_up(limit)), zero = hn::Zero(d);
-    std::uint32_t bits = 0;
-    for (std::size_t l = from; l < to; l += hn::Lanes(d)) {
-      hn::Vec<F> squared = zero;
-      for (int k = 0; k < 3; ++k) {
-        const auto gap = hn::Max(hn::Max(zero, hn::Load(d, of[k].low + l) - hn::Set(d, high[k])),
-                                 hn::Set(d, low[k]) - hn::Load(d, of[k].high + l));
-        squared = squared + gap * gap;
-      }
-      bits |= mask_bits(d, squared <= most * most) << l;
-      least = std::min(least, hn::GetLane(hn::MinOfLanes(d, squared)));
+    const auto zero = hn::Zero(d);
+    auto squared = zero;
+    for (int k = 0; k < 3; ++k) {
+      const auto gap = hn::Max(hn::Max(zero, hn::Load(d, of[k].low + from) - hn::Set(d, high[k])),
+                               hn::Set(d, low[k]) - hn::Load(d, of[k].high + from));
+      squared = squared + gap * gap;
     }
-    return bits;
+    return squared;
   }
   static float rounded_up(double limit) {
     return static_cast<float>(std::min(limit, 1e15) * (1 + 2e-6));
   }
-  /// Of A's normal, or more.
-  float length(std::uint32_t i) const {
-    const float x = a_.normal[0][i], y = a_.normal[1][i], z = a_.normal[2][i];
-    return std::sqrt((x * x + y * y) + z * z) * kLonger;
-  }
-
   const PlacedTriangles& a_;
   const PlacedTriangles& b_;
   const float blur_;
   Extents of_a_[3], of_b_[3];
   float low_b_[3], high_b_[3];  ///< around all
+  alignas(64) float inverse_a_[kWidth], inverse_b_[kWidth], sides_[3][4][kWidth];
+  bool has_sides_ = false;
 };
 
 /// The nearest points of eight pairs of triangles that do not cross.

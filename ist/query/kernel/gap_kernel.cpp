@@ -167,6 +167,21 @@ void child(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
                               out);
 }
 
+std::uint32_t around(const BallBlock& balls, const float (&point)[3], float (&depth)[kWidth]) {
+  const LaneTag<float> d;
+  std::uint32_t bits = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const auto dx = hn::Set(d, point[0]) - hn::Load(d, balls.x + lane),
+               dy = hn::Set(d, point[1]) - hn::Load(d, balls.y + lane),
+               dz = hn::Set(d, point[2]) - hn::Load(d, balls.z + lane),
+               r = hn::Max(hn::Load(d, balls.r + lane), hn::Zero(d)),
+               in = r * r - ((dx * dx + dy * dy) + dz * dz);
+    hn::StoreU(in, d, depth + lane);
+    bits |= mask_bits(d, in > hn::Zero(d)) << lane;
+  }
+  return bits;
+}
+
 LeafGap leaf(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y, double gap_limit,
              double cover_limit, Precision precision) {
   return precision == Precision::float32
@@ -182,6 +197,12 @@ namespace ist {
 
 HWY_EXPORT(child);
 HWY_EXPORT(leaf);
+HWY_EXPORT(around);
+
+std::uint32_t balls_around(const BallBlock& balls, const float (&point)[3],
+                           float (&depth)[kWidth]) noexcept {
+  return HWY_DYNAMIC_DISPATCH(around)(balls, point, depth);
+}
 
 void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
                 std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,

@@ -32,6 +32,11 @@ void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int lev
                 std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
                 ChildGaps& out) noexcept;
 
+/// Which of sixteen balls hold a point of their block's frame: a bit each. `depth`: of all, the
+/// squared radius less the squared distance.
+std::uint32_t balls_around(const BallBlock& balls, const float (&point)[3],
+                           float (&depth)[kWidth]) noexcept;
+
 /// Least gaps between the spheres of two leaf blocks, in x's unit frame.
 struct LeafGap {
   double gap;
