@@ -9,6 +9,12 @@
 
 namespace ist::gpu {
 
+/// Whether a lane's triangles, which do not cross, might if points moved by the room.
+IST_HD_COLD bool nearly_cross(const CornerView& view, const exact::Point& aside, double room) {
+  PiercingEdge end[2];
+  return cross_pair<Signs::settled>(view, aside, end, room) != PairSays::apart;
+}
+
 /// Of pairs of triangles those that cross: what their segments add to the sums, and how often each
 /// edge is pierced. In their order, each a team's width at a time.
 template <class Team, bool kExactly>
@@ -35,6 +41,7 @@ class ExactCrossings {
         work(has, pair);
       }
     };
+    nearly_ = near.count > 0;
     each(near, [](bool, const std::uint32_t(&)[2]) {});
     each(crossing, [&](bool has, const std::uint32_t(&pair)[2]) { cross(has, pair); });
     return state_;
@@ -42,6 +49,8 @@ class ExactCrossings {
 
   IST_HD std::uint32_t count() const { return crossings_; }
   IST_HD std::uint32_t records() const { return records_; }
+  /// Whether triangles cross, or nearly do.
+  IST_HD bool nearly() const { return nearly_; }
 
  private:
   static constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
@@ -90,6 +99,8 @@ class ExactCrossings {
     const bool crosses = says == PairSays::crosses;
     int total = 0;
     const int first = team_.first(crosses, total);
+    nearly_ = nearly_ || total > 0 ||
+              team_.any(has && nearly_cross(view, pair_.aside, double{pair_.reach[0]}));
     if (total == 0) return;
     exact::EdgeEnd at[2] = {};
     if (crosses)
@@ -167,6 +178,7 @@ class ExactCrossings {
   const ExactRoom& room_;
   ExactState state_ = ExactState::ok;
   std::uint32_t crossings_ = 0, records_ = 0;
+  bool nearly_ = false;
 };
 
 }  // namespace ist::gpu

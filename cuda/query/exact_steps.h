@@ -207,8 +207,7 @@ IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::u
            .run())
     state = ExactState::unsure;
   if (state == ExactState::ok &&
-      write_exact(team, batch, i, pair, memory, visits, crossings.count()) &&
-      crossing.count + near.count > 0)
+      write_exact(team, batch, i, pair, memory, visits, crossings.count()) && crossings.nearly())
     state = ExactState::nothing;
   clear_room(team, room, crossings.records());
   return state;
