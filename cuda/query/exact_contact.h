@@ -67,6 +67,7 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
   const CornerView view = {memory.contact.corners, team.lane()};
   for (int side = 0; side < 2; ++side)
     for (int k = 0; k < 3; ++k) view.set(side, k, of.corner(side, slot[side], k));
+  team.sync();  // all have read what waits
   PiercingEdge end[2];
   const PairSays says =
       has ? cross_pair<Signs::settled>(view, of.aside, end, of.reach[0]) : PairSays::apart;

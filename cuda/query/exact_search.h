@@ -87,8 +87,9 @@ IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
     const Apart by = apart_by_plane(of, side, pair);
     if (by > apart) apart = by;
   }
-  // Blocks that are near once, where pairs of theirs follow each other.
-  const std::uint32_t of_a = apart != Apart::settled ? pair[0] / kWidth : kNone,
+  // Blocks that are near once, where pairs of theirs follow each other. Those of pairs that may
+  // cross are near anyway, but that these are not settled tells whether solids may touch.
+  const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
                       of_b = pair[1] / kWidth;
   const int before = team.lane() == 0 ? 0 : team.lane() - 1;
   const std::uint32_t last_a = team.broadcast(of_a, before), last_b = team.broadcast(of_b, before);
