@@ -51,19 +51,18 @@ class TriangleCulls {
     const float over = a_.slack[i] * size;
     const auto zero = hn::Zero(d), blur = hn::Set(d, blur_), sizes = hn::Set(d, size),
                most = hn::Set(d, rounded_up(limit) * rounded_up(limit)),
-               far_squared = hn::Set(d, far * far), inverse = hn::Set(d, inverse_a_[i]);
+               far_squared = hn::Set(d, far * far), inverse = hn::Set(d, inverse_a_[i]),
+               less = hn::Set(d, 1 - 1e-5f);
     float low[3], high[3];
     for (int k = 0; k < 3; ++k)
       low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      V squared = apart(of_b_, low, high, l);
-      const auto smallest = [&] {
+      // What a lane finds must not depend on the lanes beside it, whose number the processor has.
+      V squared = less * apart(of_b_, low, high, l);
+      const auto is_far = squared > far_squared;
+      if (hn::AllTrue(d, is_far)) {
         least = std::min(least, hn::GetLane(hn::MinOfLanes(d, squared)));
-        return least;
-      };
-      if (hn::AllTrue(d, squared > far_squared)) {
-        smallest();
         continue;
       }
       const V n[3] = {hn::Load(d, b_.normal[0] + l), hn::Load(d, b_.normal[1] + l),
@@ -84,8 +83,10 @@ class TriangleCulls {
               over_b = hn::Max(zero, (beyond(of_b) - hn::Load(d, b_.slack + l) * sizes) *
                                              hn::Load(d, inverse_b_ + l) -
                                          blur);
-      squared = hn::Max(squared, hn::Max(over_a * over_a, over_b * over_b));
-      if (!hn::AllTrue(d, squared > most)) {
+      squared = hn::IfThenElse(is_far, squared,
+                               hn::Max(squared, less * hn::Max(over_a * over_a, over_b * over_b)));
+      const auto is_out = squared > most;
+      if (!hn::AllTrue(d, is_out)) {
         if (!has_sides_) find_sides();
         V aside = zero;
         for (const auto& side : sides_) {
@@ -96,11 +97,11 @@ class TriangleCulls {
                 hn::Set(d, side[2][i]) * corner[c][2];
           aside = hn::Max(aside, hn::Min(out[0], hn::Min(out[1], out[2])) - hn::Set(d, side[3][i]));
         }
-        squared = hn::Max(squared, over_a * over_a + aside * aside);
+        squared = hn::IfThenElse(is_out, squared,
+                                 hn::Max(squared, less * (over_a * over_a + aside * aside)));
       }
-      squared = squared * hn::Set(d, 1 - 1e-5f);
       bits |= mask_bits(d, squared <= most) << l;
-      smallest();
+      least = std::min(least, hn::GetLane(hn::MinOfLanes(d, squared)));
     }
     return bits;
   }
