@@ -4,6 +4,8 @@ import numpy as np
 
 import ist
 
+VECTORS = ("force", "torque", "point_a", "point_b", "normal")  # columns of three numbers
+
 
 def numbers(pairs):
     """(n, 2) int64, or None: all pairs."""

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 import ist
-from ist._scene import Gaps, Scene, Volumes, numbers
+from ist._scene import VECTORS, Gaps, Scene, Volumes, numbers
 
 __all__ = ["overlap", "separation"]
 
@@ -126,9 +126,6 @@ class _Answers(torch.autograd.Function):
         return by_pose, by_scale, None, None, None
 
 
-_VECTORS = ("force", "torque", "point_a", "point_b", "normal")
-
-
 def _ask(query, names, a, b, poses, **arguments):
     """Columns by name, where the poses are."""
     if poses.device.type == "cuda":
@@ -141,7 +138,7 @@ def _ask_gpu(query, names, a, b, poses, **arguments):
     """In PyTorch's memory, and the host does not wait."""
     rows = len(poses)
     out = {name: torch.empty(rows, dtype=torch.int32, device=poses.device) if name == "status"
-           else poses.new_empty((rows, 3) if name in _VECTORS else rows) for name in names}
+           else poses.new_empty((rows, 3) if name in VECTORS else rows) for name in names}
     query(a, b, poses, out=out, stream=torch.cuda.current_stream(poses.device).cuda_stream, **arguments)
     return out
 
