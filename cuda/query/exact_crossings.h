@@ -83,11 +83,13 @@ class ExactCrossings {
     const CornerView view = {memory_.corners, team_.lane()};
     PiercingEdge end[2] = {};
     PairSays says = PairSays::apart;
-    if (has) {
+    if (has)
       for (int side = 0; side < 2; ++side)
         for (int k = 0; k < 3; ++k) view.set(side, k, pair_.corner(side, pair[side], k));
-      says = cross_pair < kExactly ? Signs::exact : Signs::doubles > (view, pair_.aside, end);
-    }
+    if constexpr (kExactly)
+      says = cross_exactly(team_, has, view, pair_.aside, end);
+    else if (has)
+      says = cross_pair<Signs::doubles>(view, pair_.aside, end);
     if (team_.any(says == PairSays::unsure)) {
       state_ = ExactState::unsure;
       return;

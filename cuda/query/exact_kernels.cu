@@ -43,12 +43,14 @@ __global__ void __launch_bounds__(kThreads, kSearchBlocks)
   __shared__ Raw<ExactSearchMemory, kWarps> memory;
   const unsigned warp = threadIdx.x / 32;
   ExactRound& round = round_of(batch, n);
+  std::uint32_t before = blockIdx.x * kWarps + warp;
   by_warps(
       round.count, &round.searched,
       [&](const WarpTeam& team, std::uint32_t k) {
         search_query(team, batch, round, k, pair[warp], memory[warp]);
+        before = 0;
       },
-      [&] { return goes_on(batch, n); });
+      [&] { return goes_on(batch, n, before); });
 }
 
 template <bool kExactly>

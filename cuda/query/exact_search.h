@@ -10,9 +10,10 @@
 
 namespace ist::gpu {
 
-/// Appends a pair of triangles of each lane that `adds`, in their order; false: no room.
+/// Appends a pair of triangles of each lane that `adds`, in their order. Beyond the pool's room
+/// they are only counted, so that the next round knows what it takes.
 template <class Team>
-IST_HD bool append(const Team& team, const ExactPool& pool, ExactChain& chain, bool adds,
+IST_HD void append(const Team& team, const ExactPool& pool, ExactChain& chain, bool adds,
                    std::uint32_t a, std::uint32_t b) {
   constexpr std::uint32_t kPairs = ExactChunk::kPairs;
   const ExactChain before = chain;
@@ -21,24 +22,23 @@ IST_HD bool append(const Team& team, const ExactPool& pool, ExactChain& chain, b
       before.count + static_cast<std::uint32_t>(team.exclusive_count(adds, total));
   const std::uint32_t end = before.count + static_cast<std::uint32_t>(total);
   const std::uint32_t chunks = (before.count + kPairs - 1) / kPairs;  // so far
-  std::uint32_t last = before.last;
-  if (end > chunks * kPairs) {
-    last = take(team, pool.taken, 1);
-    if (last >= pool.room) return false;
-  }
-  if (adds) {
-    std::uint32_t(&slot)[2] =
-        pool.chunks[at < chunks * kPairs ? before.last : last].pair[at % kPairs];
+  const std::uint32_t last = end > chunks * kPairs ? take(team, pool.taken, 1) : before.last;
+  const std::uint32_t to = at < chunks * kPairs ? before.last : last;
+  if (adds && to < pool.room) {
+    std::uint32_t(&slot)[2] = pool.chunks[to].pair[at % kPairs];
     slot[0] = a;
     slot[1] = b;
   }
   team.sync();  // all have read the chain
   if (team.lane() == 0) {
-    if (last != before.last && chunks > 0) pool.next[before.last] = last;
+    if (last != before.last && chunks > 0 && before.last < pool.room) pool.next[before.last] = last;
     chain = {chunks == 0 ? last : before.first, last, end};
   }
   team.sync();
-  return true;
+}
+/// Whether the pool had room for all of it.
+IST_HD inline bool held(const ExactPool& pool, const ExactChain& chain) {
+  return chain.count == 0 || chain.last < pool.room;
 }
 
 enum class Apart {
@@ -70,10 +70,10 @@ IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uin
 }
 
 /// Of the next so many pairs of triangles that wait keeps those that no plane keeps apart, and
-/// those whose signs might differ if points moved by the room; false: no room. A function of its
-/// own: the search needs its registers.
+/// those whose signs might differ if points moved by the room. A function of its own: the search
+/// needs its registers.
 template <class Team>
-IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
+IST_HD void sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
                            std::uint32_t first, std::uint32_t count) {
   constexpr std::uint32_t kNone = ~0u;
   const auto lane = static_cast<std::uint32_t>(team.lane());
@@ -87,19 +87,19 @@ IST_HD bool sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
     const Apart by = apart_by_plane(of, side, pair);
     if (by > apart) apart = by;
   }
-  // Blocks that are near once, where pairs of theirs follow each other. Those of pairs that may
-  // cross are near anyway, but that these are not settled tells whether solids may touch.
+  // Blocks that are near once. Those of pairs that may cross are near anyway, but that these are
+  // not settled tells whether solids may touch.
   const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
                       of_b = pair[1] / kWidth;
-  const int before = team.lane() == 0 ? 0 : team.lane() - 1;
-  const std::uint32_t last_a = team.broadcast(of_a, before), last_b = team.broadcast(of_b, before);
-  const bool again = lane == 0 ? memory.last_near[0] == of_a && memory.last_near[1] == of_b
-                               : last_a == of_a && last_b == of_b;
+  const int leads = lowest_bit(team.alike(of_a) & team.alike(of_b));
+  const bool again =
+      leads != team.lane() || (memory.last_near[0] == of_a && memory.last_near[1] == of_b);
   team.sync();
-  if (lane == Team::kWidth - 1) memory.last_near[0] = of_a, memory.last_near[1] = of_b;
-  return append(team, memory.pool, memory.crossing, apart == Apart::no, pair[0], pair[1]) &&
-         append(team, memory.pool, memory.near, apart == Apart::certain && !again, pair[0],
-                pair[1]);
+  // Pairs of blocks follow each other: those of the last lane come first in the next batch.
+  if (lane == Team::kWidth - 1 && of_a != kNone)
+    memory.last_near[0] = of_a, memory.last_near[1] = of_b;
+  append(team, memory.pool, memory.crossing, apart == Apart::no, pair[0], pair[1]);
+  append(team, memory.pool, memory.near, apart == Apart::certain && !again, pair[0], pair[1]);
 }
 
 /// Pairs of triangles of both meshes that may cross. Both trees are opened together, depth first;
@@ -123,7 +123,7 @@ class ExactSearch {
   }
 
   /// Calls sift(first, count) of pairs of triangles that wait. False where that says so, or where
-  /// the memory does not hold them.
+  /// the memory does not hold the nodes that wait.
   template <class Sift>
   IST_HD bool run(const Sift& sift) {
     while (count_ > 0) {

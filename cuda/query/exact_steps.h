@@ -239,19 +239,18 @@ IST_HD inline std::uint32_t end_of(const ExactRound& round) {
 }
 
 /// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
-/// may still need as many chunks as pairs took before, in the last round too.
-IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n) {
+/// may take as many chunks as those of the last round took; at first, as those that are done. Of
+/// teams that begin at the same time none sees what the others take: each counts those `before` it.
+IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint32_t before) {
   constexpr std::uint32_t kLeastChunks = 4;
-  std::uint32_t each = kLeastChunks;
-  for (const ExactRound& round : batch.counters->round) {
-    const std::uint32_t chunks = atomic_load(&round.chunks);
-    const std::uint32_t taken = chunks / (atomic_load(&round.found) + 1);
-    const std::uint32_t needed = chunks <= batch.pool.room ? taken : 2 * taken;  // some had no room
-    if (needed > each) each = needed;
-  }
-  const ExactRound& round = round_of(batch, n);
+  const ExactRound &last = round_of(batch, n + 1), &round = round_of(batch, n);
+  const ExactRound& by = n > 0 && last.found > 0 ? last : round;
+  const std::uint32_t taken = atomic_load(&by.chunks) / (atomic_load(&by.found) + 1) + 1;
+  const std::uint32_t each = taken > kLeastChunks ? taken : kLeastChunks;
   const std::uint32_t found = atomic_load(&round.found), searched = atomic_load(&round.searched);
-  return atomic_load(&round.chunks) + std::uint64_t{searched + 1 - found} * each <= batch.pool.room;
+  const std::uint32_t busy = searched - found > before ? searched - found : before;
+  const std::uint32_t chunks = atomic_load(&round.chunks);
+  return (busy == 0 && chunks == 0) || chunks + std::uint64_t{busy + 1} * each <= batch.pool.room;
 }
 
 /// Searches the k-th pair of a round.
@@ -263,10 +262,12 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
   ExactPool pool = batch.pool;
   pool.taken = &round.chunks;
   ExactSearch<Team> search(team, pair, memory, memory.waiting, ExactSearchMemory::kWaiting, pool);
-  const bool fits = search.run([&](std::uint32_t first, std::uint32_t count) {
-    return sift_triangles(team, pair, memory, first, count);
+  const bool all = search.run([&](std::uint32_t first, std::uint32_t count) {
+    sift_triangles(team, pair, memory, first, count);
+    return true;
   });
   if (team.lane() == 0) {
+    const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
     query.state = fits ? ExactState::ok : ExactState::no_room;
     // What others left no chunks for is listed again.
     if (!fits && round.chunks > batch.pool.room) {
@@ -339,11 +340,13 @@ IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::
   load_pair(team, batch, i, memory.pair);
   ExactSearch<Team> search(team, memory.pair, memory.search, room.waiting, room.most_waiting,
                            room.pool);
+  const bool all = search.run([&](std::uint32_t first, std::uint32_t count) {
+    sift_triangles(team, memory.pair, memory.search, first, count);
+    return true;
+  });
+  const ExactChain crossing = memory.search.crossing, near = memory.search.near;
   ExactState state = ExactState::no_room;
-  if (search.run([&](std::uint32_t first, std::uint32_t count) {
-        return sift_triangles(team, memory.pair, memory.search, first, count);
-      })) {
-    const ExactChain crossing = memory.search.crossing, near = memory.search.near;
+  if (all && held(room.pool, crossing) && held(room.pool, near)) {
     state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
                               near, search.visits);
   }

@@ -40,7 +40,7 @@ constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
 /// A round of pairs that triangles meet, and what they leave to be summed.
 constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
 /// A round of pairs of meshes, and chunks of triangles for each of them.
-constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 12;
+constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 64, kMostChunks = 1 << 19;
 constexpr std::uint32_t kRoomForMeshGaps = 1 << 17;    ///< a round of distances of meshes
 constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
 
@@ -177,7 +177,7 @@ std::size_t place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& 
   exact.bytes = bytes - parts.used();
   exact.query_room =
       static_cast<std::uint32_t>(std::min<std::size_t>(room.most_pairs, kRoomForMeshes));
-  exact.pool.room = 1024 + kChunksEach * exact.query_room;
+  exact.pool.room = 1024 + std::min(kChunksEach * exact.query_room, kMostChunks);
   exact.queries = parts.take<gpu::ExactQuery>(exact.query_room);
   exact.pool.chunks = parts.take<gpu::ExactChunk>(exact.pool.room);
   exact.pool.next = parts.take<std::uint32_t>(exact.pool.room);

@@ -115,7 +115,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     const std::uint32_t count = gpu::pairs_from(batch, first);
     round = {first, count, 0, 0, 0, 0, 0, 0, 0, 0};
     for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
-    for (; round.searched < count && gpu::goes_on(batch, n); ++round.searched)
+    for (; round.searched < count && gpu::goes_on(batch, n, 0); ++round.searched)
       by_team(seed, [&](const auto& team) {
         gpu::search_query(team, batch, round, round.searched, *pair, *search);
       });

@@ -27,6 +27,10 @@ IST_HD inline double absolute_dot(const Point& x, const Point& size) {
   return (std::abs(x.x) * size.x + std::abs(x.y) * size.y) + std::abs(x.z) * size.z;
 }
 
+IST_HD inline bool same(const Point& p, const Point& q) {
+  return p.x == q.x && p.y == q.y && p.z == q.z;
+}
+
 /// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
 IST_HD_COLD int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
                               double d1, double d0) {
@@ -54,6 +58,8 @@ IST_HD_COLD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, c
 IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, const Point& u1,
                                           const Point& u0, const Point& v1, const Point& v0,
                                           int moved, const Point& aside) {
+  // Copies in place share edges.
+  if ((same(u1, v1) && same(u0, v0)) || (same(u1, v0) && same(u0, v1))) return {0, 0, 1};
   const Expansion<2> ux = difference(u1.x, u0.x), uy = difference(u1.y, u0.y),
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
