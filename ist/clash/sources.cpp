@@ -241,7 +241,7 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
                                 for (auto& t : out_mesh.triangles) std::swap(t[1], t[2]);
                               return out_mesh;
                             },
-                            kFloat32, kFloat32});
+                            kFloat32, scene.of_doubles ? kFloat64 : kFloat32});
     out.parts.push_back(std::move(one));
   }
   if (out.parts.empty()) throw Error(path + ": no node has a mesh of triangles");

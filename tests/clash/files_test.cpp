@@ -319,6 +319,13 @@ TEST_F(ClashFiles, FarFromTheOriginRoundingIsTold) {
   const Json told = json("far.gltf", {"--touch-within", "1e-3"}, 3);
   EXPECT_EQ(pairs(told), Words{"a b overlapping"});
   EXPECT_EQ(told.at("notes"), Json::array());
+  // Writers that keep doubles, as IfcOpenShell at a national grid's coordinates, show it somewhere.
+  write("doubles.gltf", scene(std::regex_replace(far, std::regex("4000000, 0"),
+                                                 "4000000.456, 6.123233995736766e-17"),
+                              folder_));
+  const Json doubles = json("doubles.gltf", {}, 3);
+  EXPECT_EQ(pairs(doubles), Words{"a b overlapping"});
+  EXPECT_EQ(doubles.at("notes"), Json::array());
   // A pose of a TOML is of doubles, whatever its mesh is of.
   ASSERT_EQ(ist({"sample", "cube", "-o", "cube.stl"}).exit_code, 0);
   write("far.toml",
