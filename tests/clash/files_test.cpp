@@ -326,6 +326,7 @@ TEST_F(ClashFiles, FarFromTheOriginRoundingIsTold) {
   const Json doubles = json("doubles.gltf", {}, 3);
   EXPECT_EQ(pairs(doubles), Words{"a b overlapping"});
   EXPECT_EQ(doubles.at("notes"), Json::array());
+  EXPECT_NE(clash("doubles.gltf").out.find("at (500000.75, 4000001, 1)"), std::string::npos);
   // A pose of a TOML is of doubles, whatever its mesh is of.
   ASSERT_EQ(ist({"sample", "cube", "-o", "cube.stl"}).exit_code, 0);
   write("far.toml",
