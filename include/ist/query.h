@@ -441,6 +441,8 @@ void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSetti
 /// contain the solids. Unknown: the solids are near each other or hardly touch, or 256 pairs of
 /// nodes have been opened.
 ///
+/// Where an asset has no spheres the surfaces decide, as with a margin of 0.
+///
 /// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration. With
 /// a shape, it is certain as far as the shape's distances are: see each shape. Two shapes:
 /// missing_data.

@@ -126,7 +126,7 @@ void check_options(const ClashOptions& options) {
   refuse_idle_options(options.assembly.robot, options.input);
   if (!options.assembly.joints.empty() && !is_robot_file(options.input))
     throw CLI::ValidationError(
-        "--pose", "has no effect: '" + options.input + "' is not a robot (.urdf, .xml)");
+        "--pose", "has no effect: '" + options.input + "' is not a robot (.urdf, .xml, .sdf)");
   for (const auto& [path, what] : {std::pair(&options.bcf, "the BCF"), {&options.glb, "the scene"}})
     if (!path->empty()) require_output(*path, options.input, what);
 }
@@ -148,6 +148,7 @@ void clash(const ClashOptions& options) {
   report.swept = assembly.rows.size() > 1;
   for (const auto& [part, what] : assembly.faults) report.faults.emplace_back(part, what);
   report.notes = assembly.notes;
+  note_rounding(assembly.parts, options.settings, report.notes);
   if (!options.bcf.empty()) write_text(options.bcf, clashes_bcf(report, now()));
   if (!options.glb.empty()) write_text(options.glb, drawn(assembly, report));
   fmt::print("{}", options.json  ? json_text(clashes_json(report)) + "\n"
@@ -197,7 +198,7 @@ void add_clash(CLI::App& app) {
       "clash", "All pairs of an assembly's parts that overlap, by the exact measure");
   add_input(command, "FILE", options->input,
             "Parts in a .toml, a scene (.glb, .gltf: nodes are parts) or a robot (.urdf, .xml, "
-            ".mjcf: links are)");
+            ".sdf: links are)");
   add_number(command, "--clearance", options->settings.clearance, {.least = 0},
              "Also list pairs that are nearer than this, in u");
   add_number(

@@ -190,7 +190,7 @@ Made make(const ClashShape& shape, const MeshSettings& closing) {
 Assembly read_assembly(const std::string& path, const AssemblyOptions& options) {
   ClashSource source;
   const std::string ending = ending_of(path);
-  const bool robot = ending == ".urdf" || ending == ".xml" || ending == ".mjcf";
+  const bool robot = ending == ".urdf" || ending == ".xml" || ending == ".mjcf" || ending == ".sdf";
   if (ending == ".toml")
     read_clash_toml(path, false, source);
   else if (ending == ".glb" || ending == ".gltf")
@@ -200,7 +200,7 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
   else
     throw Error(path +
                 ": is no assembly: name a .toml of parts, a scene (.glb, .gltf) or a robot "
-                "(.urdf, .xml, .mjcf)");
+                "(.urdf, .xml, .sdf)");
   if (!options.rules.empty()) read_clash_toml(options.rules, true, source);
   const std::vector<Assembly::Rule> rules = rules_of(source);
 
@@ -249,7 +249,7 @@ Assembly read_assembly(const std::string& path, const AssemblyOptions& options) 
     const ClashShape& from = source.shapes[part.shape];
     out.assets.push_back(shape.asset);
     out.parts.push_back({part.name, PlacedAsset{shape.asset->view(), rows[0].poses[i], part.scale},
-                         from.rounding, part.scale * from.slack});
+                         from.rounding, part.scale * from.slack, from.placing});
     for (std::size_t r = 0; r < rows.size(); ++r) out.rows[r].poses.push_back(rows[r].poses[i]);
     kept.push_back(i);
   }

@@ -53,8 +53,8 @@ struct Assembly {
   std::size_t count = 0;  ///< parts of the file, also those with faults and those ignored
 };
 
-/// Reads a TOML of parts, a glTF scene (its nodes), a URDF or an MJCF (its links). Throws Error for
-/// what is wrong with the description; a mesh that is no solid is a fault of its parts. A part
+/// Reads a TOML of parts, a glTF scene (its nodes), a URDF, MJCF or SDF (its links). Throws Error
+/// for what is wrong with the description; a mesh that is no solid is a fault of its parts. A part
 /// whose pairs are all ignored is not read.
 Assembly read_assembly(const std::string& path, const AssemblyOptions& options);
 

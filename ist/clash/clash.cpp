@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -35,6 +36,10 @@ struct Scratch {
   std::vector<ContactPatch> patches = std::vector<ContactPatch>(kPatches);
 };
 
+double reach(const Bounds& box) {
+  return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+}
+
 /// A part as pairs see it.
 struct Placed {
   Placed(const ClashPart& given, const ClashSettings& settings) : part(given) {
@@ -45,14 +50,8 @@ struct Placed {
       throw Error(part.name +
                   ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, "
                   "the scale above 0");
-    const auto reach = [](const Bounds& b) {
-      return std::max(b.lower.cwiseAbs().maxCoeff(), b.upper.cwiseAbs().maxCoeff());
-    };
     const double largest = std::max(reach(world), solid.scale * reach(own));
-    // Coordinates, and poses of as many digits, are each off by up to this.
-    touch = settings.touch_within >= 0
-                ? settings.touch_within / 2
-                : 4 * part.rounding * largest + part.slack + solid.scale * solid.asset.mesh_error();
+    touch = settings.touch_within >= 0 ? settings.touch_within / 2 : uncertainty_of(part);
     margin = touch + settings.clearance / 2 + 4 * kFloat64 * largest;
     box = {world.lower.array() - margin, world.upper.array() + margin};
     volume = solid.asset.volume() * solid.scale * solid.scale * solid.scale;
@@ -291,6 +290,31 @@ double rounding_of_file(const std::string& path) {
     if (line.starts_with("property double x") || line.starts_with("property float64 x"))
       return kFloat64;
   return kFloat32;
+}
+
+double uncertainty_of(const ClashPart& part) {
+  const PlacedAsset& solid = part.solid;
+  const double own = solid.scale * reach(bounds(solid.asset));
+  return 4 * std::max(part.rounding * own, part.placing * std::max(own, reach(bounds(solid)))) +
+         part.slack + solid.scale * solid.asset.mesh_error();
+}
+
+void note_rounding(std::span<const ClashPart> parts, const ClashSettings& settings,
+                   std::vector<std::string>& notes) {
+  const ClashPart* first = nullptr;
+  std::size_t count = 0;
+  double most = 0;
+  for (const ClashPart& part : parts) {
+    const double rounded = uncertainty_of(part) - part.slack;
+    if (settings.touch_within >= 0 || !(rounded > 1e-3 * bounds(part.solid).radius)) continue;
+    if (count++ == 0) first = &part;
+    most = std::max(most, 2 * rounded);
+  }
+  if (count == 0) return;
+  notes.push_back(fmt::format(
+      "{}{}: so far from the origin that rounding is a thousandth of the part and more: overlaps "
+      "up to {:.4g} u deep may count as touching. Give --touch-within, or move the assembly",
+      first->name, count > 1 ? fmt::format(" and {} more", count - 1) : "", most));
 }
 
 std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,

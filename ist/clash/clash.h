@@ -11,16 +11,20 @@
 
 namespace ist {
 
+inline constexpr double kFloat32 = 0x1p-23, kFloat64 = 0x1p-52;
+
 /// A part of an assembly. Its asset keeps a mesh.
 struct ClashPart {
   std::string name;
   PlacedAsset solid;
   /// The rounding of its coordinates, as a fraction of them: that of float32 or of float64.
   double rounding = 0;
-  double slack = 0;  ///< [u] how far its mesh may lie from the shape that is meant
+  double slack = 0;           ///< [u] how far its mesh may lie from the shape that is meant
+  double placing = kFloat64;  ///< the rounding of its pose
 };
 
-inline constexpr double kFloat32 = 0x1p-23, kFloat64 = 0x1p-52;
+/// [u] How far rounding and slack let its surface lie from where it is meant to be, at most.
+double uncertainty_of(const ClashPart& part);
 
 /// How coordinates of a mesh's file are rounded: as its format stores them.
 double rounding_of_file(const std::string& path);
@@ -55,6 +59,10 @@ struct Clash {
   bool duplicate = false;                ///< both are one shape in one place
   std::string pose;                      ///< of a sweep: where it was found
 };
+
+/// Adds a note where rounding alone moves parts by a thousandth of their size, and decides.
+void note_rounding(std::span<const ClashPart> parts, const ClashSettings& settings,
+                   std::vector<std::string>& notes);
 
 /// Pairs that nobody asks for, by indices of parts.
 using PairFilter = std::function<bool(std::size_t a, std::size_t b)>;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 
 #include <ist/types.h>
@@ -108,6 +109,13 @@ std::string clashes_csv(const ClashReport& report) {
   return out;
 }
 
+/// With five digits, and a tenth of a unit however far from the origin.
+static std::string place(const Eigen::Vector3d& x) {
+  const double largest = std::max(1.0, x.cwiseAbs().maxCoeff());
+  const int digits = std::max(5, 2 + static_cast<int>(std::log10(largest)));
+  return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", x.x(), digits, x.y(), digits, x.z(), digits);
+}
+
 std::string clashes_text(const ClashReport& report) {
   std::size_t counts[3] = {}, width = 4;
   for (const Clash& c : report.pairs) {
@@ -129,7 +137,7 @@ std::string clashes_text(const ClashReport& report) {
       out += fmt::format("area {:.6g}", c.contact_area);
     else
       out += fmt::format("distance {:.6g}", c.distance_max);
-    out += " at " + short_vector(c.centroid);
+    out += " at " + place(c.centroid);
     if (c.duplicate) out += ", one part twice in one place";
     if (report.swept) out += ", pose " + c.pose;
     if (report.tolerance >= 0 && c.kind == ClashKind::overlapping)

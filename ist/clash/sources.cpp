@@ -204,6 +204,11 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
       out.notes.push_back(fmt::format("{} has no triangles: it is no part", part.name));
       continue;
     }
+    if (part.in_world.linear().isZero(0)) {
+      out.notes.push_back(
+          fmt::format("{} has the scale 0, which hides it: it is no part", part.name));
+      continue;
+    }
     // A rotation, after a mirror image where it must be, and one scale; else the mesh is deformed.
     Eigen::Matrix3d linear = part.in_world.linear(), deformed = Eigen::Matrix3d::Identity();
     if (linear.determinant() < 0) deformed(0, 0) = -1;
@@ -236,7 +241,7 @@ void read_clash_scene(const std::string& path, ClashSource& out) {
                                 for (auto& t : out_mesh.triangles) std::swap(t[1], t[2]);
                               return out_mesh;
                             },
-                            kFloat32});
+                            kFloat32, scene.of_doubles ? kFloat64 : kFloat32});
     out.parts.push_back(std::move(one));
   }
   if (out.parts.empty()) throw Error(path + ": no node has a mesh of triangles");

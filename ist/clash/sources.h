@@ -17,7 +17,7 @@ namespace ist {
 struct ClashShape {
   std::string name;                    ///< for messages
   std::function<TriangleMesh()> mesh;  ///< throws Error; null: an asset's file is `name`
-  double rounding = kFloat64;
+  double rounding = kFloat64, placing = kFloat64;
   double slack = 0;
 };
 

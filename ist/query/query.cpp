@@ -120,6 +120,10 @@ ContactPatches contact_patches(const PlacedSolid& a, const PlacedSolid& b,
 }
 
 YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept {
+  const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
+  const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
+  if (tree_a != nullptr && tree_b != nullptr && lack_spheres(*tree_a, *tree_b))
+    return overlap(a, b, 0, workspace);
   return ask_pair(
       a, b, workspace, YesNoAnswer{YesNo::unknown, QueryStatus::missing_data},
       [&](const auto& x, const PlacedAsset& y) { return find_overlap(x, y, workspace); },

@@ -112,7 +112,9 @@ class CollisionManager:
         self._repair = repair
         self._objs = {}
         self._assets = {}
-        self._scene, self._room = None, 0  # made where it is needed, for so many
+        self._scene, self._room, self._pairs = None, 0, 16  # made where it is needed, for so many
+        self._numbered, self._moved = {}, {}  # objects by number, and those that the scene has elsewhere
+        self._size = np.inf  # of the smallest object
 
     def add_object(self, name, mesh, transform=None):
         """Adds or replaces an object: anything with `vertices` and `faces`. transform: (4, 4), rigid.
@@ -123,8 +125,9 @@ class CollisionManager:
         if name in self._objs:
             self.remove_object(name)
         self._objs[name] = added
+        self._size = min(self._size, (added.high - added.low).max())
         if self._scene is not None and len(self._objs) <= self._room:
-            added.number = self._scene.add(added.asset, added.pose)
+            self._place(added)
         else:
             self._scene = None
         return added.asset
@@ -133,69 +136,98 @@ class CollisionManager:
         gone = self._of(name)
         if self._scene is not None:
             self._scene.remove(gone.number)
+            del self._numbered[gone.number]
+            self._moved.pop(gone.number, None)
         del self._objs[name]
 
     def set_transform(self, name, transform):
         moved = self._of(name)
         moved.set_transform(transform)
         if self._scene is not None:
-            self._scene.step(moved.pose[None], numbers=[moved.number])
+            self._moved[moved.number] = moved.pose
 
     def in_collision_single(self, mesh, transform=None, return_names=False, return_data=False):
         """Whether a mesh collides with any object; the set of their names; a list of ContactData."""
-        single = self._object("__external", mesh, transform)
-        pairs = _pairs_of(list(self._objs.values()), [single])
+        pairs = self._near(self._object("__external", mesh, transform))
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, {a for a, _ in names}, data, return_names, return_data)
 
     def in_collision_internal(self, return_names=False, return_data=False):
         """Whether any two objects collide; the set of their names, sorted in each pair."""
-        found, names, data = _collide(self._pairs_within(), return_names, return_data)
+        found, names, data = _collide(self._within(), return_names, return_data)
         return _told(found, {tuple(sorted(pair)) for pair in names}, data, return_names, return_data)
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = _pairs_of(list(self._objs.values()), list(other_manager._objs.values()))
+        pairs = self._near_any(other_manager._objs.values())
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
         """The least distance of a mesh from any object [u], negative inside; inf without objects."""
         single = self._object("__external", mesh, transform)
-        distance, names, data = _nearest(_all_of(list(self._objs.values()), [single]), return_data)
+        distance, names, data = _nearest(lambda margin: self._near(single, margin), len(self._objs),
+                                         (single.high - single.low).max(), return_data)
         return _told(distance, names and names[0], data, return_name, return_data)
 
     def min_distance_internal(self, name=None, return_names=False, return_data=False):
         """The least distance of two objects, or of object `name` from the others."""
+        count = len(self._objs)
         if name is None:
-            pairs = _all_within(list(self._objs.values()))
+            distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size, return_data)
         else:
             one = self._of(name)
-            pairs = _all_of([one], [other for other in self._objs.values() if other is not one])
-        distance, names, data = _nearest(pairs, return_data)
+            distance, names, data = _nearest(lambda margin: self._near(one, margin), count - 1,
+                                             (one.high - one.low).max(), return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
         """The least distance of an object from one of another manager; names are (own, other's)."""
-        pairs = _all_of(list(self._objs.values()), list(other_manager._objs.values()))
-        distance, names, data = _nearest(pairs, return_data)
+        others = other_manager._objs.values()
+        distance, names, data = _nearest(lambda margin: self._near_any(others, margin),
+                                         len(self._objs) * len(others), self._size, return_data)
         return _told(distance, names, data, return_names, return_data)
 
-    def _pairs_within(self):
-        """Those whose boxes meet, by a scene: not all pairs are looked at."""
-        objects = list(self._objs.values())
-        if len(objects) < 2:
-            return _all_of(objects, [])
+    def _placed(self):
+        """The scene of all objects."""
         if self._scene is None:
-            self._room = room = 2 * len(objects)
-            self._scene = ist.Scene(max_bodies=room, max_pairs=room * room // 2, threads=1)
-            self._scene.set_rule(answer="boxes", measure="exact")
-            for one in objects:
-                one.number = self._scene.add(one.asset, one.pose)
-        at = np.full(1 + max(one.number for one in objects), -1)
-        at[[one.number for one in objects]] = np.arange(len(objects))
-        found = at[self._scene.step().pairs]
-        return _Pairs(objects, objects, found[:, 0], found[:, 1], np.zeros(len(found)))
+            self._room = 2 * len(self._objs) + 2
+            self._scene = ist.Scene(max_bodies=self._room, max_pairs=self._pairs * self._room, threads=1)
+            self._numbered, self._moved = {}, {}
+            for one in self._objs.values():
+                self._place(one)
+        return self._scene
+
+    def _place(self, one):
+        one.number = self._scene.add(one.asset, one.pose)
+        self._numbered[one.number] = one
+
+    def _within(self, margin=0):
+        """The pairs whose boxes are no further apart than the margin."""
+        found = None
+        while found is None:
+            self._placed().set_rule(answer="boxes", measure="exact", margin=margin)
+            moved, self._moved = self._moved, {}
+            try:
+                found = self._scene.step(np.reshape(list(moved.values()), (-1, 7)), numbers=np.array(list(moved), int))
+            except ist.Error:  # more pairs than there is room for
+                self._scene, self._pairs = None, 8 * self._pairs
+        numbers, at = np.unique(found.pairs, return_inverse=True)
+        objects = [self._numbered[number] for number in numbers.tolist()]
+        return _Pairs(objects, objects, *at.reshape(-1, 2).T)
+
+    def _near(self, one, margin=0):
+        """As _within(), of an object and those of this manager."""
+        if self._moved:
+            self._within()
+        found = self._placed().in_box(one.low - margin, one.high + margin)
+        objects = [self._numbered[number] for number in found.tolist() if self._numbered[number] is not one]
+        return _Pairs(objects, [one], np.arange(len(objects)), np.zeros(len(objects), int))
+
+    def _near_any(self, others, margin=0):
+        near = [(a, b) for b in others for a in self._near(b, margin).of_a]
+        at = np.arange(len(near))
+        return _Pairs([a for a, _ in near], [b for _, b in near], at, at)
 
     def _of(self, name):
         if name not in self._objs:
@@ -215,23 +247,35 @@ class CollisionManager:
 
 
 def scene_to_collision(scene, *, repair=False):
-    """A CollisionManager of a trimesh.Scene, and {node: ist.Asset}."""
+    """A CollisionManager of a trimesh.Scene's meshes, as they stand there, and {node: ist.Asset}."""
     manager = CollisionManager(repair=repair)
     assets = {}
     for node in scene.graph.nodes_geometry:
         transform, geometry = scene.graph[node]
-        assets[node] = manager.add_object(node, scene.geometry[geometry], transform)
+        mesh = scene.geometry[geometry]
+        if not hasattr(mesh, "faces"):  # a path or points
+            continue
+        if np.abs(transform[:3, :3].T @ transform[:3, :3] - np.eye(3)).max() > 1e-9 or np.linalg.det(transform) < 0:
+            # The mesh takes what no pose has: scales and mirror images.
+            mesh = mesh.copy()
+            mesh.apply_transform(transform)
+            transform = None
+        assets[node] = manager.add_object(node, mesh, transform)
     return manager, assets
 
 
 class _Pairs:
-    """Pairs of objects: their numbers among those of either side, and how far their boxes are apart."""
+    """Pairs of objects: their numbers among those of either side."""
 
-    def __init__(self, of_a, of_b, first, second, gap):
-        self.of_a, self.of_b, self.first, self.second, self.gap = of_a, of_b, first, second, gap
+    def __init__(self, of_a, of_b, first, second):
+        self.of_a, self.of_b, self.first, self.second = of_a, of_b, first, second
 
-    def only(self, kept):
-        return _Pairs(self.of_a, self.of_b, self.first[kept], self.second[kept], self.gap[kept])
+    def gaps(self):
+        """[u] (n,): how far boxes are apart."""
+        low_a, high_a, low_b, high_b = (
+            np.reshape([getattr(one, side) for one in of], (-1, 3))[at]
+            for of, at in ((self.of_a, self.first), (self.of_b, self.second)) for side in ("low", "high"))
+        return np.linalg.norm(np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0), axis=1)
 
     def ask(self, query, chosen, poses=None, **settings):
         """The query of some of them, in one call. poses: of B; None: its own."""
@@ -283,32 +327,6 @@ class _Pairs:
         return tuple(one.name for one in self.objects(i))
 
 
-def _gaps(of_a, of_b):
-    """[u] (n, m): how far boxes are apart."""
-    low_a, high_a = np.array([one.low for one in of_a]), np.array([one.high for one in of_a])
-    out = np.zeros((len(of_a), len(of_b)))
-    for j, b in enumerate(of_b):
-        apart = np.maximum(np.maximum(low_a - b.high, b.low - high_a), 0)
-        out[:, j] = np.sqrt((apart**2).sum(axis=1))
-    return out
-
-
-def _all_of(of_a, of_b):
-    gap = _gaps(of_a, of_b) if of_a and of_b else np.zeros((0, 0))
-    first, second = (i.ravel() for i in np.indices(gap.shape))
-    return _Pairs(of_a, of_b, first, second, gap.ravel())
-
-
-def _all_within(objects):
-    pairs = _all_of(objects, objects)
-    return pairs.only(pairs.first < pairs.second)
-
-
-def _pairs_of(of_a, of_b):
-    pairs = _all_of(of_a, of_b)
-    return pairs.only(pairs.gap == 0)
-
-
 def _collide(pairs, with_names, with_data):
     """(whether any collide, their names, their ContactData); the first to collide, where that is all"""
     with_names = with_names or with_data
@@ -332,10 +350,13 @@ def _collide(pairs, with_names, with_data):
     return bool(len(hits)), [pairs.names(i) for i in hits], data
 
 
-def _nearest(pairs, with_data):
-    """(least distance, names, DistanceData); negative where solids overlap, by volume over area"""
-    order = np.argsort(pairs.gap, kind="stable")
-    near = order[:np.searchsorted(pairs.gap[order], 0, side="right")]
+def _nearest(near_by, count, margin, with_data):
+    """(least distance, names, DistanceData); negative where solids overlap, by volume over area.
+
+    near_by(margin): pairs whose boxes are no further apart, of `count` in all. margin: tried first.
+    """
+    pairs = near_by(0)
+    near = np.arange(len(pairs.first))
     best, nearest = np.inf, None
     if len(near) > 0:
         answers = pairs.ask(ist.penetration, near, measure="exact")
@@ -348,21 +369,28 @@ def _nearest(pairs, with_data):
         depth = np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
         k = int(depth.argmax())
         half = 0.5 * depth[k] * force[k] / max(area[k], 1e-300)
-        best, nearest = -depth[k], (near[k], (point[k] + half, point[k] - half))
-    begin, count = 0, _FIRST
-    while best > 0 and begin < len(order) and pairs.gap[order[begin]] < best:
-        chosen = order[begin:begin + count]
-        chosen = chosen[pairs.gap[chosen] < best]
-        limit = {"max_distance": best} if best < np.inf else {}
-        gaps = pairs.ask(ist.separation, chosen, **limit)
-        _refuse_unanswered(pairs, gaps.status)
-        k = int(gaps.distance.argmin())
-        if gaps.distance[k] < best:
-            best, nearest = gaps.distance[k], (chosen[k], (gaps.point_a[k], gaps.point_b[k]))
-        begin, count = begin + count, 4 * count
+        best, nearest = -depth[k], (pairs, near[k], (point[k] + half, point[k] - half))
+    looked = -1.0  # pairs whose boxes are no further apart are known
+    while count > 0 and looked < best and best > 0 and looked < 1e37:
+        looked = best if best < np.inf else margin
+        pairs, margin = near_by(looked), 4 * margin
+        gap = pairs.gaps()
+        order, begin, size = np.argsort(gap, kind="stable"), 0, _FIRST
+        while begin < len(order) and gap[order[begin]] < best:
+            chosen = order[begin:begin + size]
+            chosen = chosen[gap[chosen] < best]
+            limit = {"max_distance": best} if best < np.inf else {}
+            found = pairs.ask(ist.separation, chosen, **limit)
+            _refuse_unanswered(pairs, found.status)
+            k = int(found.distance.argmin())
+            if found.distance[k] < best:
+                best, nearest = found.distance[k], (pairs, chosen[k], (found.point_a[k], found.point_b[k]))
+            begin, size = begin + size, 4 * size
+        if len(gap) == count:
+            break
     if nearest is None:
         return float("inf"), None, None
-    i, points = nearest
+    pairs, i, points = nearest
     data = DistanceData(pairs.names(i), pairs.objects(i), best, points) if with_data else None
     return float(best), pairs.names(i), data
 

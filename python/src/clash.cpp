@@ -20,6 +20,11 @@
 namespace ist::python {
 namespace {
 
+double rounding_of_array(const py::object& array) {
+  return py::hasattr(array, "dtype") && text_of(array.attr("dtype")) == "float32" ? kFloat32
+                                                                                  : kFloat64;
+}
+
 /// Coordinates in float32 say so by their file or their array.
 double rounding_of(const py::object& mesh) {
   if (py::isinstance<py::str>(mesh) || py::hasattr(mesh, "__fspath__"))
@@ -28,8 +33,7 @@ double rounding_of(const py::object& mesh) {
   const py::object vertices = pair && py::len(mesh) > 0       ? py::object(mesh[0])
                               : py::hasattr(mesh, "vertices") ? py::object(mesh.attr("vertices"))
                                                               : py::object(py::none());
-  return py::hasattr(vertices, "dtype") && text_of(vertices.attr("dtype")) == "float32" ? kFloat32
-                                                                                        : kFloat64;
+  return rounding_of_array(vertices);
 }
 
 py::object clash(const py::object& given, const py::object& poses, const py::object& names,
@@ -59,6 +63,7 @@ py::object clash(const py::object& given, const py::object& poses, const py::obj
     ClashPart part;
     part.name = names.is_none() ? std::to_string(i) : text_of(names[i]);
     part.rounding = rounding_of(mesh);
+    part.placing = rounding_of_array(poses);
     part.solid.scale = scales.is_none() ? 1 : py::cast<double>(scales[i]);
     part.solid.pose = take_pose(poses.is_none() ? poses : py::object(poses[i]), part.solid.scale);
     try {
@@ -82,6 +87,7 @@ py::object clash(const py::object& given, const py::object& poses, const py::obj
   const std::vector<Clash> pairs =
       offline([parts, settings](const ProgressCallback&) { return find_clashes(parts, settings); });
   report.pairs = pairs;
+  note_rounding(parts, settings, report.notes);
   return py::module_::import_("json").attr("loads")(json_text(clashes_json(report), -1));
 }
 

@@ -168,7 +168,7 @@ constexpr const char* kOverlapDoc = R"(Whether solids share a point. Yes and no 
 
 Arguments as for penetration(). Costs a fraction of a penetration query.
 margin: [u] whether they come within this of each other: by their surfaces, if both Assets keep a mesh.
-    0: whether inner spheres meet, or no covers do.
+    0: whether inner spheres meet, or no covers do; of assets without spheres by their surfaces.
 
 Returns (n,) uint32, a YesNo: 0 no, 1 yes, 2 unknown, also for invalid rows; a number for one
 pose.)";

@@ -147,6 +147,7 @@ MeshScene read_mesh_scene(const std::string& path) {
   for (GltfParts::Part& part : read.parts)
     scene.parts.push_back({std::move(part.name), part.mesh, part.in_world});
   scene.notes = std::move(read.notes);
+  scene.of_doubles = read.of_doubles;
   return scene;
 }
 

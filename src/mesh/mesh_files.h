@@ -23,6 +23,7 @@ struct MeshScene {
   std::vector<TriangleMesh> meshes;  ///< one without triangles is empty
   std::vector<Part> parts;
   std::vector<std::string> notes;  ///< as TriangleMesh::notes
+  bool of_doubles = false;  ///< some number of its nodes is no float32, and no decimal of one
 };
 
 /// Throws Error as load_mesh() does.

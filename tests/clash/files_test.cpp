@@ -297,6 +297,44 @@ TEST_F(ClashFiles, NodesOfASceneAreParts) {
   }
 }
 
+TEST_F(ClashFiles, ANodeOfScaleZeroIsNoPart) {
+  write("hidden.gltf", scene(R"([
+    {"name": "a", "mesh": 0}, {"name": "hidden", "mesh": 0, "scale": [0, 0, 0]},
+    {"name": "b", "mesh": 0, "translation": [3, 0, 0]}])",
+                             folder_));
+  const Json report = json("hidden.gltf", {}, 0);
+  EXPECT_EQ(report.at("parts"), 2);
+  EXPECT_NE(report.at("notes").dump().find("hidden has the scale 0"), std::string::npos);
+}
+
+TEST_F(ClashFiles, FarFromTheOriginRoundingIsTold) {
+  const std::string far = R"([
+    {"name": "a", "mesh": 0, "translation": [500000, 4000000, 0]},
+    {"name": "b", "mesh": 0, "translation": [500000.5, 4000000, 0]}])";
+  write("far.gltf", scene(far, folder_));
+  const Json report = json("far.gltf", {}, 0);
+  EXPECT_EQ(pairs(report), Words{"a b touching"});
+  EXPECT_NE(report.at("notes").dump().find("a and 1 more: so far from the origin"),
+            std::string::npos);
+  const Json told = json("far.gltf", {"--touch-within", "1e-3"}, 3);
+  EXPECT_EQ(pairs(told), Words{"a b overlapping"});
+  EXPECT_EQ(told.at("notes"), Json::array());
+  // Writers that keep doubles, as IfcOpenShell at a national grid's coordinates, show it somewhere.
+  write("doubles.gltf", scene(std::regex_replace(far, std::regex("4000000, 0"),
+                                                 "4000000.456, 6.123233995736766e-17"),
+                              folder_));
+  const Json doubles = json("doubles.gltf", {}, 3);
+  EXPECT_EQ(pairs(doubles), Words{"a b overlapping"});
+  EXPECT_EQ(doubles.at("notes"), Json::array());
+  EXPECT_NE(clash("doubles.gltf").out.find("at (500000.75, 4000001, 1)"), std::string::npos);
+  // A pose of a TOML is of doubles, whatever its mesh is of.
+  ASSERT_EQ(ist({"sample", "cube", "-o", "cube.stl"}).exit_code, 0);
+  write("far.toml",
+        "[[part]]\nname = \"a\"\nmesh = \"cube.stl\"\npose = [1,0,0,0, 500000,4000000,0]\n"
+        "[[part]]\nname = \"b\"\nmesh = \"cube.stl\"\npose = [1,0,0,0, 500000.5,4000000,0]\n");
+  EXPECT_EQ(pairs(json("far.toml", {}, 3)), Words{"a b overlapping"});
+}
+
 TEST_F(ClashFiles, CopiesOfANode) {
   write("flush.gltf", scene(R"([
     {"name": "a", "mesh": 0, "translation": [0.1, 0.2, 0.3]},
@@ -359,6 +397,16 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   const Json turned = json("arm.xml", {"--pose", "shoulder=3.14"}, 3);
   EXPECT_EQ(pairs(turned), Words{"world upper overlapping"});
   EXPECT_NE(turned["notes"].dump().find("round shapes"), std::string::npos);
+
+  const auto box = [](const std::string& name, const std::string& x) {
+    return "<link name='" + name + "'><pose>" + x +
+           " 0 0 0 0 0</pose><collision name='c'><geometry><box><size>1 1 1</size></box></geometry>"
+           "</collision></link>";
+  };
+  write("boxes.sdf", "<sdf version='1.9'><model name='m'>" + box("a", "0") + box("b", "0.5") +
+                         "<joint name='j' type='fixed'><parent>a</parent><child>b</child></joint>"
+                         "</model></sdf>");
+  EXPECT_EQ(pairs(json("boxes.sdf", {}, 3)), Words{"a b overlapping"});
 }
 
 TEST_F(ClashFiles, TablesArchivesAndPictures) {

@@ -455,6 +455,37 @@ def test_the_solid_is_the_file_not_mujocos_copy(folder):
         assert model.body_mass[1] == pytest.approx(5, rel=1e-6)
 
 
+@pytest.mark.parametrize("compiler, inertia", [
+    ('meshdir="sub"', ""), ('meshdir="sub" inertiafromgeom="true"', 'diaginertia="1 1 1"'),
+    ('meshdir="sub" inertiafromgeom="true"', 'fullinertia="1 1 1 .1 .1 .1"')])
+@pytest.mark.parametrize("way", ["spec", "file", "assets"])
+def test_a_model_within_a_model_keeps_its_files_and_masses(tmp_path, compiler, inertia, way):
+    a, b = box((0, 0, 0), (.1, .1, .1)), box((.3, 0, 0), (.4, .1, .1))
+    (tmp_path / "child/sub").mkdir(parents=True)
+    write(tmp_path / "child/sub/two.obj", (a[0] + b[0], a[1]))
+    with open(tmp_path / "child/sub/two.obj", "a") as file:  # MuJoCo keeps the first object's faces
+        file.write("o b\n" + "".join("f " + " ".join(str(i + 9) for i in face) + "\n" for face in b[1]))
+    mass = f'<inertial pos="0 0 0" mass="7" {inertia}/>' if "true" in compiler else ""
+    text = f"""<mujoco><compiler {compiler}/><asset><mesh name="two" file="two.obj"/></asset><worldbody>
+      <body name="b">{mass}<freejoint/><geom type="mesh" mesh="two"/></body></worldbody></mujoco>"""
+    (tmp_path / "child/child.xml").write_text(text)
+    if way == "file":
+        (tmp_path / "scene.xml").write_text("""<mujoco><asset><model name="c" file="child/child.xml"/></asset>
+          <worldbody><attach model="c" body="b" prefix="x "/></worldbody></mujoco>""")
+        spec = mujoco.MjSpec.from_file(str(tmp_path / "scene.xml"))
+    else:
+        spec = mujoco.MjSpec()
+        assets = {"elsewhere/two.obj": (tmp_path / "child/sub/two.obj").read_bytes()}
+        child = (mujoco.MjSpec.from_string(text, assets=assets) if way == "assets"
+                 else mujoco.MjSpec.from_file(str(tmp_path / "child/child.xml")))
+        spec.attach(child, prefix="x ", frame=spec.worldbody.add_frame())
+    with pytest.warns(UserWarning, match="12 of 24 triangles"):
+        assert ist.mujoco.attach(spec, cache=tmp_path / "cache") == 1
+    model = spec.compile()
+    assert model.body_mass[1] == pytest.approx(2, rel=1e-6)
+    assert sorted(model.body_inertia[1]) == pytest.approx([2 * .02 / 12, 2 * (.02 / 12 + .0225), 2 * (.02 / 12 + .0225)], rel=1e-6)
+
+
 def test_a_binary_model_travels_without_its_assets(folder, tmp_path):
     (tmp_path / "cache").mkdir()
     spec = mujoco.MjSpec.from_file(str(folder / "nut.xml"))

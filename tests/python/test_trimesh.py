@@ -93,6 +93,40 @@ def test_many_are_asked_as_pairs():
     assert m.min_distance_single(Box(), moved, return_name=True) == (min(gaps), int(np.argmin(gaps)))
 
 
+def test_few_of_many_are_looked_at(monkeypatch):
+    real, rooms = ist.Scene, []
+    monkeypatch.setattr(ist, "Scene", lambda **settings: rooms.append(settings["max_pairs"]) or real(**settings))
+    m = CollisionManager()
+    for i in range(1500):  # room for 16 pairs each does not hold what meets at the origin
+        m.add_object(i, Box(), at(0) if i < 400 else at(3 * (i % 20), 3 * (i // 20 % 20), 3 * (i // 400 + 1)))
+    assert len(m.in_collision_internal(return_names=True)[1]) == 400 * 399 // 2
+    assert len(rooms) == 2 and sum(rooms) < 1500**2 / 4
+    assert m.in_collision_single(Box(), at(3.9, 3, 9), return_names=True)[1] == {821}
+    assert m.min_distance_single(Box(), at(-1000), return_name=True)[0] == 999
+    for i in range(400):
+        m.remove_object(i)
+    assert m.min_distance_internal() == 2
+    m.set_transform(500, at(0, 0, -1e6))
+    assert m.min_distance_internal(500) == pytest.approx(1e6 + 5)
+    n = CollisionManager()
+    n.add_object("far", Box(), at(0, 0, -1e6 - 3))
+    assert m.min_distance_other(n, return_names=True) == (2, (500, "far"))
+
+
+def test_scenes_scale_and_mirror():
+    trimesh = pytest.importorskip("trimesh")
+    from ist.trimesh import scene_to_collision
+
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box(), node_name="large", transform=np.diag([2, 2, 2, 1.]))
+    scene.add_geometry(trimesh.creation.box(), node_name="mirrored", transform=at(1.4) @ np.diag([-1, 1, 1, 1.]))
+    scene.add_geometry(trimesh.PointCloud(np.eye(3)), node_name="points")
+    manager, assets = scene_to_collision(scene)
+    assert set(assets) == {"large", "mirrored"}
+    assert manager.min_distance_internal() == pytest.approx(-0.1)
+    assert manager.in_collision_internal(return_data=True)[1][0].volume == pytest.approx(0.1)
+
+
 def test_mistakes_are_told():
     m = CollisionManager()
     with pytest.raises(ist.OpenMeshError, match="lid: .*not closed"):

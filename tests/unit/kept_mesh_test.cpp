@@ -223,7 +223,10 @@ TEST_F(SurfaceAlone, AnswersNoQueryOfSpheres) {
     expect_missing_data(separation(a, b, {.inner_spheres = true}, workspace_));
     EXPECT_EQ(separation(a, b, {}, workspace_).status, QueryStatus::ok);
     expect_missing_data(time_of_impact(a, b, {}, {}, workspace_));
-    EXPECT_EQ(overlap(a, b, workspace_), YesNo::unknown);
+    EXPECT_EQ(overlap(a, b, workspace_), YesNo::yes);
+    PlacedAsset away = b;
+    away.pose.t[0] = 100;
+    EXPECT_EQ(overlap(a, away, workspace_), YesNo::no);
     EXPECT_EQ(overlap_lenses(a, b, {}, {}).status, QueryStatus::missing_data);
     EXPECT_TRUE(size_match(a, b).fits());
     Penetration answer;

@@ -6,16 +6,15 @@ import numpy as np
 
 def set_bodies(spec, model, solids):
     """Gives each body with solids (geom number: Solid) whose mass is inferred an explicit one."""
-    infers = spec.compiler.inertiafromgeom
-    if infers == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE:
-        return
-    always = infers == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    rule = mujoco.mjtInertiaFromGeom  # each body has the compiler settings of the file that it comes from
     legacy = {mesh.name for mesh in spec.meshes if mesh.inertia in (
         mujoco.mjtMeshInertia.mjMESH_INERTIA_LEGACY, mujoco.mjtMeshInertia.mjMESH_INERTIA_EXACT)}
-    groups = range(spec.compiler.inertiagrouprange[0], spec.compiler.inertiagrouprange[1] + 1)
-    geoms = {geom.id: geom for geom in spec.geoms
-             if geom.id in solids and geom.meshname in legacy and geom.group in groups}
-    bodies = {body.id: body for body in spec.bodies if body.id > 0 and (always or not body.explicitinertial)}
+    geoms = {geom.id: geom for geom in spec.geoms if geom.id in solids and geom.meshname in legacy
+             and geom.compiler.inertiagrouprange[0] <= geom.group <= geom.compiler.inertiagrouprange[1]}
+    always = {body.id: body for body in spec.bodies
+              if body.id > 0 and body.compiler.inertiafromgeom == rule.mjINERTIAFROMGEOM_TRUE}
+    bodies = always | {body.id: body for body in spec.bodies if body.id > 0 and not body.explicitinertial
+                       and body.compiler.inertiafromgeom == rule.mjINERTIAFROMGEOM_AUTO}
     chosen = {body: [] for body in bodies}
     for number in geoms:
         chosen.get(int(model.geom_bodyid[number]), []).append(number)
@@ -31,17 +30,20 @@ def set_bodies(spec, model, solids):
         for geom in numbers:
             parts.append(_part(model, geoms[geom], geom, solids[geom].asset))
         _give(bodies[number], parts)
-    if always:
-        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
-        for number, body in bodies.items():
-            body.explicitinertial = number in chosen
+    for number, body in always.items():
+        body.compiler.inertiafromgeom = rule.mjINERTIAFROMGEOM_AUTO
+        body.explicitinertial = number in chosen
 
 
 def _without(spec, numbers):
     """The model in which geoms have no mass."""
     copy = spec.copy()
     copy.compiler.settotalmass = -1
-    copy.compiler.boundmass = copy.compiler.boundinertia = 1e-14  # MuJoCo refuses bodies without
+    for body in copy.bodies:
+        body.compiler.boundmass = body.compiler.boundinertia = 1e-14  # MuJoCo refuses bodies without
+        if body.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+            # MuJoCo takes what the file states where no geom has a mass.
+            body.mass, body.inertia, body.fullinertia = 0, [0] * 3, [np.nan] * 6
     for geom in copy.geoms:
         if geom.id in numbers:
             geom.mass = 0
@@ -77,5 +79,5 @@ def _give(body, parts):
         way = place - centre
         whole += inertia + part * (way @ way * np.eye(3) - np.outer(way, way))
     body.explicitinertial = True
-    body.mass, body.ipos, body.iquat = mass, centre, [1, 0, 0, 0]
+    body.mass, body.ipos, body.iquat, body.inertia = mass, centre, [1, 0, 0, 0], [0] * 3
     body.fullinertia = [whole[0, 0], whole[1, 1], whole[2, 2], whole[0, 1], whole[0, 2], whole[1, 2]]

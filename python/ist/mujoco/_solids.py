@@ -53,8 +53,8 @@ def _from_file(spec, model, mesh, name):
     vertices, faces = _of_model(model, mesh)
     entry = next((m for m in spec.meshes if m.name == name), None)
     try:
-        loaded = _loaded(spec, entry)
-        if loaded is None:
+        loaded = _loaded(spec, model, mesh)
+        if loaded is None or entry is None:
             return vertices, faces
     except ist.Error as error:
         _warn(f"mesh {name!r} is MuJoCo's copy, since its file is not read: {error}")
@@ -84,21 +84,20 @@ def _of_model(model, mesh):
     return vertices, np.ascontiguousarray(model.mesh_face[first:first + count], dtype=np.uint32)
 
 
-def _loaded(spec, entry):
+def _loaded(spec, model, mesh):
     """The mesh of a file, or None without one: ist reads other files in other ways than MuJoCo does."""
-    if entry is None or pathlib.Path(entry.file).suffix.lower() not in (".obj", ".stl"):
+    start = model.mesh_pathadr[mesh]
+    path = pathlib.Path(os.fsdecode(model.paths[start:].split(b"\0", 1)[0]) if start >= 0 else "")
+    if path.suffix.lower() not in (".obj", ".stl"):
         return None
-    for meshdir in (entry.compiler.meshdir, spec.compiler.meshdir):
-        for name in (entry.file, os.path.join(meshdir or "", entry.file)):
-            if name in spec.assets:
-                with tempfile.TemporaryDirectory() as folder:
-                    path = pathlib.Path(folder) / pathlib.Path(name).name
-                    path.write_bytes(spec.assets[name])
-                    return ist.load_mesh(path)
-        path = pathlib.Path(spec.modelfiledir or ".") / (meshdir or "") / entry.file
-        if path.is_file():
-            return ist.load_mesh(path)
-    return None
+    # MuJoCo finds assets by the last part of their names.
+    held = [name for name in spec.assets if pathlib.Path(name).name == path.name]
+    if not held:
+        return ist.load_mesh(path)
+    with tempfile.TemporaryDirectory() as folder:
+        copy = pathlib.Path(folder) / path.name
+        copy.write_bytes(spec.assets[min(held, key=lambda name: not str(path).endswith(name))])
+        return ist.load_mesh(copy)
 
 
 def _box(vertices):

@@ -53,6 +53,7 @@ struct GltfParts {
   };
   std::vector<PolygonMesh> meshes;
   std::vector<Part> parts;  ///< in the order of the scene
+  bool of_doubles = false;  ///< some number of its nodes is no float32, and no decimal of one
   std::vector<std::string> notes;
 };
 GltfParts read_gltf_parts(const SourceFile& file);

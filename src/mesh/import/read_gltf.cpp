@@ -1,6 +1,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -59,6 +60,15 @@ Transform local_transform(const GltfDocument& document, const Json& node, const 
   const std::vector<double> r = numbers("rotation", {0, 0, 0, 1});  // x y z w
   const std::vector<double> s = numbers("scale", {1, 1, 1});
   return placed(document, t.data(), r.data(), s.data(), name);
+}
+
+/// More digits than a float32 has when it is written as a decimal or as the double it is.
+bool is_certainly_double(const double x) {
+  char text[32];
+  const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::general, 9).ptr;
+  double rounded = x;
+  std::from_chars(text, end, rounded);
+  return rounded != x && static_cast<double>(static_cast<float>(x)) != x;
 }
 
 /// Where EXT_mesh_gpu_instancing puts copies of a node's mesh, in the node's frame; without it,
@@ -265,6 +275,9 @@ class GltfScene {
     GltfParts out;
     std::map<std::size_t, std::size_t> shared;  // by the file's mesh
     for (const std::size_t index : in_order_) {
+      for (const char* const key : {"matrix", "translation", "rotation", "scale"})
+        for (const Json& number : document_.root().at("nodes")[index].value(key, Json::array()))
+          out.of_doubles = out.of_doubles || is_certainly_double(number.get<double>());
       if (!has_mesh(index)) continue;
       const Json& node = document_.root().at("nodes")[index];
       const bool own = node.contains("weights") || node.contains("skin");
