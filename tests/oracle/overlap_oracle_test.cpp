@@ -14,7 +14,7 @@ TEST(OverlapOracle, IsNeverWrong) {
   for (const std::string key : {"eledino", "ico1k"}) {
     int unknown = 0, rows = 0;
     for (const testing::OracleRow& row : testing::read_oracle_rows(key)) {
-      const auto [a, b] = testing::placed(row, 2000);
+      const auto [a, b] = testing::placed(row, 1500);
       const YesNo answer = overlap(a, b, workspace).answer;
       EXPECT_NE(answer, row.volume > 0 ? YesNo::no : YesNo::yes) << key << " " << row.id;
       unknown += answer == YesNo::unknown;
