@@ -242,9 +242,10 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
       complete_cover(link, true);
     }
     robot.self = study.of(robot.covers(), true);
+    if (robot.self.false_share() < best.second.false_share()) best = {robot.links, robot.self};
     for (const FalseMeeting& one : robot.self.meetings)
       if (!lost.contains(one.sample)) narrow.insert({one.a, one.b});
-    if (robot.self.false_share() < best.second.false_share()) best = {robot.links, robot.self};
+    if (narrow.empty()) break;  // the next round would be the same
   }
   std::tie(robot.links, robot.self) = std::move(best);
   if (robot.self.false_share() <= kEnough) return;
