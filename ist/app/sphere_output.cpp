@@ -179,9 +179,8 @@ std::string self_collision_text(const SphereRobot& robot) {
       100 * self.false_share());
   if (excluded != nullptr)
     out += fmt::format(
-        "    {} excluded pairs overlap in some of them, which counts as no collision: most often "
-        "{} "
-        "and {}, in {}\n",
+        "    excluded pairs that overlap in some of them, which counts as no collision: {}, most "
+        "often {} and {}, in {}\n",
         overlapping, excluded->a, excluded->b, excluded->colliding);
   std::sort(wrong.begin(), wrong.end(), [](const LinkPair* a, const LinkPair* b) {
     return std::pair(a->missed, a->falsely) > std::pair(b->missed, b->falsely);
