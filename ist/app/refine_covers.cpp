@@ -15,64 +15,55 @@
 namespace ist::app {
 namespace {
 
-constexpr double kEnough = 0.1;              ///< of the free poses
-constexpr std::size_t kMostOfALink = 40;     ///< on average
-constexpr double kGivenUp[] = {0.05, 0.03};  ///< share of the free poses, by round
-constexpr double kHopeless = 0.3;   ///< share that is given up where it takes too many spheres
+constexpr double kEnough = 0.1;           ///< of the free poses
+constexpr std::size_t kMostOfALink = 40;  ///< on average
+constexpr std::size_t kMostOfAll = 60;    ///< the same, where kEnough are given up
+constexpr double kGivenUp = 0.05;         ///< share of the free poses, at least
+constexpr double kHopeless = 0.6;   ///< share that is given up where it takes too many spheres
 constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
+constexpr double kHalf = 0.5;       ///< of a gap, where both links' spheres change
+constexpr double kLess = 0.4;       ///< of a gap, where half of it was not enough
 constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
 constexpr int kBisections = 3;      ///< of the free distance in a direction
-constexpr std::size_t kPosesOfAPair = 160;  ///< that are looked at, about
-constexpr std::size_t kTold = 3;            ///< pairs that are named as obstacles
+constexpr int kRounds = 2;
+constexpr std::size_t kTold = 3;  ///< pairs that are named as obstacles
 
-/// Positions in which spheres of two links overlap falsely, and how far apart the links are there.
-class Meetings {
- public:
-  Meetings(const LinkSolids& solids) : solids_(solids) {}
-
-  void add(const std::vector<FalseMeeting>& meetings) {
-    const std::size_t known = all_.size();
-    for (const FalseMeeting& one : meetings)
-      if (seen_.insert({one.a, one.b, one.sample}).second) all_.push_back({one, 0});
-    tbb::parallel_for(known, all_.size(), [&](std::size_t i) {
-      all_[i].gap = solids_.gap(all_[i].at.a, all_[i].at.b, all_[i].at.b_in_a);
-    });
-  }
-
-  struct Meeting {
-    FalseMeeting at;
-    double gap;  ///< [u]
-  };
-
-  /// Those in other positions than the `given_up` that cost most. Where a pair is to be free from a
-  /// gap t on, spheres go with 1 / t and positions that are lost with t and how often the pair
-  /// meets; so the best t goes with the root of that.
-  std::vector<Meeting> without(std::size_t given_up) const {
-    std::map<std::pair<std::size_t, std::size_t>, double> often;
-    for (const Meeting& one : all_) ++often[{one.at.a, one.at.b}];
-    std::map<std::size_t, double> nearest;
-    for (const Meeting& one : all_) {
-      const double cost = one.gap * std::sqrt(often[{one.at.a, one.at.b}]);
-      const auto [at, is_new] = nearest.try_emplace(one.at.sample, cost);
-      at->second = std::min(at->second, cost);
-    }
-    std::vector<std::pair<double, std::size_t>> order;
-    for (const auto& [sample, gap] : nearest) order.emplace_back(gap, sample);
-    std::sort(order.begin(), order.end());
-    order.resize(std::min(given_up, order.size()));
-    std::set<std::size_t> left;
-    for (const auto& [gap, sample] : order) left.insert(sample);
-    std::vector<Meeting> kept;
-    for (const Meeting& one : all_)
-      if (!left.contains(one.at.sample)) kept.push_back(one);
-    return kept;
-  }
-
- private:
-  const LinkSolids& solids_;
-  std::set<std::tuple<std::size_t, std::size_t, std::size_t>> seen_;
-  std::vector<Meeting> all_;
+/// A position in which spheres of two links overlap falsely, and how far apart the links are there.
+struct Meeting {
+  FalseMeeting at;
+  double gap;  ///< [u]
 };
+
+std::vector<Meeting> with_gaps(const std::vector<FalseMeeting>& meetings,
+                               const LinkSolids& solids) {
+  std::vector<Meeting> all(meetings.size());
+  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) {
+    const FalseMeeting& one = meetings[i];
+    all[i] = {one, solids.gap(one.a, one.b, one.b_in_a)};
+  });
+  return all;
+}
+
+/// The `count` positions that cost most. Where a pair is to be free from a gap t on, spheres go
+/// with 1 / t and positions that are lost with t and how often the pair meets; so the best t goes
+/// with the root of that.
+std::set<std::size_t> dearest(const std::vector<Meeting>& all, std::size_t count) {
+  std::map<std::pair<std::size_t, std::size_t>, double> often;
+  for (const Meeting& one : all) ++often[{one.at.a, one.at.b}];
+  std::map<std::size_t, double> nearest;
+  for (const Meeting& one : all) {
+    const double cost = one.gap * std::sqrt(often[{one.at.a, one.at.b}]);
+    const auto [at, is_new] = nearest.try_emplace(one.at.sample, cost);
+    at->second = std::min(at->second, cost);
+  }
+  std::vector<std::pair<double, std::size_t>> order;
+  for (const auto& [sample, cost] : nearest) order.emplace_back(cost, sample);
+  std::sort(order.begin(), order.end());
+  order.resize(std::min(count, order.size()));
+  std::set<std::size_t> samples;
+  for (const auto& [cost, sample] : order) samples.insert(sample);
+  return samples;
+}
 
 /// How far a link's spheres may protrude, so that they meet no others falsely.
 struct LinkRoom {
@@ -124,29 +115,33 @@ struct Refined {
   double first;            ///< [u] protrusion before
 };
 
-/// By link; of those that stay as they are none is near.
+/// Two links, by index.
+using Two = std::pair<std::size_t, std::size_t>;
+
+/// By link; of those that stay as they are none is near. `narrow`: pairs that need a margin.
 std::vector<LinkRoom> rooms_of(const std::vector<Refined>& links,
                                const std::vector<LinkSpheres>& covers,
-                               const std::vector<Meetings::Meeting>& meetings) {
+                               const std::vector<Meeting>& meetings,
+                               const std::set<std::size_t>& given_up,
+                               const std::set<Two>& narrow = {}) {
   std::vector<LinkRoom> rooms;
   for (const Refined& link : links) rooms.push_back({kElsewhere * link.first});
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<const Meetings::Meeting*>> pairs;
-  for (const Meetings::Meeting& one : meetings) pairs[{one.at.a, one.at.b}].push_back(&one);
-  for (auto& [pair, all] : pairs) {
-    // The tightest first: then the others are soon told to be far.
-    std::stable_sort(all.begin(), all.end(),
-                     [](const auto* x, const auto* y) { return x->gap < y->gap; });
-    const std::size_t step = (all.size() + kPosesOfAPair - 1) / kPosesOfAPair;
-    for (std::size_t i = 0; i < all.size(); i += step) {
-      const FalseMeeting& at = all[i]->at;
-      const auto add = [&](std::size_t link, std::size_t other, const Eigen::Isometry3d& in_other) {
-        if (links[link].mesh != nullptr)
-          rooms[link].near.push_back({other, in_other, links[other].mesh == nullptr ? kWhole : 0.5,
-                                      &covers[other].spheres});
-      };
-      add(at.a, at.b, at.b_in_a.inverse());
-      add(at.b, at.a, at.b_in_a);
-    }
+  // The tightest first: then the others are soon told to be far.
+  std::vector<const Meeting*> order;
+  for (const Meeting& one : meetings)
+    if (!given_up.contains(one.at.sample)) order.push_back(&one);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const Meeting* x, const Meeting* y) { return x->gap < y->gap; });
+  for (const Meeting* one : order) {
+    const auto add = [&](std::size_t link, std::size_t other, const Eigen::Isometry3d& in_other) {
+      const double share = links[other].mesh == nullptr              ? kWhole
+                           : narrow.contains({one->at.a, one->at.b}) ? kLess
+                                                                     : kHalf;
+      if (links[link].mesh != nullptr)
+        rooms[link].near.push_back({other, in_other, share, &covers[other].spheres});
+    };
+    add(one->at.a, one->at.b, one->at.b_in_a.inverse());
+    add(one->at.b, one->at.a, one->at.b_in_a);
   }
   return rooms;
 }
@@ -167,6 +162,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
                    const SphereCoverSettings& cover,
                    const std::map<std::string, std::size_t>& fixed, bool is_open,
                    const ProgressCallback& progress) {
+  if (robot.self.false_share() <= kEnough) return;
   std::vector<Refined> links;
   std::size_t next = 0, before = 0;
   SphereCoverSettings settings = cover;
@@ -180,7 +176,9 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
       settings.max_protrusion = std::max(settings.max_protrusion, kElsewhere * protrusion);
   }
   settings.count = kMostCoverSpheres;
-  const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
+  const auto budget = [&](double given_up) {
+    return std::max(before, (given_up < kEnough ? kMostOfALink : kMostOfAll) * robot.links.size());
+  };
   const std::vector<LinkSpheres> first = robot.covers();
   std::vector<LinkRoom> rooms;
   const auto room_of = [&](std::size_t i) {
@@ -197,27 +195,34 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     });
     return counts;
   };
-  Meetings meetings(solids);
-  const auto given_up = [&](double share) {
-    return static_cast<std::size_t>(share * static_cast<double>(robot.self.free));
+  const std::vector<Meeting> meetings = with_gaps(robot.self.meetings, solids);
+  const auto given_up = [&, free = static_cast<double>(robot.self.free)](double share) {
+    return static_cast<std::size_t>(share * free);
   };
   std::pair best(robot.links, robot.self);
-  for (const double least : kGivenUp) {
-    if (best.second.false_share() <= kEnough) break;
-    meetings.add(robot.self.meetings);
-    if (!is_open) break;
+  std::set<Two> narrow;
+  double share = kGivenUp;
+  for (int round = 0; round < kRounds && is_open && best.second.false_share() > kEnough; ++round) {
+    std::set<std::size_t> lost;
     std::size_t total = SIZE_MAX;
-    for (double share = least; share < kHopeless && total > budget; share *= 2) {
-      rooms = rooms_of(links, first, meetings.without(given_up(share)));
-      const std::vector<std::size_t> counts = needed(budget);
+    while (true) {
+      lost = dearest(meetings, given_up(share));
+      rooms = rooms_of(links, first, meetings, lost, narrow);
+      const std::vector<std::size_t> counts = needed(budget(kEnough));
       total = 0;
       for (std::size_t i = 0; i < links.size(); ++i)
         total += counts[i] > 0 ? counts[i] : links[i].own;
+      const double too_many = static_cast<double>(total) / static_cast<double>(budget(share));
+      double next = share * std::clamp(std::pow(too_many, 1.5), 1.1, 2.0);
+      if (share < kEnough) next = std::min(next, kEnough);
+      if (total <= budget(share) || next > kHopeless) break;
+      share = next;
     }
+    if (total > budget(share)) break;
     std::vector<ClosedMesh> meshes;
     std::vector<std::size_t> changed;
     settings.room.clear();
-    for (std::size_t i = 0; i < links.size() && total <= budget; ++i) {
+    for (std::size_t i = 0; i < links.size(); ++i) {
       if (rooms[i].near.empty()) continue;
       changed.push_back(i);
       meshes.push_back(*links[i].mesh);
@@ -238,12 +243,15 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     }
     robot.self = study.of(robot.covers(), true);
     if (robot.self.false_share() < best.second.false_share()) best = {robot.links, robot.self};
+    for (const FalseMeeting& one : robot.self.meetings)
+      if (!lost.contains(one.sample)) narrow.insert({one.a, one.b});
+    if (narrow.empty()) break;  // the next round would be the same
   }
   std::tie(robot.links, robot.self) = std::move(best);
   if (robot.self.false_share() <= kEnough) return;
 
   // Pairs that remain in collision even if no more than a tenth is given up.
-  std::vector<Meetings::Meeting> left = meetings.without(given_up(kEnough));
+  const std::set<std::size_t> lost = dearest(meetings, given_up(kEnough));
   std::vector<const LinkPair*> worst;
   for (const LinkPair& pair : robot.self.pairs)
     if (pair.falsely > 0) worst.push_back(&pair);
@@ -251,15 +259,16 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
                    [](const LinkPair* x, const LinkPair* y) { return x->falsely > y->falsely; });
   worst.resize(std::min(worst.size(), kTold));
   for (const LinkPair* pair : worst) {
-    std::vector<Meetings::Meeting> own;
+    std::vector<Meeting> own;
     double gap = std::numeric_limits<double>::infinity();
-    for (const Meetings::Meeting& one : left)
-      if (robot.links[one.at.a].name == pair->a && robot.links[one.at.b].name == pair->b) {
+    for (const Meeting& one : meetings)
+      if (!lost.contains(one.at.sample) && robot.links[one.at.a].name == pair->a &&
+          robot.links[one.at.b].name == pair->b) {
         own.push_back(one);
         gap = std::min(gap, one.gap);
       }
     if (own.empty()) continue;
-    rooms = rooms_of(links, first, own);
+    rooms = rooms_of(links, first, own, {});
     std::size_t spheres = 0;
     for (const std::size_t count : needed(kMostCoverSpheres)) spheres += count;
     robot.too_close.push_back({pair->a, pair->b, gap, spheres});

@@ -62,7 +62,8 @@ Json robot_json(const SphereRobot& robot) {
   Json links = Json::object();
   for (const SphereLink& link : robot.links) links[link.name] = link_json(link);
   const SelfCollision& self = robot.self;
-  Json ignored = Json::array(), wrong = Json::array(), too_close = Json::array();
+  Json ignored = Json::array(), wrong = Json::array(), too_close = Json::array(),
+       mostly = Json::array();
   for (const ClosePair& pair : robot.too_close)
     too_close.push_back({{"links", {pair.a, pair.b}},
                          {"gap", pair.gap},
@@ -70,8 +71,12 @@ Json robot_json(const SphereRobot& robot) {
                          {"spheres", pair.spheres}});
   for (const LinkPair& pair : self.pairs) {
     if (!pair.ignored.empty())
-      ignored.push_back(
-          {{"links", {pair.a, pair.b}}, {"reason", pair.ignored}, {"tried", pair.tried}});
+      ignored.push_back({{"links", {pair.a, pair.b}},
+                         {"reason", pair.ignored},
+                         {"tried", pair.tried},
+                         {"colliding", pair.is_counted() ? Json(pair.colliding) : Json()}});
+    if (self.is_mostly_colliding(pair))
+      mostly.push_back({{"links", {pair.a, pair.b}}, {"colliding", pair.colliding}});
     if (pair.missed + pair.falsely > 0)
       wrong.push_back({{"links", {pair.a, pair.b}},
                        {"colliding", pair.colliding},
@@ -104,6 +109,7 @@ Json robot_json(const SphereRobot& robot) {
             {"missed", self.missed},
             {"false", self.falsely},
             {"wrong", wrong},
+            {"mostly_colliding", mostly},
             {"too_close", too_close}}}};
 }
 
@@ -154,6 +160,13 @@ std::string self_collision_text(const SphereRobot& robot) {
     if (!pair.ignored.empty()) ++ignored[pair.ignored];
     if (pair.missed + pair.falsely > 0) wrong.push_back(&pair);
   }
+  const LinkPair* excluded = nullptr;  // that overlaps most often
+  std::size_t overlapping = 0;
+  for (const LinkPair& pair : self.pairs) {
+    if (pair.ignored != "Excluded" || pair.colliding == 0) continue;
+    ++overlapping;
+    if (excluded == nullptr || pair.colliding > excluded->colliding) excluded = &pair;
+  }
   std::string reasons;
   for (const auto& [reason, count] : ignored)
     reasons += fmt::format("{}{} {}", reasons.empty() ? "" : ", ", count, reason);
@@ -164,6 +177,11 @@ std::string self_collision_text(const SphereRobot& robot) {
       "({:.1f} %) are called colliding\n",
       self.samples, self.colliding, self.missed, self.samples - self.colliding, self.falsely,
       100 * self.false_share());
+  if (excluded != nullptr)
+    out += fmt::format(
+        "    excluded pairs that overlap in some of them, which counts as no collision: {}, most "
+        "often {} and {}, in {}\n",
+        overlapping, excluded->a, excluded->b, excluded->colliding);
   std::sort(wrong.begin(), wrong.end(), [](const LinkPair* a, const LinkPair* b) {
     return std::pair(a->missed, a->falsely) > std::pair(b->missed, b->falsely);
   });

@@ -101,6 +101,9 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   out.input = options.input;
   out.robot = read_robot_for(options.robot, options.input);
   out.name = out.robot.name;
+  if (!options.srdf.empty())
+    for (const auto& pair : disabled_collisions(out.robot, options.srdf))
+      out.robot.excluded.push_back(pair);
   for (const auto& [name, count] : options.counts) require_link(out.robot, name);
   const PackagePaths paths = package_paths(options.input, options.robot);
   LinkMeshes meshes(options.input, options.closing.settings.mesh, options.robot.repaired);
@@ -290,6 +293,15 @@ void compare_links(SphereRobot& input, const SpheresOptions& options,
         "the gaps between some links (the report names the pairs and their gaps); use more spheres "
         "(--total, --count LINK=N)",
         options.input, 100 * input.self.false_share());
+  for (const LinkPair& pair : input.self.pairs)
+    if (input.self.is_mostly_colliding(pair))
+      spdlog::warn(
+          "{}: {} and {} overlap in {:.0f} % of the sampled poses, so few poses are free: their "
+          "shapes reach into each other; if the robot's parts do not, exclude the pair (--srdf "
+          "FILE, with <disable_collisions link1=\"{}\" link2=\"{}\"/>)",
+          options.input, pair.a, pair.b,
+          100.0 * static_cast<double>(pair.colliding) / static_cast<double>(input.self.samples),
+          pair.a, pair.b);
   const DefaultPose& pose = input.self.pose;
   if (pose.overlapping.empty()) return;
   std::string pairs;
@@ -465,7 +477,8 @@ void add_spheres(CLI::App& app) {
       ->expected(1)
       ->take_all();
   add_input(command, "--srdf", options->srdf,
-            "Robots: an SRDF, whose group_states are tried first as the default pose")
+            "Robots: an SRDF: its group_states are tried first as the default pose, and the pairs "
+            "of its disable_collisions are ignored")
       ->required(false)
       ->type_name("FILE");
   add_whole(command, "--seed", options->cover.seed,

@@ -200,6 +200,52 @@ TEST_F(RobotCommands, TheDefaultPoseIsAskedFor) {
   expect_error({"spheres", "cube.obj", "-o", "o.json", "--pose", "j2=1"}, 2, "is not a robot");
 }
 
+/// An arm that reaches into its base at most angles: that is told, until an SRDF excludes the pair.
+TEST_F(RobotCommands, PairsThatMostlyCollideAreToldOrExcluded) {
+  write(
+      "dip.urdf",
+      "<robot name='dip'><link name='base'><collision><geometry><box size='1 1 1'/></geometry>"
+      "</collision></link><link name='hub'><collision><geometry><box size='0.1 0.1 0.1'/>"
+      "</geometry></collision></link><link name='arm'><collision><origin xyz='0 0 0.6'/><geometry>"
+      "<box size='0.2 0.2 1'/></geometry></collision></link><joint name='f' type='fixed'><parent "
+      "link='base'/><child link='hub'/><origin xyz='0 0 0.55'/></joint><joint name='j' "
+      "type='revolute'><parent link='hub'/><child link='arm'/><axis xyz='0 1 0'/><limit "
+      "lower='1' upper='3' effort='1' velocity='1'/></joint></robot>");
+  write("dip.srdf",
+        "<robot name='dip'><disable_collisions link1='arm' link2='base' reason='Default'/>"
+        "<disable_collisions link1='arm' link2='none'/></robot>");
+  const std::vector<std::string> spheres = {"spheres", "dip.urdf", "-o", "d.json", "--count", "4"};
+  Outcome outcome = ist(spheres);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.err.find("base and arm overlap in"), std::string::npos) << outcome.err;
+  Json self = Json::parse(read("d.json"))["self_collision"];
+  ASSERT_EQ(self["mostly_colliding"].size(), 1u);
+  EXPECT_EQ(self["mostly_colliding"][0]["links"], Json::parse(R"(["base", "arm"])"));
+  EXPECT_EQ(self["mostly_colliding"][0]["colliding"], self["colliding"]);
+  EXPECT_GT(2 * self["colliding"].get<std::size_t>(), self["samples"].get<std::size_t>());
+
+  std::vector<std::string> excluded = spheres;
+  excluded.insert(excluded.end(), {"--srdf", "dip.srdf"});
+  outcome = ist(excluded);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.err.find("overlap in"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.out.find("counts as no collision: 1, most"), std::string::npos) << outcome.out;
+  const Json before = self;
+  self = Json::parse(read("d.json"))["self_collision"];
+  EXPECT_EQ(self["colliding"], 0);
+  EXPECT_TRUE(self["mostly_colliding"].empty());
+  std::size_t found = 0;
+  for (const Json& pair : self["ignored"])
+    if (pair["reason"] == "Excluded") {
+      ++found;
+      EXPECT_EQ(pair["links"], Json::parse(R"(["base", "arm"])"));
+      EXPECT_EQ(pair["colliding"], before["colliding"]);  // in the same poses
+    } else {
+      EXPECT_TRUE(pair["colliding"].is_null());
+    }
+  EXPECT_EQ(found, 1u);
+}
+
 /// Repair drops the sheet; the spheres contain it all the same.
 TEST_F(RobotCommands, WhatRepairDroppedIsCovered) {
   std::string cube = read("cube.obj");

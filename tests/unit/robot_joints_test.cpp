@@ -289,5 +289,14 @@ TEST(GroupStates, AreReadFromAnSrdf) {
   EXPECT_EQ(states[0].second, (Positions{0, 0.5}));
 }
 
+TEST(GroupStates, PairsThatAnSrdfDisables) {
+  const Turning robot = turning();
+  const TempFile file("r.srdf",
+                      "<robot name='r'><disable_collisions link1='c' link2='a' reason='Default'/>"
+                      "<disable_collisions link1='a' link2='none'/></robot>");
+  using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
+  EXPECT_EQ(disabled_collisions(robot.robot, file.path()), (Pairs{{2, 0}}));
+}
+
 }  // namespace
 }  // namespace ist::testing

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,5 +14,10 @@ namespace ist {
 /// stand as in default_positions(). Joints that the robot lacks are passed over. Throws Error.
 std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& robot,
                                                             const std::string& srdf);
+
+/// Pairs of links that an SRDF tells planners to ignore (`disable_collisions`); those with links
+/// that the robot lacks are passed over. Throws Error.
+std::vector<std::pair<std::size_t, std::size_t>> disabled_collisions(const RobotModel& robot,
+                                                                     const std::string& srdf);
 
 }  // namespace ist

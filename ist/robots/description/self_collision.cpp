@@ -289,12 +289,13 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
   std::vector<std::uint8_t> calls(half_), truths(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
     LinkPair& told = out.pairs[i];
-    if (pairs_[i].given != nullptr || told.ignored == "Always" || pairs_[i].free.empty()) return;
+    if (!told.is_counted() || pairs_[i].free.empty()) return;
     for (std::size_t k = 0; k < half_; ++k) {
       bool by_spheres = false, by_solids = false;
       look(pairs_[i], half_ + k, by_spheres, by_solids);
       by_spheres = by_spheres && told.ignored.empty();
       told.colliding += by_solids ? 1 : 0;
+      if (pairs_[i].given != nullptr) continue;  // Excluded: it counts as no collision
       told.missed += by_solids && !by_spheres ? 1 : 0;
       told.falsely += by_spheres && !by_solids ? 1 : 0;
       if (by_spheres) std::atomic_ref(calls[k]).store(1, std::memory_order_relaxed);

@@ -27,13 +27,16 @@ struct LinkPair {
   ///
   /// Adjacent: a joint connects them, or links without spheres alone stand between. Always: the
   /// solids overlapped in all positions tried. Never: in none, though the spheres did in 1 % or
-  /// more. Excluded: the robot's file says so.
+  /// more. Excluded: the robot's file or SRDF says so.
   std::string ignored;
   std::size_t tried = 0;  ///< positions of the joints between them that decided it; 0: none did
   // Among SelfCollision::samples other positions:
   std::size_t colliding = 0;  ///< the solids overlap
   std::size_t missed = 0;     ///< the solids overlap, and no compared spheres of this pair do
   std::size_t falsely = 0;    ///< compared spheres overlap, and the solids do not
+
+  /// Whether `colliding` was counted.
+  bool is_counted() const { return ignored != "Adjacent" && ignored != "Always"; }
 };
 
 /// A pose that a planner may begin with.
@@ -59,9 +62,14 @@ struct SelfCollision {
   DefaultPose pose;
   std::map<std::size_t, double> locked;  ///< joints of grippers: open, in the pose and the samples
   /// Positions of all joints, drawn within their limits after all was decided, and how many of them
-  /// are truly colliding (of pairs that are neither Adjacent nor Always), of these how many the
-  /// spheres call free, and how many free ones they call colliding.
+  /// are truly colliding (of pairs that are not Adjacent, Always or Excluded), of these how many
+  /// the spheres call free, and how many free ones they call colliding.
   std::size_t samples = 0, colliding = 0, missed = 0, falsely = 0;
+
+  /// Whether a compared pair's solids overlap in more than half of the samples.
+  bool is_mostly_colliding(const LinkPair& pair) const {
+    return pair.ignored.empty() && 2 * pair.colliding > samples;
+  }
 
   double false_share() const {
     return samples == colliding
