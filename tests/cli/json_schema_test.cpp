@@ -96,7 +96,7 @@ TEST_F(JsonSchema, Robots) {
         "<link name='c'><collision><geometry><mesh filename='cube.obj'/></geometry></collision>"
         "</link><joint name='j' type='fixed'><parent link='NAME'/><child link='b'/></joint>"
         "<joint name='NAME' type='prismatic'><parent link='b'/><child link='c'/>"
-        "<limit lower='1.2' upper='2'/></joint></robot>");
+        "<limit lower='0.5' upper='2'/></joint></robot>");
   Paths report, file, bake;
   add({"spheres", "r.urdf", "-o", "s.json", "--count", "8", "--json"}, report);
   const auto without_b = [](Paths& paths) {
