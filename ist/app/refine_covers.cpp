@@ -26,7 +26,8 @@ constexpr double kLess = 0.4;       ///< of a gap, where half of it was not enou
 constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
 constexpr int kBisections = 3;      ///< of the free distance in a direction
 constexpr int kRounds = 2;
-constexpr std::size_t kTold = 3;  ///< pairs that are named as obstacles
+constexpr std::size_t kFewest = 50;  ///< free poses, of fewer a share tells nothing
+constexpr std::size_t kTold = 3;     ///< pairs that are named as obstacles
 
 /// A position in which spheres of two links overlap falsely, and how far apart the links are there.
 struct Meeting {
@@ -202,6 +203,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
   std::pair best(robot.links, robot.self);
   std::set<Two> narrow;
   double share = kGivenUp;
+  is_open = is_open && robot.self.free >= kFewest;
   for (int round = 0; round < kRounds && is_open && best.second.false_share() > kEnough; ++round) {
     std::set<std::size_t> lost;
     std::size_t total = SIZE_MAX;
