@@ -417,8 +417,10 @@ test(
       await page.mouse.move(x, y);
       assert.equal(await page.evaluate(() => playground.view.holder.style.cursor), 'grab');
       await page.mouse.down();
+      // What shows for a moment is waited for before it can come.
+      const begins = page.locator('#pairs .begins').first().waitFor();
       for (let i = 1; i <= 12; ++i) await page.mouse.move(x + 2 * i, y - 3 * i);
-      await page.locator('#pairs .begins').first().waitFor();
+      await begins;
       assert.equal(await page.locator('#part').inputValue(), 'bolt 6');
       assert.ok(await page.locator('#hint').isHidden());
       const met = await tray(page);
@@ -435,11 +437,12 @@ test(
       await page.waitForFunction(
           () => [...document.querySelectorAll('#pairs tr')].every(({className}) => className.startsWith('stays')));
 
-      for (let i = 11; i >= 0; --i) await page.mouse.move(x + 2 * i, y - 3 * i);
-      await page.mouse.up();
-      await page.waitForFunction(
+      const ended = page.waitForFunction(
           () => [...document.querySelectorAll('#pairs .ended')].some(
               ({cells: [names]}) => names.textContent === 'gear 1, bolt 6'));
+      for (let i = 11; i >= 0; --i) await page.mouse.move(x + 2 * i, y - 3 * i);
+      await page.mouse.up();
+      await ended;
       await page.waitForFunction(() => document.querySelectorAll('#pairs .ended').length === 0);
       assert.deepEqual(await listed(page), before);
       assert.equal(await eye(), seen, 'the view stood still');
