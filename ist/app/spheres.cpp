@@ -101,9 +101,13 @@ SphereRobot read_robot_input(const SpheresOptions& options) {
   out.input = options.input;
   out.robot = read_robot_for(options.robot, options.input);
   out.name = out.robot.name;
-  if (!options.srdf.empty())
-    for (const auto& pair : disabled_collisions(out.robot, options.srdf))
-      out.robot.excluded.push_back(pair);
+  if (!options.srdf.empty()) {
+    const DisabledCollisions disabled = disabled_collisions(out.robot, options.srdf);
+    for (const auto& pair : disabled.pairs) out.robot.excluded.push_back(pair);
+    if (!disabled.lacking.empty())
+      spdlog::warn("{}: disable_collisions names links that {} lacks: {}; these pairs are left out",
+                   options.srdf, out.name, fmt::join(disabled.lacking, ", "));
+  }
   for (const auto& [name, count] : options.counts) require_link(out.robot, name);
   const PackagePaths paths = package_paths(options.input, options.robot);
   LinkMeshes meshes(options.input, options.closing.settings.mesh, options.robot.repaired);

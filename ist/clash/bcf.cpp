@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "clash/report.h"
-#include "library/text.h"
 #include "mesh/import/xml_document.h"
 
 namespace ist {
@@ -107,7 +106,7 @@ std::string clashes_bcf(const ClashReport& report, const std::string& date) {
                         "{:.6g}, at {}{}{}</Description></Topic><Viewpoints Guid=\"{}\">"
                         "<Viewpoint>viewpoint.bcfv</Viewpoint></Viewpoints></Markup>\n",
                         kXml, topic, xml_text(a), xml_text(b), date, c.volume, c.depth,
-                        short_vector(c.centroid), c.pose.empty() ? "" : ", pose ", xml_text(c.pose),
+                        place_text(c.centroid), c.pose.empty() ? "" : ", pose ", xml_text(c.pose),
                         view));
     // From where all of a cube around the overlap is seen.
     const double away = 8 * std::max(std::cbrt(c.volume_max), c.depth);

@@ -109,8 +109,7 @@ std::string clashes_csv(const ClashReport& report) {
   return out;
 }
 
-/// With five digits, and a tenth of a unit however far from the origin.
-static std::string place(const Eigen::Vector3d& x) {
+std::string place_text(const Eigen::Vector3d& x) {
   const double largest = std::max(1.0, x.cwiseAbs().maxCoeff());
   const int digits = std::max(5, 2 + static_cast<int>(std::log10(largest)));
   return fmt::format("({:.{}g}, {:.{}g}, {:.{}g})", x.x(), digits, x.y(), digits, x.z(), digits);
@@ -137,7 +136,7 @@ std::string clashes_text(const ClashReport& report) {
       out += fmt::format("area {:.6g}", c.contact_area);
     else
       out += fmt::format("distance {:.6g}", c.distance_max);
-    out += " at " + place(c.centroid);
+    out += " at " + place_text(c.centroid);
     if (c.duplicate) out += ", one part twice in one place";
     if (report.swept) out += ", pose " + c.pose;
     if (report.tolerance >= 0 && c.kind == ClashKind::overlapping)

@@ -40,6 +40,8 @@ struct ClashReport {
 nlohmann::ordered_json clashes_json(const ClashReport& report);  ///< docs/json.md
 std::string clashes_csv(const ClashReport& report);
 std::string clashes_text(const ClashReport& report);
+/// With five digits, and a tenth of a unit however far from the origin.
+std::string place_text(const Eigen::Vector3d& x);
 
 /// The clashes of a report of `ist clash --json`. Throws Error where the file is none.
 std::set<ClashReport::Names> read_clashes(const std::string& path);

@@ -210,7 +210,9 @@ class CollisionManager:
             moved, self._moved = self._moved, {}
             try:
                 found = self._scene.step(np.reshape(list(moved.values()), (-1, 7)), numbers=np.array(list(moved), int))
-            except ist.Error:  # more pairs than there is room for
+            except ist.Error:  # more pairs than there is room for, or, with room for all, something else
+                if self._pairs >= self._room:
+                    raise
                 self._scene, self._pairs = None, 8 * self._pairs
         numbers, at = np.unique(found.pairs, return_inverse=True)
         objects = [self._numbered[number] for number in numbers.tolist()]

@@ -229,6 +229,7 @@ TEST_F(RobotCommands, PairsThatMostlyCollideAreToldOrExcluded) {
   outcome = ist(excluded);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(outcome.err.find("overlap in"), std::string::npos) << outcome.err;
+  EXPECT_NE(outcome.err.find("names links that dip lacks: none"), std::string::npos) << outcome.err;
   EXPECT_NE(outcome.out.find("counts as no collision: 1, most"), std::string::npos) << outcome.out;
   const Json before = self;
   self = Json::parse(read("d.json"))["self_collision"];

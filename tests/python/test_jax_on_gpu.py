@@ -63,6 +63,22 @@ def test_values_and_gradients_are_those_of_the_cpu(gear, knot, cube, scenes, que
             assert np.abs(one - other).max() <= bound * np.abs(other).max()
 
 
+def test_aligned_poses_and_copies(gear, knot, cube):
+    solids = [cube, cube, gear]
+    random = np.random.default_rng(6)
+    poses = np.zeros((200, 3, 7))
+    poses[..., 0] = 1
+    turned = random.integers(0, 4, (200, 3))  # not, or by 90 degrees about an axis
+    for axis in (1, 2, 3):
+        poses[turned == axis, 0] = poses[turned == axis, axis] = np.sqrt(0.5)
+    poses[..., 4:] = 0.5 * random.integers(-2, 3, (200, 3, 3))
+    ours, theirs = (gradients(overlap, of, poses, None, device, **EXACT)
+                    for of, device in ((ist.Solids(solids, device="cuda"), "gpu"), (solids, "cpu")))
+    assert 0.2 < (theirs[0] > 0).mean() < 0.9
+    for one, other in zip(ours, theirs):
+        assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
+
+
 def test_every_transformation_gives_the_same(gear, knot, cube, scenes):
     there = ist.Solids([gear, knot, cube], device="cuda")
     scenes = jnp.asarray(scenes)

@@ -113,6 +113,24 @@ def test_few_of_many_are_looked_at(monkeypatch):
     assert m.min_distance_other(n, return_names=True) == (2, (500, "far"))
 
 
+def test_what_a_scene_refuses_is_raised(monkeypatch):
+    class Broken:
+        def __init__(self, **settings):
+            pass
+
+        def __getattr__(self, name):
+            return lambda *arguments, **settings: 0
+
+        def step(self, *arguments, **settings):
+            raise ist.Error("no step")
+
+    monkeypatch.setattr(ist, "Scene", Broken)
+    m = CollisionManager()
+    m.add_object("a", Box(), at(0))
+    with pytest.raises(ist.Error, match="no step"):
+        m.in_collision_internal()
+
+
 def test_scenes_scale_and_mirror():
     trimesh = pytest.importorskip("trimesh")
     from ist.trimesh import scene_to_collision

@@ -295,7 +295,9 @@ TEST(GroupStates, PairsThatAnSrdfDisables) {
                       "<robot name='r'><disable_collisions link1='c' link2='a' reason='Default'/>"
                       "<disable_collisions link1='a' link2='none'/></robot>");
   using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
-  EXPECT_EQ(disabled_collisions(robot.robot, file.path()), (Pairs{{2, 0}}));
+  const DisabledCollisions disabled = disabled_collisions(robot.robot, file.path());
+  EXPECT_EQ(disabled.pairs, (Pairs{{2, 0}}));
+  EXPECT_EQ(disabled.lacking, std::set<std::string>{"none"});
 }
 
 }  // namespace

@@ -42,20 +42,20 @@ std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& ro
   return states;
 }
 
-std::vector<std::pair<std::size_t, std::size_t>> disabled_collisions(const RobotModel& robot,
-                                                                     const std::string& srdf) {
-  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+DisabledCollisions disabled_collisions(const RobotModel& robot, const std::string& srdf) {
+  DisabledCollisions out;
   for_each_element(srdf, "disable_collisions", [&](const XmlDocument& xml, std::uint32_t e) {
     const auto link = [&](const char* which) {
       const auto at =
           std::find_if(robot.links.begin(), robot.links.end(),
                        [&](const RobotLink& one) { return one.name == xml.attribute(e, which); });
+      if (at == robot.links.end()) out.lacking.emplace(xml.attribute(e, which));
       return static_cast<std::size_t>(at - robot.links.begin());
     };
     const std::size_t a = link("link1"), b = link("link2");
-    if (std::max(a, b) < robot.links.size()) pairs.emplace_back(a, b);
+    if (std::max(a, b) < robot.links.size()) out.pairs.emplace_back(a, b);
   });
-  return pairs;
+  return out;
 }
 
 }  // namespace ist

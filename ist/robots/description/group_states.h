@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,9 +16,12 @@ namespace ist {
 std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& robot,
                                                             const std::string& srdf);
 
-/// Pairs of links that an SRDF tells planners to ignore (`disable_collisions`); those with links
-/// that the robot lacks are passed over. Throws Error.
-std::vector<std::pair<std::size_t, std::size_t>> disabled_collisions(const RobotModel& robot,
-                                                                     const std::string& srdf);
+/// What an SRDF tells planners to ignore (`disable_collisions`).
+struct DisabledCollisions {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;  ///< of links, by index
+  std::set<std::string> lacking;  ///< links that it names and the robot lacks
+};
+/// Throws Error.
+DisabledCollisions disabled_collisions(const RobotModel& robot, const std::string& srdf);
 
 }  // namespace ist
