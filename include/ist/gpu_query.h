@@ -49,9 +49,9 @@ class GpuSolids {
 /// Working memory of a batch on the device. One batch at a time may use it.
 class GpuWorkspace {
  public:
-  /// For batches of up to `most_pairs`. Takes 100 MB, up to 410 MB on a large card for the exact
-  /// measure if `most_pairs` is 32,768 or more, plus 12 bytes per pair, or 40 bytes up to
-  /// kFewGpuPairs.
+  /// For batches of up to `most_pairs`. Takes 100 MB, and for the exact measure more: 130 MB for
+  /// 1,000 pairs, up to 480 MB on a large card for 8,192 or more. With it 12 bytes per pair, or 40
+  /// bytes up to kFewGpuPairs.
   ///
   /// Up to kFewGpuPairs pairs are partitioned more finely: a small batch ends sooner, at the cost
   /// of throughput. Answers of the two kinds differ by rounding.
