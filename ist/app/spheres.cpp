@@ -267,7 +267,7 @@ WantedPose wanted_pose(const RobotModel& robot, const SpheresOptions& options) {
   return wanted;
 }
 
-void compare_links(SphereRobot& input, const SpheresOptions& options,
+void compare_links(SphereRobot& input, const WantedPose& wanted, const SpheresOptions& options,
                    const ProgressCallback& progress) {
   LinkSolids solids;
   std::vector<std::string> names;
@@ -286,7 +286,7 @@ void compare_links(SphereRobot& input, const SpheresOptions& options,
       [&](std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) {
         return solids.overlap(a, b, b_in_a);
       },
-      wanted_pose(input.robot, options));
+      wanted);
   input.self =
       study.of(input.covers(), options.kind == Kind::cover || options.kind == Kind::capsules);
   if (options.kind == Kind::cover)
@@ -324,7 +324,7 @@ void compare_links(SphereRobot& input, const SpheresOptions& options,
         options.input, pairs);
 }
 
-void fill_links(SphereRobot& input, const SpheresOptions& options) {
+void fill_links(SphereRobot& input, const WantedPose& wanted, const SpheresOptions& options) {
   constexpr double kPatience = 0.5;  // [s]
   std::vector<std::vector<CoverCapsule>> capsules;
   std::vector<SphereCover> covers =
@@ -361,7 +361,7 @@ void fill_links(SphereRobot& input, const SpheresOptions& options) {
   }
   if (input.is_robot())
     interruptibly(kPatience, options.quiet, false, [&](const ProgressCallback& progress) {
-      compare_links(input, options, progress);
+      compare_links(input, wanted, options, progress);
       return 0;
     });
 }
@@ -381,7 +381,7 @@ void run_spheres(const SpheresOptions& options) {
       !input.robot.is_urdf && (ending == ".urdf" || ending == ".yml" || ending == ".yaml"))
     throw Error(options.output + ": this format needs the robot as a URDF; " + options.input +
                 " can become .json, .xrdf, .srdf or .glb");
-  fill_links(input, options);
+  fill_links(input, wanted_pose(input.robot, options), options);
   const std::string text = writer(input);
   {
     const InterruptGuard guard;
