@@ -156,7 +156,7 @@ class MeshGapSearch {
   IST_HD static Real coarse(Real x) {
     if constexpr (sizeof(Real) == 4) return float_of(bits_of(x) & 0xfffff000u);
     return static_cast<Real>(
-        float_of(bits_of(static_cast<float>(x < 1e37 ? x : 1e37)) & 0xfffff000u));
+        float_of(bits_of(static_cast<float>(x < 1e37 ? (x > 0 ? x : 0) : 1e37)) & 0xfffff000u));
   }
 
   /// Child `lane` of the opened node of a pair that waits; whether it may be near enough.
@@ -189,7 +189,10 @@ class MeshGapSearch {
     const Real gap = unit * (Real(1 - 2 * kGapRounding<Real>) * squared);
     const Real before = m_.stack_squared[pair];
     child.squared = gap > before ? gap : before;
-    child.key = gap > 0 ? coarse(child.squared) : apart;
+    // Of solids that are far apart for their size all is as far but for the last digits.
+    child.key = gap <= 0            ? apart
+                : sizeof(Real) == 4 ? coarse(child.squared)
+                                    : coarse(Real(1 - kGapsAlike) * child.squared - before);
     const MeshNode below = MeshNode::at(node.level() - 1, kWidth * node.number() + lane);
     const MeshNode next_a = of_a ? below : a, next_b = of_a ? b : below;
     Real longest = 0;
@@ -216,13 +219,31 @@ class MeshGapSearch {
                 columns = in_global_memory(m_.mesh[1].blocks)[b].triangles;
       for (int first = 0; first < rows * columns && !done(); first += Team::kWidth) {
         const int k = first + team_.lane();
-        const bool is = k < rows * columns;
-        const auto i = static_cast<std::uint32_t>(is ? k / columns : 0),
-                   j = static_cast<std::uint32_t>(is ? k % columns : 0);
+        const auto i = static_cast<std::uint32_t>(k < rows * columns ? k / columns : 0),
+                   j = static_cast<std::uint32_t>(k < rows * columns ? k % columns : 0);
+        const bool is = k < rows * columns && may_be_near(kWidth * a + i, kWidth * b + j);
         queued_ = append(team_, m_, queued_, is, kWidth * a + i, kWidth * b + j, 0);
         measure_but(kBatch - 1);
       }
     }
+  }
+
+  /// Whether triangles may be within the limit, by where they reach along the axes.
+  IST_HD bool may_be_near(std::uint32_t of_a, std::uint32_t of_b) const {
+    double squared = 0;
+    for (const exact::Point& way : m_.axes[0].way) {
+      double low[2], high[2];
+      for (int side = 0; side < 2; ++side) {
+        const std::uint32_t name = side == 0 ? of_a : of_b;
+        const double p = dot(way, m_.corner(side, name, 0)), q = dot(way, m_.corner(side, name, 1)),
+                     r = dot(way, m_.corner(side, name, 2));
+        low[side] = std::fmin(p, std::fmin(q, r));
+        high[side] = std::fmax(p, std::fmax(q, r));
+      }
+      const double gap = std::fmax(0.0, std::fmax(low[1] - high[0], low[0] - high[1]));
+      squared += gap * gap;
+    }
+    return squared <= static_cast<double>(m_.squared_limit);
   }
 
   /// Until no more than so many are in the queue, or the answer is there.

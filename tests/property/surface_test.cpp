@@ -325,7 +325,9 @@ TEST(Surface, SeparationMatchesAllPairsOfTriangles) {
       const Body &of_a = solids[s], &of_b = solids[(s + 2) % solids.size()];
       const PlacedAsset a{of_a.asset.view(), testing::random_pose(random, 0.3), 1};
       const PlacedAsset b{of_b.asset.view(), testing::random_pose(random, 0.24 * i),
-                          i % 3 == 0 ? 0.05 : 0.7};
+                          i % 3 != 0 ? 0.7
+                          : i == 3   ? 1e-5
+                                     : 0.05};
       const auto triangles_a = of_a.triangles(a), triangles_b = of_b.triangles(b);
       exact::NearestPair least;
       for (const exact::FlatTriangle& x : triangles_a)

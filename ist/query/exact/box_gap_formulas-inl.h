@@ -23,7 +23,8 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   using T = typename Of::T;
   using V = typename Of::V;
   const auto set = [](S x) { return Of::set(static_cast<T>(x)); };
-  constexpr S kLength = S(1 - 1e-5);  // of normals, or more
+  constexpr S kLength = S(1 - 1e-5);  // of normals, in floats, or more
+  constexpr S kLengthOfWay = sizeof(T) == sizeof(float) ? kLength : S(1 - 1e-14);
   const V zero = set(0), half_one = set(S(0.5));
   V away[3], half[3];
   V along = zero, across = zero, largest = set(S(-1e30));
@@ -48,7 +49,8 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
                                   (times(look.abs_way[1 + j], half) + set(one.beside_way[j])));
   }
   const V ahead = times(look.lane_way[0], away) + times(look.abs_way[0], half);
-  const V box_ahead = Of::greater(zero, set(kLength * one.nearest) - set(kLength) * ahead);
+  const V box_ahead =
+      Of::greater(zero, set(kLengthOfWay * one.nearest) - set(kLengthOfWay) * ahead);
   const V by_boxes = Of::greater(along, box_ahead * box_ahead + beside);
   if (Of::all(by_boxes > beyond)) return false;
   for (int k = 0; k < 3; ++k) {
@@ -84,7 +86,8 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
                   ((to_box + Of::lesser(of_low, of_high)) - other_at_box) - set(one.high));
   const V slab = Of::greater(zero, Of::greater(gap, other_gap) - set(3 * look.blur));
   of_slab = of_slab + Of::greater(steep * slab_low, steep * slab_high);
-  const V ahead_gap = squared_gap(set(kLength) * (set(one.nearest) - Of::lesser(ahead, of_slab))),
+  const V ahead_gap =
+              squared_gap(set(kLengthOfWay) * (set(one.nearest) - Of::lesser(ahead, of_slab))),
           slab_gap = set(kLength) * slab;
   apart = largest;
   squared =

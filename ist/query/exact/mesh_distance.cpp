@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "query/exact/mesh_distance.cpp"
@@ -27,6 +28,8 @@ class MeshGapSearch {
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
   static constexpr std::uint32_t kFew = 4;
+  /// So much larger is a block whose triangles are asked how far nodes are.
+  static constexpr double kMuchLarger = 3;
 
  public:
   MeshGapSearch(const GapQuestion& asked, Budget& budget, ExactScratch& scratch)
@@ -95,6 +98,7 @@ class MeshGapSearch {
   /// `toward`: unit, or zero: then solids are seen along the axes of A.
   void look_along(const exact::Point& toward) {
     toward_ = level_ = toward;
+    faces_.reset();
     const bool known = dot(toward, toward) > 0;
     axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
@@ -229,17 +233,73 @@ class MeshGapSearch {
                                  limit, squared, apart);
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
+    const BlockFaces* const beside = left != 0 ? triangles_beside(pair, open_a) : nullptr;
     for (; left != 0; left &= left - 1) {
       const auto l = static_cast<std::uint32_t>(std::countr_zero(left));
-      const double gap = unit * double{squared[l]};
+      double gap = unit * double{squared[l]};
+      if (gap > squared_limit_) continue;
+      if (beside != nullptr)
+        gap = std::max(
+            gap, beside->squared_gap(placed_box(open_a, level - 1, kWidth * number + l), slack_));
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
-      child.order = gap > 0 ? coarse(child.squared) : static_cast<float>(apart[l]);
+      // Of solids that are far apart for their size all is as far but for the last digits.
+      child.order = gap <= 0 ? static_cast<float>(apart[l])
+                    : single_
+                        ? coarse(child.squared)
+                        : coarse(std::max(0.0, (1 - kGapsAlike) * child.squared - pair.squared));
       (open_a ? child.a : child.b) = kWidth * number + l;
       --(open_a ? child.level_a : child.level_b);
       push(child, first);
     }
+  }
+
+  /// The triangles of the other's block, where that is much larger than what is opened: they say
+  /// more than their box.
+  const BlockFaces* triangles_beside(const GapPair& pair, bool open_a) {
+    if ((open_a ? pair.level_b : pair.level_a) != 0) return nullptr;
+    const double of_a = size_of(a_, pair.level_a, pair.a),
+                 of_b = scale_ * size_of(b_, pair.level_b, pair.b);
+    if ((open_a ? of_b : of_a) < kMuchLarger * (open_a ? of_a : of_b)) return nullptr;
+    const std::uint32_t number = open_a ? pair.b : pair.a;
+    if (!faces_ || faces_of_ != number || faces_of_b_ != open_a) {
+      faces_.emplace(vertices(open_a, number), (open_a ? b_ : a_).blocks[number], axes_);
+      faces_of_ = number;
+      faces_of_b_ = open_a;
+    }
+    return &*faces_;
+  }
+  /// Of two blocks: where one is much larger, its nearest triangle tells the way to the other.
+  WayAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
+    const GapPair blocks{0, 0, number_a, number_b, 0, 0};
+    for (const bool of_a : {false, true}) {
+      const BlockFaces* const larger = triangles_beside(blocks, of_a);
+      if (larger == nullptr) continue;
+      const exact::Point way =
+          larger->way_to(placed_box(of_a, 0, of_a ? number_a : number_b).middle);
+      if (const double length = std::sqrt(dot(way, way)); length > 0)
+        return axes_along((1 / length) * way);
+    }
+    return axes_;
+  }
+  /// A node's box, in A's frame and along the axes.
+  PlacedBox placed_box(bool of_a, int level, std::uint32_t number) const {
+    const MiddleBox<double> box = box_of<double>(of_a ? a_ : b_, level, number);
+    const double(&m)[9] = asked_.a_from_b.m;
+    PlacedBox out;
+    out.middle = {box.middle[0], box.middle[1], box.middle[2]};
+    if (!of_a) out.middle = map_point(asked_.a_from_b, out.middle);
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 3; ++i) out.side[k][i] = box.half[k] * (of_a ? i == k : m[3 * i + k]);
+    for (std::size_t j = 0; j < 3; ++j) {
+      const exact::Point& way = axes_.way[j];
+      double reach = 0;
+      for (const exact::Point& side : out.side) reach += std::abs(dot(way, side));
+      out.low[j] = dot(way, out.middle) - reach;
+      out.high[j] = dot(way, out.middle) + reach;
+    }
+    return out;
   }
 
   const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
@@ -262,14 +322,18 @@ class MeshGapSearch {
         add(kWidth * number_a + i, of_a,
             kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)), of_b);
     };
+    const WayAxes axes = axes_between(number_a, number_b);
     if (!single_) {
-      for (std::uint32_t left = all_a; left != 0; left &= left - 1)
-        take(static_cast<std::uint32_t>(std::countr_zero(left)), all_b);
-      return 0;
+      const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
+      for (std::uint32_t left = a.near(b, squared_limit_) & all_a; left != 0; left &= left - 1) {
+        const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
+        take(i, b.near(a, i, squared_limit_) & all_b);
+      }
+      return known;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
-    TriangleCulls culls(a, b, axes_, static_cast<float>(blur_));
+    TriangleCulls culls(a, b, axes, static_cast<float>(blur_));
     float least = HUGE_VALF;
     for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
       const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
@@ -418,6 +482,9 @@ class MeshGapSearch {
   NearestTriangles best_;
   exact::Point toward_, level_ = {0, 0, 0};
   WayAxes axes_;
+  std::optional<BlockFaces> faces_;  ///< of a block, along the axes
+  std::uint32_t faces_of_ = 0;
+  bool faces_of_b_ = false;
   KeptPairs* keep_ = nullptr;
   MeshGap out_;
 };

@@ -206,6 +206,145 @@ class TriangleCulls {
   bool has_sides_ = false;
 };
 
+/// A box, and where it reaches along three axes.
+struct PlacedBox {
+  double low[3], high[3];
+  exact::Point middle, side[3];  ///< half of each side, from the middle
+};
+
+/// How far the triangles of a block reach along three axes, in double.
+class BlockExtents {
+ public:
+  BlockExtents(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      double along[kWidth];
+      for (std::size_t v = 0; v < kWidth; ++v)
+        along[v] = (axes.way[k].x * vertices.at[0][v] + axes.way[k].y * vertices.at[1][v]) +
+                   axes.way[k].z * vertices.at[2][v];
+      for (std::size_t t = 0; t < kWidth; ++t) {
+        const double p = along[block.corner[0][t]], q = along[block.corner[1][t]],
+                     r = along[block.corner[2][t]];
+        low_[k][t] = std::min({p, q, r});
+        high_[k][t] = std::max({p, q, r});
+      }
+    }
+  }
+
+  /// Those no further from triangle `t` of another, or from all of it, than a limit, squared.
+  std::uint32_t near(const BlockExtents& other, std::uint32_t t, double squared_limit) const {
+    double low[3], high[3];
+    for (int k = 0; k < 3; ++k) low[k] = other.low_[k][t], high[k] = other.high_[k][t];
+    return near(low, high, squared_limit);
+  }
+  std::uint32_t near(const BlockExtents& other, double squared_limit) const {
+    double low[3], high[3];
+    for (int k = 0; k < 3; ++k) {
+      low[k] = *std::min_element(other.low_[k], other.low_[k] + kWidth);
+      high[k] = *std::max_element(other.high_[k], other.high_[k] + kWidth);
+    }
+    return near(low, high, squared_limit);
+  }
+
+ protected:
+  HWY_INLINE V squared_gap(const double (&low)[3], const double (&high)[3],
+                           std::size_t from) const {
+    const D d;
+    V squared = hn::Zero(d);
+    for (int k = 0; k < 3; ++k) {
+      const V gap = hn::Max(hn::Max(hn::Zero(d), hn::Load(d, low_[k] + from) - hn::Set(d, high[k])),
+                            hn::Set(d, low[k]) - hn::Load(d, high_[k] + from));
+      squared = squared + gap * gap;
+    }
+    return squared;
+  }
+
+ private:
+  std::uint32_t near(const double (&low)[3], const double (&high)[3], double squared_limit) const {
+    const D d;
+    std::uint32_t bits = 0;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
+      bits |= mask_bits(d, squared_gap(low, high, l) <= hn::Set(d, squared_limit)) << l;
+    return bits;
+  }
+
+  alignas(64) double low_[3][kWidth], high_[3][kWidth];
+};
+
+/// The triangles of a block that is much larger than what they are measured from.
+class BlockFaces : public BlockExtents {
+ public:
+  BlockFaces(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes)
+      : BlockExtents(vertices, block, axes) {
+    const D d;
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      Flat& t = faces_[l / hn::Lanes(d)];
+      for (int c = 0; c < 3; ++c) {
+        alignas(64) double at[3][kWidth];
+        for (std::size_t i = 0; i < hn::Lanes(d); ++i)
+          for (int k = 0; k < 3; ++k) at[k][i] = vertices.at[k][block.corner[c][l + i]];
+        t.corner[c] = {hn::Load(d, at[0]), hn::Load(d, at[1]), hn::Load(d, at[2])};
+      }
+      flatten(t);
+    }
+  }
+
+  /// The nearest triangle's distance from a box, or less; squared. `slack`: of distances.
+  double squared_gap(const PlacedBox& box, double slack) const {
+    const D d;
+    const V zero = hn::Zero(d), off = hn::Set(d, slack), tiny = hn::Set(d, 1e-300);
+    V least = hn::Set(d, HUGE_VAL);
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      // A triangle lies behind the plane through its point that is nearest to the middle.
+      const NearestPoints nearest = nearest_to(box.middle, l);
+      const V distance = hn::Sqrt(nearest.squared);
+      V reach = zero;
+      for (const exact::Point& side : box.side)
+        reach = reach + hn::Abs(dot(nearest.between, in_lanes(side)));
+      const V gap = hn::Max(zero, (distance - reach / hn::Max(distance, tiny)) - off);
+      least = hn::Min(least, hn::Max(gap * gap, BlockExtents::squared_gap(box.low, box.high, l)));
+    }
+    return hn::GetLane(hn::MinOfLanes(d, least));
+  }
+
+  /// From the nearest triangle to a point, of any length.
+  exact::Point way_to(const exact::Point& point) const {
+    const D d;
+    alignas(64) double squared[kWidth], way[3][kWidth];
+    for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+      const NearestPoints nearest = nearest_to(point, l);
+      hn::Store(nearest.squared, d, squared + l);
+      hn::Store(nearest.between.x, d, way[0] + l);
+      hn::Store(nearest.between.y, d, way[1] + l);
+      hn::Store(nearest.between.z, d, way[2] + l);
+    }
+    const auto least = std::min_element(squared, squared + kWidth) - squared;
+    return {way[0][least], way[1][least], way[2][least]};
+  }
+
+ private:
+  static HWY_INLINE Vec3 in_lanes(const exact::Point& x) {
+    const D d;
+    return {hn::Set(d, x.x), hn::Set(d, x.y), hn::Set(d, x.z)};
+  }
+  HWY_INLINE NearestPoints nearest_to(const exact::Point& to, std::size_t from_lane) const {
+    const D d;
+    const Flat& t = faces_[from_lane / hn::Lanes(d)];
+    const Vec3 point = in_lanes(to);
+    NearestPoints nearest{hn::Set(d, HUGE_VAL), point, point};
+    over_face<false>(point, t, nearest);
+    for (int e = 0; e < 3; ++e) {
+      const Vec3 from = point - t.corner[e];
+      const Vec3 on_edge = part_of_edge(dot(from, t.side[e]) * t.inverse[e]) * t.side[e];
+      const Vec3 between = from - on_edge;
+      const V squared = dot(between, between);
+      take_nearer(nearest, squared, squared <= squared, point - between, between);
+    }
+    return nearest;
+  }
+
+  Flat faces_[kWidth / hn::MaxLanes(D())];
+};
+
 /// The nearest points of eight pairs of triangles that do not cross.
 struct alignas(64) PairGaps {
   double squared[8];

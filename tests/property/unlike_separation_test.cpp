@@ -1,0 +1,59 @@
+// Distances of solids of unlike sizes, or far apart for their size: none is dear.
+
+#include <gtest/gtest.h>
+#include <ist/query.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "support/random_assets.h"
+#include "support/surface_queries.h"
+#include "support/test_meshes.h"
+
+namespace ist {
+namespace {
+
+/// A screw beside a hull, a part beside a hall, two at opposite ends of a yard: no query takes
+/// more than five times the work of the dearest of solids of one size, side by side.
+TEST(UnlikeSeparation, IsNoDearer) {
+  const std::vector<Asset> solids = [] {
+    std::vector<Asset> made;
+    made.push_back(testing::surface(testing::icosphere_mesh(4)));
+    made.push_back(testing::surface(testing::torus_mesh(0.7, 0.3, 80, 40)));
+    made.push_back(testing::surface(testing::box_mesh({-1, -0.7, -0.01}, {1, 0.7, 0.01})));
+    return made;
+  }();
+  std::mt19937_64 random(7);
+  Workspace workspace;
+  const auto dearest = [&](double scale, double far) {
+    std::uint32_t most = 0;
+    for (const Asset& a : solids)
+      for (const Asset& b : solids)
+        for (int i = 0; i < 6; ++i) {
+          Pose pose_a, pose_b;
+          if (i % 2 == 0) {
+            pose_a = testing::random_pose(random, 0);
+            pose_b = testing::random_pose(random, 0);
+          }
+          const testing::Vector3d way =
+              i % 3 == 0 ? testing::Vector3d::UnitZ() : testing::random_direction(random);
+          for (int k = 0; k < 3; ++k) pose_b.t[k] = far * (1 + scale) * way[k];
+          const PlacedAsset placed_a{a.view(), pose_a, 1}, placed_b{b.view(), pose_b, scale};
+          for (const bool swapped : {false, true}) {
+            const Separation found = swapped ? separation(placed_b, placed_a, {}, workspace)
+                                             : separation(placed_a, placed_b, {}, workspace);
+            EXPECT_EQ(found.status, QueryStatus::ok);
+            most = std::max(most, found.node_visits + found.sphere_pairs / 8);
+          }
+        }
+    return most;
+  };
+  const std::uint32_t alike = std::max(dearest(1, 1.2), dearest(1, 2.5));
+  for (const double scale : {1.0, 0.1, 1e-2, 1e-3, 1e-5, 1e-8})
+    for (const double far : {1.1, 2.5, 1e2, 1e4, 1e7})
+      EXPECT_LT(dearest(scale, far), 5 * alike) << scale << ' ' << far;
+}
+
+}  // namespace
+}  // namespace ist
