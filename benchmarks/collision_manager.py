@@ -93,7 +93,8 @@ def main():
         "Distances of what overlaps: FCL tells that of the first pair that it finds, here it is the deepest of all. "
         "Contacts have volumes here, one for each connected part of an overlap; FCL's are of triangles."]
     out.write_text(json.dumps({
-        "benchmark": "collision_manager", "page": "trimesh's CollisionManager", "made_by": "benchmarks/collision_manager.py",
+        "benchmark": "collision_manager", "page": "trimesh's CollisionManager",
+        "made_by": "benchmarks/collision_manager.py",
         "commit": os.environ.get("IST_COMMIT", "–"), "date": datetime.date.today().isoformat(),
         "cpu": next((line.split(": ")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")),
                     platform.machine()),
