@@ -8,6 +8,7 @@ whether it only touches.
 """
 
 import hashlib
+import operator
 
 import numpy as np
 
@@ -15,7 +16,7 @@ import ist
 
 __all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collision"]
 
-_ASIDE = 1e-9  # of an object's size
+_ASIDE, _WAY = 1e-9, np.array([0.36, 0.48, 0.8])  # of an object's size, and where to
 _FIRST = 16  # distances that are asked first: the best of them bounds the others
 
 
@@ -74,23 +75,19 @@ class _Object:
 
     def __init__(self, name, mesh, asset, transform):
         self.name, self.mesh, self.asset = name, mesh, asset
+        self.box = np.array([asset.bounds().lower, asset.bounds().upper])
+        self.size = (self.box[1] - self.box[0]).max()
         self.set_transform(transform)
 
     def set_transform(self, transform):
-        transform = np.eye(4) if transform is None else np.asanyarray(transform, dtype=np.float64)
+        transform = np.eye(4) if transform is None else np.array(transform, dtype=np.float64)
         if transform.shape != (4, 4):
             raise ValueError("transform must be (4,4)!")
         if not np.isfinite(transform).all():
             raise ValueError(f"transform of {self.name}: must be finite")
-        self.pose = ist.poses(transform)
+        if not _is_rigid(*transform.tolist()):
+            ist.poses(transform)  # says why
         self.transform = transform
-        box = self.asset.bounds()
-        middle, half = (box.upper + box.lower) / 2, (box.upper - box.lower) / 2
-        middle = transform[:3, :3] @ middle + transform[:3, 3]
-        half = np.abs(transform[:3, :3]) @ half
-        # (more than what placing a solid rounds)
-        half = half + 1e-12 * (np.abs(middle).max() + half.max())
-        self.low, self.high = middle - half, middle + half
 
     def face(self, point):
         import trimesh
@@ -100,6 +97,38 @@ class _Object:
         triangles = np.asarray(self.mesh.triangles)
         near = trimesh.triangles.closest_point(triangles, np.broadcast_to(local, (len(triangles), 3)))
         return int(((near - local)**2).sum(axis=1).argmin())
+
+
+def _is_rigid(x, y, z, last):
+    """As ist.poses has it, of a matrix's rows."""
+    columns = list(zip(x[:3], y[:3], z[:3]))
+    off = max(abs(sum(map(operator.mul, u, v)) - (u is v)) for u in columns for v in columns)
+    (a, b, c), (d, e, f), (g, h, i) = columns
+    return off < 1e-6 and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0 and last == [0, 0, 0, 1]
+
+
+class _Bodies:
+    """Objects as queries take them, a row each."""
+
+    def __init__(self, objects):
+        self.objects = list(objects)
+        self.solids = ist.Solids([one.asset for one in self.objects])
+        self.sizes = np.array([one.size for one in self.objects])
+        self.poses, self.low, self.high = (np.empty((len(self.objects), width)) for width in (7, 3, 3))
+        self.move(np.arange(len(self.objects)))
+
+    def move(self, rows):
+        """To where the objects are now."""
+        if len(rows) == 0:
+            return
+        at = np.array([self.objects[row].transform for row in rows])
+        box = np.array([self.objects[row].box for row in rows])
+        self.poses[rows] = ist.poses(at)
+        middle = np.einsum("nij,nj->ni", at[:, :3, :3], box.mean(axis=1)) + at[:, :3, 3]
+        half = np.einsum("nij,nj->ni", np.abs(at[:, :3, :3]), (box[:, 1] - box[:, 0]) / 2)
+        # (more than what placing a solid rounds)
+        half += 1e-12 * (np.abs(middle).max(axis=1) + half.max(axis=1))[:, None]
+        self.low[rows], self.high[rows] = middle - half, middle + half
 
 
 class CollisionManager:
@@ -113,7 +142,9 @@ class CollisionManager:
         self._objs = {}
         self._assets = {}
         self._scene, self._room, self._pairs = None, 0, 16  # made where it is needed, for so many
-        self._numbered, self._moved = {}, {}  # objects by number, and those that the scene has elsewhere
+        self._moved = set()  # numbers of objects that the scene has elsewhere
+        self._bodies = self._row = None  # rows of all objects, and those of the scene's numbers
+        self._found = None  # the pairs of a margin, until something moves
         self._size = np.inf  # of the smallest object
 
     def add_object(self, name, mesh, transform=None):
@@ -125,9 +156,10 @@ class CollisionManager:
         if name in self._objs:
             self.remove_object(name)
         self._objs[name] = added
-        self._size = min(self._size, (added.high - added.low).max())
+        self._bodies = self._row = self._found = None
+        self._size = min(self._size, added.size)
         if self._scene is not None and len(self._objs) <= self._room:
-            self._place(added)
+            added.number = self._scene.add(added.asset, ist.poses(added.transform))
         else:
             self._scene = None
         return added.asset
@@ -136,19 +168,20 @@ class CollisionManager:
         gone = self._of(name)
         if self._scene is not None:
             self._scene.remove(gone.number)
-            del self._numbered[gone.number]
-            self._moved.pop(gone.number, None)
+            self._moved.discard(gone.number)
+        self._bodies = self._row = self._found = None
         del self._objs[name]
 
     def set_transform(self, name, transform):
         moved = self._of(name)
         moved.set_transform(transform)
+        self._found = None
         if self._scene is not None:
-            self._moved[moved.number] = moved.pose
+            self._moved.add(moved.number)
 
     def in_collision_single(self, mesh, transform=None, return_names=False, return_data=False):
         """Whether a mesh collides with any object; the set of their names; a list of ContactData."""
-        pairs = self._near(self._object("__external", mesh, transform))
+        pairs = self._near([self._object("__external", mesh, transform)])
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, {a for a, _ in names}, data, return_names, return_data)
 
@@ -159,15 +192,15 @@ class CollisionManager:
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = self._near_any(other_manager._objs.values())
+        pairs = self._near(other_manager._objs.values())
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
         """The least distance of a mesh from any object [u], negative inside; inf without objects."""
         single = self._object("__external", mesh, transform)
-        distance, names, data = _nearest(lambda margin: self._near(single, margin), len(self._objs),
-                                         (single.high - single.low).max(), return_data)
+        distance, names, data = _nearest(lambda margin: self._near([single], margin), len(self._objs),
+                                         single.size, return_data)
         return _told(distance, names and names[0], data, return_name, return_data)
 
     def min_distance_internal(self, name=None, return_names=False, return_data=False):
@@ -177,59 +210,61 @@ class CollisionManager:
             distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size, return_data)
         else:
             one = self._of(name)
-            distance, names, data = _nearest(lambda margin: self._near(one, margin), count - 1,
-                                             (one.high - one.low).max(), return_data)
+            distance, names, data = _nearest(lambda margin: self._near([one], margin), count - 1, one.size,
+                                             return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
         """The least distance of an object from one of another manager; names are (own, other's)."""
         others = other_manager._objs.values()
-        distance, names, data = _nearest(lambda margin: self._near_any(others, margin),
+        distance, names, data = _nearest(lambda margin: self._near(others, margin),
                                          len(self._objs) * len(others), self._size, return_data)
         return _told(distance, names, data, return_names, return_data)
 
     def _placed(self):
-        """The scene of all objects."""
+        """The scene of all objects, where they were at its last step."""
+        if self._bodies is None:
+            self._bodies = _Bodies(self._objs.values())
         if self._scene is None:
             self._room = 2 * len(self._objs) + 2
             self._scene = ist.Scene(max_bodies=self._room, max_pairs=self._pairs * self._room, threads=1)
-            self._numbered, self._moved = {}, {}
-            for one in self._objs.values():
-                self._place(one)
+            self._moved, self._row = set(), None
+            for one, pose in zip(self._bodies.objects, self._bodies.poses):
+                one.number = self._scene.add(one.asset, pose)
+        if self._row is None:
+            numbers = [one.number for one in self._bodies.objects]
+            self._row = np.empty(max(numbers, default=0) + 1, int)
+            self._row[numbers] = np.arange(len(numbers))
         return self._scene
-
-    def _place(self, one):
-        one.number = self._scene.add(one.asset, one.pose)
-        self._numbered[one.number] = one
 
     def _within(self, margin=0):
         """The pairs whose boxes are no further apart than the margin."""
-        found = None
-        while found is None:
+        while self._found is None or self._found[0] != margin:
             self._placed().set_rule(answer="boxes", measure="exact", margin=margin)
-            moved, self._moved = self._moved, {}
+            numbers = np.array(list(self._moved), int)
+            rows = self._row[numbers]
+            self._bodies.move(rows)
+            self._moved = set()
             try:
-                found = self._scene.step(np.reshape(list(moved.values()), (-1, 7)), numbers=np.array(list(moved), int))
+                found = self._scene.step(self._bodies.poses[rows], numbers=numbers)
+                self._found = margin, _Pairs(self._bodies, self._bodies, *self._row[found.pairs].T)
             except ist.Error:  # more pairs than there is room for, or, with room for all, something else
                 if self._pairs >= self._room:
                     raise
                 self._scene, self._pairs = None, 8 * self._pairs
-        numbers, at = np.unique(found.pairs, return_inverse=True)
-        objects = [self._numbered[number] for number in numbers.tolist()]
-        return _Pairs(objects, objects, *at.reshape(-1, 2).T)
+        return self._found[1]
 
-    def _near(self, one, margin=0):
-        """As _within(), of an object and those of this manager."""
+    def _near(self, others, margin=0):
+        """As _within(), of objects of this manager and others."""
         if self._moved:
             self._within()
-        found = self._placed().in_box(one.low - margin, one.high + margin)
-        objects = [self._numbered[number] for number in found.tolist() if self._numbered[number] is not one]
-        return _Pairs(objects, [one], np.arange(len(objects)), np.zeros(len(objects), int))
-
-    def _near_any(self, others, margin=0):
-        near = [(a, b) for b in others for a in self._near(b, margin).of_a]
-        at = np.arange(len(near))
-        return _Pairs([a for a, _ in near], [b for _, b in near], at, at)
+        scene, others = self._placed(), _Bodies(others)
+        near = [self._row[scene.in_box(low - margin, high + margin)]
+                for low, high in zip(others.low, others.high)]
+        first = np.concatenate([np.zeros(0, int), *near])
+        second = np.repeat(np.arange(len(near)), [len(rows) for rows in near])
+        own = [self._bodies.objects[i] is others.objects[k] for i, k in zip(first.tolist(), second.tolist())]
+        return _Pairs(self._bodies, others, first[~np.array(own, bool)], second[~np.array(own, bool)])
 
     def _of(self, name):
         if name not in self._objs:
@@ -267,49 +302,45 @@ def scene_to_collision(scene, *, repair=False):
 
 
 class _Pairs:
-    """Pairs of objects: their numbers among those of either side."""
+    """Pairs of objects: their rows among those of either side."""
 
     def __init__(self, of_a, of_b, first, second):
         self.of_a, self.of_b, self.first, self.second = of_a, of_b, first, second
 
     def gaps(self):
         """[u] (n,): how far boxes are apart."""
-        low_a, high_a, low_b, high_b = (
-            np.reshape([getattr(one, side) for one in of], (-1, 3))[at]
-            for of, at in ((self.of_a, self.first), (self.of_b, self.second)) for side in ("low", "high"))
-        return np.linalg.norm(np.maximum(np.maximum(low_a - high_b, low_b - high_a), 0), axis=1)
+        a, b = self.of_a, self.of_b
+        apart = np.maximum(a.low[self.first] - b.high[self.second], b.low[self.second] - a.high[self.first])
+        return np.linalg.norm(np.maximum(apart, 0), axis=1)
 
-    def ask(self, query, chosen, poses=None, **settings):
-        """The query of some of them, in one call. poses: of B; None: its own."""
+    def ask(self, query, chosen, aside=0, **settings):
+        """The query of some of them, in one call. aside: of B, in sizes of A."""
         first, second = self.first[chosen], self.second[chosen]
-        a = ist.Solids([one.asset for one in self.of_a])
-        b = ist.Solids([one.asset for one in self.of_b])
-        if poses is None:
-            poses = np.array([self.of_b[i].pose for i in second])
-        return query(a[first], b[second], poses, poses_a=np.array([self.of_a[i].pose for i in first]),
-                     **settings)
-
-    def aside(self, i):
-        """Two poses of B beside its own: where faces are flush beside an overlap its slope jumps there,
-        and the mean of both sides is that of neither face."""
-        a, b = self.objects(i)
-        move = _ASIDE * (a.high - a.low).max() * np.array([0, 0, 0, 0, 0.36, 0.48, 0.8])
-        return b.pose + move, b.pose - move
+        poses = self.of_b.poses[second]
+        if aside != 0:
+            poses[:, 4:] += aside * self.of_a.sizes[first, None] * _WAY
+        return query(self.of_a.solids[first], self.of_b.solids[second], poses,
+                     poses_a=self.of_a.poses[first], **settings)
 
     def overlaps(self, chosen):
-        """Volumes, forces on B and centroids."""
-        sides = [self.ask(ist.penetration, chosen, poses=np.array([self.aside(i)[k] for i in chosen]),
-                          measure="exact") for k in range(2)]
-        _refuse_unanswered(self, sides[0].status)
+        """Volumes, forces on B and centroids.
+
+        Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
+        neither face.
+        """
+        sides = [self.ask(ist.penetration, chosen, aside, measure="exact") for aside in (-_ASIDE, _ASIDE)]
+        _refuse_unanswered(self, chosen, sides[0].status)
         return ((getattr(sides[0], what) + getattr(sides[1], what)) / 2
                 for what in ("volume", "force", "centroid"))
 
     def parts(self, i):
         """The connected parts of the overlap of a pair, largest first."""
         a, b = self.objects(i)
+        pose_a, pose_b = self.of_a.poses[self.first[i]], self.of_b.poses[self.second[i]]
+        move = _ASIDE * a.size * np.concatenate([np.zeros(4), _WAY])
         sides = []
-        for pose in self.aside(i):
-            found = ist.overlap_outline(a.asset, b.asset, pose, poses_a=a.pose, max_patches=32).contact
+        for pose in (pose_b - move, pose_b + move):
+            found = ist.overlap_outline(a.asset, b.asset, pose, poses_a=pose_a, max_patches=32).contact
             sides.append((found, np.argsort(-found.volume[:found.count])))
         if sides[0][0].count != sides[1][0].count:
             sides = sides[:1]
@@ -323,7 +354,7 @@ class _Pairs:
         return out
 
     def objects(self, i):
-        return self.of_a[self.first[i]], self.of_b[self.second[i]]
+        return self.of_a.objects[self.first[i]], self.of_b.objects[self.second[i]]
 
     def names(self, i):
         return tuple(one.name for one in self.objects(i))
@@ -333,11 +364,11 @@ def _collide(pairs, with_names, with_data):
     """(whether any collide, their names, their ContactData); the first to collide, where that is all"""
     with_names = with_names or with_data
     hits, touches = [], []
-    begin, count = 0, len(pairs.first) if with_names else _FIRST
+    begin, count = 0, len(pairs.first) if with_names else 1
     while begin < len(pairs.first) and (with_names or not hits):
         chosen = np.arange(begin, min(begin + count, len(pairs.first)))
         answers = pairs.ask(ist.penetration, chosen, measure="exact")
-        _refuse_unanswered(pairs, answers.status)
+        _refuse_unanswered(pairs, chosen, answers.status)
         for k in np.flatnonzero((answers.volume > 0) | answers.touching):
             hits.append(chosen[k])
             touches.append(None if answers.volume[k] > 0 else answers.contact_normal[k])
@@ -362,7 +393,7 @@ def _nearest(near_by, count, margin, with_data):
     best, nearest = np.inf, None
     if len(near) > 0:
         answers = pairs.ask(ist.penetration, near, measure="exact")
-        _refuse_unanswered(pairs, answers.status)
+        _refuse_unanswered(pairs, near, answers.status)
         near = near[answers.volume > 0]
     if len(near) > 0:
         volume, force, point = pairs.overlaps(near)
@@ -383,7 +414,7 @@ def _nearest(near_by, count, margin, with_data):
             chosen = chosen[gap[chosen] < best]
             limit = {"max_distance": best} if best < np.inf else {}
             found = pairs.ask(ist.separation, chosen, **limit)
-            _refuse_unanswered(pairs, found.status)
+            _refuse_unanswered(pairs, chosen, found.status)
             k = int(found.distance.argmin())
             if found.distance[k] < best:
                 best, nearest = found.distance[k], (pairs, chosen[k], (found.point_a[k], found.point_b[k]))
@@ -397,10 +428,10 @@ def _nearest(near_by, count, margin, with_data):
     return float(best), pairs.names(i), data
 
 
-def _refuse_unanswered(pairs, status):
-    for i in np.flatnonzero(status != int(ist.QueryStatus.ok))[:1]:
-        name = ist.QueryStatus(int(status[i])).name
-        raise ist.Error(f"{' and '.join(map(str, pairs.names(i)))}: {name}")
+def _refuse_unanswered(pairs, chosen, status):
+    for k in np.flatnonzero(status != int(ist.QueryStatus.ok))[:1]:
+        name = ist.QueryStatus(int(status[k])).name
+        raise ist.Error(f"{' and '.join(map(str, pairs.names(chosen[k])))}: {name}")
 
 
 def _told(found, names, data, with_names, with_data):
