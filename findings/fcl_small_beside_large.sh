@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A smaller copy of a mesh should be no dearer to measure from. python-fcl 0.7.0.11 (FCL 0.7) takes 90 times as long for the
 # distance of a sphere of 20,480 triangles from its copy of a hundred-thousandth of the size as from one of its own size
-# (0.9 and 78 ms on one core), and 13 times as long at a thousandth; at a tenth it takes the same. All distances are right.
+# (0.9 and 80 ms on one core), and more than ten times as long at a thousandth; at a tenth hardly longer. All are right.
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
