@@ -244,7 +244,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
       const Eigen::Vector3d normal = -patch.normal;
       result->addContactPoint(
           to_bullet(normal),
-          to_bullet(Eigen::Vector3d(place_of(patch) + 0.5 * patch.depth * normal)),
+          to_bullet(Eigen::Vector3d(patch.centroid + 0.5 * patch.depth * normal)),
           static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);

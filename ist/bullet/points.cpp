@@ -94,12 +94,6 @@ struct OldPoints {
 
 }  // namespace
 
-Eigen::Vector3d place_of(const ContactPatch& patch) {
-  const Eigen::Vector3d aside = patch.point - patch.centroid;
-  const double far = aside.norm(), width = std::sqrt(patch.area);
-  return patch.centroid + (far > width ? width / far : 1) * aside;
-}
-
 std::size_t Points::count() const {
   std::size_t sum = 0;
   for (const btPersistentManifold* manifold : manifolds)
@@ -155,7 +149,7 @@ Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisi
     if (!(force > 0)) continue;
     together += force * patch.normal;
     apart += force;
-    const btVector3 middle = to_bullet(place_of(patch));
+    const btVector3 middle = to_bullet(patch.centroid);
     const btVector3 motion =
         velocity_of(first, middle) - velocity_of(second, middle) + unsaid_at(middle);
     closing_ = std::max(closing_, to_eigen(motion).dot(patch.normal));
@@ -174,7 +168,7 @@ void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const
   if (patch.depth > 0) {
     const double parting = spring.parting(patch.depth, together.dot(patch.normal));
     // A point that moves along grows faster the deeper it is: a slight speed is no measure.
-    const double placed = to_eigen(unsaid_at(to_bullet(place_of(patch)))).dot(patch.normal);
+    const double placed = to_eigen(unsaid_at(to_bullet(patch.centroid))).dot(patch.normal);
     const double speed =
         parting +
         std::max(0.0, placed) * std::min(1.0, patch.depth / std::max(0.2 * spring.rest, 1e-300));
@@ -202,7 +196,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
   for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
     if (!(patch.area > 0)) continue;
     const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
-    const btVector3 middle = to_bullet(place_of(patch));
+    const btVector3 middle = to_bullet(patch.centroid);
     const btScalar depth = static_cast<btScalar>(patch.depth);
     const btVector3 on_first = middle - normal * (depth / 2);
     const btVector3 on_second = middle + normal * (depth / 2);

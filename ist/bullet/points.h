@@ -10,12 +10,9 @@
 
 namespace ist::bullet {
 
-/// The point at which a patch pushes. A force on the wrench's axis leaves no torque but that about
-/// the axis. If a patch pushes in both directions the axis may lie far away: the point stays within
-/// the patch's width of its middle.
-Eigen::Vector3d place_of(const ContactPatch& patch);
-
-/// The points of a pair in Bullet's manifolds.
+/// The points of a pair in Bullet's manifolds. A patch pushes at its centroid, as a bed of springs
+/// does whose pressure grows with depth. Its wrench has another axis, that of a constant pressure:
+/// a body that rocks or rolls on it gains energy.
 class Points {
  public:
   /// To where the bodies have moved.
