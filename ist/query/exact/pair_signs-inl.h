@@ -257,27 +257,40 @@ class PairSigns {
     return apart | (all & ~round.undecided(all, parts, round.settled));
   }
 
-  /// Pairs that are further apart than `reach` across or along the plane of one of them.
+  /// Pairs that are further apart than `reach` across or along the plane of one of them, for
+  /// certain.
   HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
     const D d;
     std::uint32_t out = 0;
-    const V least = hn::Set(d, reach * reach * (1 + 1e-6));
+    const V least = hn::Set(d, reach * reach * (1 + 1e-6)), filter = hn::Set(d, exact::kFilter);
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       for (int s = 0; s < 2; ++s) {
-        const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
-        const auto height = [&](int k) { return dot(normal, corner[1 - s][k] - corner[s][0]); };
+        const Vec3(&other)[3] = corner[1 - s];
+        const Vec3 u = corner[s][1] - corner[s][0], v = corner[s][2] - corner[s][0];
+        const Vec3 normal = cross(u, v);
+        const V wide = largest(u) + largest(v);
+        // What a coordinate of the normal is off by, in doubles of slivers.
+        const V off = filter * (wide * wide);
+        const auto beyond = [&](const Vec3& axis, V error, const auto& from, V gap) {
+          const V reached = hn::Max(largest(other[0] - from),
+                                    hn::Max(largest(other[1] - from), largest(other[2] - from)));
+          const V sure = gap - error * reached;
+          out |= mask_bits(d, sure * hn::Abs(sure) > least * dot(axis, axis)) << l;
+        };
+        const auto height = [&](int k) { return dot(normal, other[k] - corner[s][0]); };
         const V low = min3(height(0), height(1), height(2)),
-                high = max3(height(0), height(1), height(2)), off = hn::Max(low, hn::Neg(high));
-        out |= mask_bits(d, off * hn::Abs(off) > least * dot(normal, normal)) << l;
+                high = max3(height(0), height(1), height(2));
+        beyond(normal, hn::Set(d, 4.0) * off, corner[s][0], hn::Max(low, hn::Neg(high)));
         for (int k = 0; k < 3; ++k) {
-          const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
-          const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
-                             dot(out_of, corner[1 - s][2] - p));
-          out |= mask_bits(d, gap * hn::Abs(gap) > least * dot(out_of, out_of)) << l;
+          const Vec3 &p = corner[s][k], edge = corner[s][(k + 1) % 3] - p;
+          const Vec3 out_of = cross(edge, normal);
+          beyond(out_of, hn::Set(d, 8.0) * (off * largest(edge)), p,
+                 min3(dot(out_of, other[0] - p), dot(out_of, other[1] - p),
+                      dot(out_of, other[2] - p)));
         }
       }
     }
