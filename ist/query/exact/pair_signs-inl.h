@@ -309,27 +309,33 @@ class PairSigns {
         for (int c = 0; c < 3; ++c) edge[s][c] = corner[s][(c + 1) % 3] - corner[s][c];
         normal[s] = cross(edge[s][0], edge[s][1]);
       }
-      const V zero = hn::Zero(d), reach = hn::Set(d, by);
+      const V zero = hn::Zero(d), reach = hn::Set(d, by), filter = hn::Set(d, 6 * exact::kFilter);
       V beyond = zero;
       // An axis and what both triangles reach along it, B's seen from a corner of A's.
-      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b) {
-        const V gap = hn::Max(low_b - high_a, low_a - high_b);
+      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b, V off) {
+        const V gap = hn::Max(low_b - high_a, low_a - high_b) - off;
         beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
+      };
+      // Both ends of an edge are one along its axis, but for rounding: of edges that are parallel
+      // the axis is nothing else.
+      const auto rounding = [&](const Vec3& u, const Vec3& v) {
+        const V size_u = largest(u), size_v = largest(v);
+        return filter * ((size_u * size_v) * (size_u + size_v));
       };
       for (int s = 0; s < 2; ++s) {
         V at[3];
         for (int c = 0; c < 3; ++c) at[c] = dot(normal[s], corner[1 - s][c] - corner[s][0]);
-        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]));
+        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]),
+             rounding(edge[s][0], edge[s][1]));
       }
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
-          // Both ends of an edge are one along the axis.
           const Vec3 axis = cross(edge[0][i], edge[1][j]);
           const V other_a = dot(axis, corner[0][(i + 2) % 3] - corner[0][i]);
           const V at_b = dot(axis, corner[1][j] - corner[0][i]);
           const V other_b = at_b + dot(axis, corner[1][(j + 2) % 3] - corner[1][j]);
           look(axis, hn::Min(zero, other_a), hn::Max(zero, other_a), hn::Min(at_b, other_b),
-               hn::Max(at_b, other_b));
+               hn::Max(at_b, other_b), rounding(edge[0][i], edge[1][j]));
         }
       apart |= mask_bits(d, beyond > zero) << l;
     }
