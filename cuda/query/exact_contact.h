@@ -16,7 +16,7 @@
 namespace ist::gpu {
 
 /// A lane's pair of triangles in one plane that face each other: adds what they have in common.
-IST_HD_COLD bool add_common_area(const CornerView& view, ContactSums& sums) {
+IST_HD_COLD void add_common_area(const CornerView& view, ContactSums& sums) {
   const exact::Point a[3] = {view.corner(0, 0), view.corner(0, 1), view.corner(0, 2)},
                      b[3] = {view.corner(1, 0), view.corner(1, 1), view.corner(1, 2)};
   const exact::Point normal = cross(a[1] - a[0], a[2] - a[0]);
@@ -29,7 +29,6 @@ IST_HD_COLD bool add_common_area(const CornerView& view, ContactSums& sums) {
     sums.of[ContactSums::kNormal + k][lane] += along[k];
     sums.of[ContactSums::kMoment + k][lane] += moment[k];
   }
-  return area > 0;
 }
 
 /// Whether a lane's triangles, which do not cross, come as near.
@@ -43,17 +42,24 @@ IST_HD_COLD bool come_within(double distance, const CornerView& view) {
   return exact::nearest_points(flat[0], flat[1], 0, unclear).squared < distance * distance;
 }
 
-/// Whether a lane's triangles lie in one plane and face each other.
-IST_HD inline bool flush(double touch, const CornerView& view) {
-  const exact::Point o = view.corner(0, 0), b = view.corner(1, 0);
-  const exact::FilteredPlane plane(view.corner(0, 1) - o, view.corner(0, 2) - o, {0, 0, 0});
-  const double far = touch * norm(plane.normal);
-  bool level = true;
-  for (int k = 0; k < 3; ++k) {
-    const exact::Determinant height = plane.height(view.corner(1, k) - o);
-    level = level && std::abs(height.value) <= far + height.error;
+/// Whether a lane's triangles lie in one plane, to a distance, and face each other. In that of
+/// either: the plane of a sliver may be any.
+IST_HD inline bool flush(double distance, const CornerView& view) {
+  exact::Point normal[2];
+  bool level = false;
+  for (int s = 0; s < 2; ++s) {
+    const exact::Point o = view.corner(s, 0);
+    const exact::FilteredPlane plane(view.corner(s, 1) - o, view.corner(s, 2) - o, {0, 0, 0});
+    normal[s] = plane.normal;
+    const double far = distance * norm(plane.normal);
+    bool in_plane = true;
+    for (int k = 0; k < 3; ++k) {
+      const exact::Determinant height = plane.height(view.corner(1 - s, k) - o);
+      in_plane = in_plane && std::abs(height.value) <= far + height.error;
+    }
+    level = level || in_plane;
   }
-  return level && dot(plane.normal, cross(view.corner(1, 1) - b, view.corner(1, 2) - b)) < 0;
+  return level && dot(normal[0], normal[1]) < 0;
 }
 
 /// Looks at the next so many pairs of triangles that wait. False where two cross wherever points
@@ -72,10 +78,8 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
   const PairSays says =
       has ? cross_pair<Signs::settled>(view, of.aside, end, of.reach[0]) : PairSays::apart;
   if (team.any(says == PairSays::crosses)) return false;
-  const bool near = says != PairSays::apart;
-  touches =
-      team.any(near && flush(of.touch, view) && add_common_area(view, memory.contact)) || touches;
-  if (!touches) touches = team.any(near && come_within(of.touch, view));
+  if (has && flush(flush_distance(of.touch), view)) add_common_area(view, memory.contact);
+  if (!touches) touches = team.any(says != PairSays::apart && come_within(of.touch, view));
   return true;
 }
 

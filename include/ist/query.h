@@ -153,8 +153,8 @@ struct Penetration {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   /// [u³/rad] Its torque on B about B's origin: −dV/d(rotation vector of B), world.
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();
-  /// [u²] Measure::exact, where the solids touch: of the faces that lie on each other. 0 where they
-  /// touch in points and edges alone.
+  /// [u²] Measure::exact, where the solids touch: of the faces that lie on each other, in one plane
+  /// to 64 times what counts as touching. 0 where they touch in points and edges alone.
   double contact_area = 0;
   /// Unit, from A to B, world: the mean normal of these faces. Zero without faces, and where their
   /// normals cancel, as around a pin in its hole.

@@ -119,7 +119,7 @@ ContactPatches find_patches(const PlacedAsset& a, const PlacedAsset& b,
   ContactPatches result;
   const bool inner = settings.measure == Measure::inner;
   ChosenPart chosen(a, b, *pose, inner, workspace, patches);
-  bool blends = !inner && (settings.pair_budget > 0 || by_error(settings));
+  bool blends = !inner && asks_levels(a, b, settings);
   result.penetration =
       blends ? blend_levels(a, b, *pose, settings, workspace, exact_penetration, &chosen)
              : chosen.level(LevelPair(), limits_of(settings));

@@ -2,10 +2,8 @@
 
 #include "query/base/no_answer.h"
 #include "query/exact_penetration.h"
-#include "query/lod/coincident.h"
 #include "query/lod/level_blend.h"
 #include "query/lod/unlike_sizes.h"
-#include "query/lod/wanted_error.h"
 #include "query/solid_queries.h"
 
 namespace ist {
@@ -16,8 +14,7 @@ Penetration by_spheres(const PlacedAsset& a, const PlacedAsset& b,
                        Workspace& workspace) noexcept {
   const AssetHeader &header_a = a.asset.header(), &header_b = b.asset.header();
   const bool inner = settings.measure == Measure::inner;
-  if (!inner &&
-      (settings.pair_budget > 0 || by_error(settings) || are_one_asset(header_a, header_b)))
+  if (!inner && asks_levels(a, b, settings))
     return blend_levels(a, b, pose, settings, workspace, exact_penetration);
   return lens_sum(a, inner ? header_a.inner_tree : header_a.matched_tree, b,
                   inner ? header_b.inner_tree : header_b.matched_tree, pose, limits_of(settings),

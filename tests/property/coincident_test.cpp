@@ -153,6 +153,21 @@ TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
   }
 }
 
+TEST_F(CoincidentInstances, PatchesSumToTheSameAnswer) {
+  for (const double aside : {0.0, 1e-6, 0.3, 1.0, 3.0}) {
+    const PlacedAsset b =
+        placed(small_pose(aside * radius_ * Vector3d(0.6, 0.48, 0.64), {0, 0, 0}));
+    const Penetration whole = penetration(still(), b, {}, workspace_);
+    ContactPatch patches[8];
+    const ContactPatches found = contact_patches(still(), b, {}, workspace_, patches);
+    EXPECT_NEAR(found.penetration.volume, whole.volume, 1e-12 * whole.volume) << aside;
+    EXPECT_LE((found.penetration.force - whole.force).norm(), 1e-9 * whole.force.norm() + 1e-9);
+    double sum = 0;
+    for (const ContactPatch& patch : std::span(patches).first(found.count)) sum += patch.volume;
+    EXPECT_NEAR(sum, whole.volume, 1e-12 * whole.volume) << aside;
+  }
+}
+
 TEST_F(CoincidentInstances, LimitsHold) {
   int stopped = 0;
   for (int i = 0; i < 200; ++i) {

@@ -92,6 +92,24 @@ TEST_F(ExactLoop, PartsThatJoinAndComeApartHaveTheSameBits) {
   EXPECT_GE(most, 2u);
 }
 
+// Edges of copies that are moved and not turned are parallel but for rounding: no plane along both
+// keeps their triangles apart.
+TEST_F(ExactLoop, CopiesThatAreMovedHaveTheSameBits) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> shift(-0.2, 0.2);
+  for (const std::uint32_t around : {8u, 16u, 24u, 48u})
+    for (const std::uint32_t across : {4u, 6u, 8u}) {
+      const Asset ring = testing::surface(testing::torus_mesh(1, 0.4, around, across));
+      for (std::uint32_t i = 1; i <= 50; ++i) {
+        const Pose pose = {{1, 0, 0, 0}, {shift(random), shift(random), shift(random)}};
+        const std::uint64_t alone = bits(ring, ring, pose, 0);
+        for (int step = 0; step < 3; ++step)
+          ASSERT_EQ(bits(ring, ring, pose, i), alone)
+              << around << " by " << across << ", shift " << i << ", step " << step;
+      }
+    }
+}
+
 TEST_F(ExactLoop, InClearanceNothingIsSearchedAndNothingTouches) {
   int searched = 0;
   for (int i = 0; i < 200; ++i) {

@@ -1,5 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <ctime>
+#include <random>
+
 #include "support/mate_checks.h"
 
 // Exact queries of random mates, whose volumes and contact areas follow from plane geometry. The
@@ -17,6 +21,52 @@ TEST(ExactMated, RandomMates) {
   for (const auto& [what, count] : tally.wrong) EXPECT_EQ(count, 0u) << what;
   const testing::MateWork work = checks.work();
   EXPECT_LE(work.worst, 10) << work.what;
+}
+
+// A kernel rounds the corners of a face, and the planes of its slivers turn with them by far more.
+TEST(ExactMated, FacesOfRoundedCornersLieOnEachOther) {
+  std::mt19937_64 random(4);
+  Workspace workspace;
+  for (int i = 0; i < 200; ++i) {
+    const auto corners = static_cast<std::uint32_t>(20 + i % 60);
+    const testing::Extrusion fan = testing::Extrusion::prism(corners, 1, -0.5, 0);
+    const testing::Extrusion box = testing::Extrusion::rectangle(0.5, 0.3, 0.4);
+    TriangleMesh rounded = fan.mesh();
+    for (Eigen::Vector3d& v : rounded.vertices)
+      v.z() += std::uniform_real_distribution<double>(-4e-15, 4e-15)(random);
+    const Asset a = testing::surface(std::move(rounded), "fan"),
+                b = testing::surface(box.mesh(), "box");
+    const Pose above = {{1, 0, 0, 0}, {0.2, 0.1, 0.2}};
+    for (const bool exchanged : {false, true}) {
+      const PlacedAsset first = {a.view(), {}, 1}, second = {b.view(), above, 1};
+      const Penetration p = exchanged ? testing::exactly(second, first, workspace)
+                                      : testing::exactly(first, second, workspace);
+      EXPECT_TRUE(p.touching) << corners;
+      EXPECT_NEAR(p.contact_area, 0.15, 1e-9) << corners << " corners, exchanged " << exchanged;
+    }
+  }
+}
+
+// Near faces that do not touch are told apart by planes, not by the distance of each two triangles.
+TEST(ExactMated, FacesNextToEachOtherCostWhatFacesOnEachOtherDo) {
+  const testing::Extrusion of = testing::Extrusion::tube(500, 1, 0.8, 0, 1);
+  const Asset tube = testing::surface(of.mesh(), "tube");
+  Workspace workspace;
+  const auto seconds = [&](double z) {
+    double least = 1e9;
+    for (int i = 0; i < 5; ++i) {
+      const PlacedAsset a = {tube.view(), {}, 1}, b = {tube.view(), {{1, 0, 0, 0}, {0, 0, z}}, 1};
+      const std::clock_t begin = std::clock();
+      const Penetration p = testing::exactly(a, b, workspace);
+      least = std::min(least, double(std::clock() - begin));
+      EXPECT_EQ(p.volume, 0);
+      EXPECT_EQ(p.touching, z == 1);
+    }
+    return least;
+  };
+  const double on = seconds(1);
+  for (const double gap : {1e-11, 1e-10, 1e-9, 1e-8, 1e-7})
+    EXPECT_LT(seconds(1 + gap), 3 * on) << gap;
 }
 
 }  // namespace

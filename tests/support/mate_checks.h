@@ -159,6 +159,18 @@ class MateChecks {
     if (mate_.parts && aside >= 1e-9)
       need(!p.touching && p.volume_max <= 1e-12 * faces * larger, "touching apart from each other");
     tally_.touching += p.touching;
+    ContactPatch patches[8];
+    const ContactPatches found =
+        contact_patches(placed_a_, placed_b_, {.measure = Measure::exact}, workspace_, patches);
+    double volume = 0;
+    Point force = Point::Zero();
+    for (const ContactPatch& patch : std::span(patches).first(found.count)) {
+      volume += patch.volume;
+      force += patch.force;
+    }
+    if (p.volume > 0)
+      need(std::abs(volume - p.volume) <= room && (force - p.force).norm() <= 1e-11 * faces,
+           "patches that do not sum to the whole");
   }
 
   /// Else the side of a kink that an answer takes may be another if A and B are exchanged.

@@ -247,5 +247,61 @@ TEST(BulletSupport, ATowerOfConcavePartsStands) {
   }
 }
 
+/// A box of 0.2 × 0.08 × 0.14 whose edges along x are rounded.
+TriangleMesh rounded_box() {
+  constexpr std::uint32_t kTurns = 6, kCorners = 4 * (kTurns + 1);
+  constexpr double kRadius = 0.015, kQuarter = 1.5707963267948966;
+  TriangleMesh mesh;
+  for (const double x : {-0.1, 0.1})
+    for (std::uint32_t i = 0; i < kCorners; ++i) {
+      const std::uint32_t corner = i / (kTurns + 1);
+      const double angle = kQuarter * (corner + double(i % (kTurns + 1)) / kTurns);
+      const double y = corner == 0 || corner == 3 ? 0.025 : -0.025, z = corner < 2 ? 0.055 : -0.055;
+      mesh.vertices.emplace_back(x, y + kRadius * std::cos(angle), z + kRadius * std::sin(angle));
+    }
+  for (std::uint32_t i = 0; i < kCorners; ++i) {
+    const std::uint32_t j = (i + 1) % kCorners;
+    mesh.triangles.push_back({i, j, kCorners + j});
+    mesh.triangles.push_back({i, kCorners + j, kCorners + i});
+    if (i < 2) continue;
+    mesh.triangles.push_back({0, i, i - 1});
+    mesh.triangles.push_back({kCorners, kCorners + i - 1, kCorners + i});
+  }
+  return mesh;
+}
+
+// The area changes as the contact moves from an edge over the face to the other edge: at the axis
+// of the wrench, which is that of a constant pressure, every crossing would give energy.
+TEST(BulletSupport, ABoxThatRocksOnRoundedEdgesComesToRest) {
+  const Asset box = baked(rounded_box(), "rounded box", 500);
+  for (const double hz : {60, 240, 1000}) {
+    for (const double tilt : {0.03, 0.1, 0.2}) {
+      World world;
+      world.contacts.configure(world.world);
+      auto table = std::make_unique<bullet::Shape>(flat_box());
+      table->setLocalScaling({5, 5, 5});
+      world.add(std::move(table), 0, {0, 0, -0.1});
+      btRigidBody& body =
+          world.add(std::make_unique<bullet::Shape>(box.view()), 2,
+                    btTransform(btQuaternion({1, 0, 0}, static_cast<btScalar>(tilt)),
+                                {0, 0, static_cast<btScalar>(0.072 + 0.1 * tilt)}));
+      // [J] Above that at rest.
+      const auto energy = [&] {
+        const btVector3 turning =
+            body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
+        double sum = body.getLinearVelocity().length2() +
+                     2 * 9.81 * (body.getWorldTransform().getOrigin().z() - 0.0698);
+        for (int k = 0; k < 3; ++k)
+          sum += 0.5 * turning[k] * turning[k] / body.getInvInertiaDiagLocal()[k];
+        return sum;
+      };
+      world.step(static_cast<int>(hz), {}, hz);
+      const double before = energy();
+      world.step(static_cast<int>(5 * hz), {}, hz);
+      EXPECT_LT(energy(), 0.7 * before + 5e-4) << tilt << " at " << hz << " Hz";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace ist::testing

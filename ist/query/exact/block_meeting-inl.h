@@ -151,14 +151,24 @@ class Meeting {
     return lanes;
   }
 
-  /// Which of B's triangles lie in the plane of A's triangle i, to CrossingSearch::touch.
-  std::uint32_t flush(std::uint32_t i) const {
-    const PlacedPlanes& planes = planes_of(0);
-    const exact::Point n = {planes.normal[0][i], planes.normal[1][i], planes.normal[2][i]};
-    const double far = search_.touch * std::sqrt(dot(n, n));
-    const PlaneSides off = sides_of(*vertices_[1], planes, i, -far, far, {0, 0, 0}, double{apart_},
-                                    Margin::rounding, 0);
-    return triangles_of(~(off.above | off.below), block(1));
+  /// Which of `lanes` of B lie in one plane with A's triangle i, to flush_distance(): that of
+  /// either, since the plane of a sliver may be any.
+  std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
+    const auto in_plane = [&](int side, std::uint32_t t) {
+      const PlaneSides off = sides_by(side, t, flush_distance(search_.touch));
+      return triangles_of(~(off.above | off.below), block(1 - side));
+    };
+    const std::uint32_t others = lanes & ~in_plane(0, i);
+    return lanes & ~flush_.without(i, others, [&](std::uint32_t j) { return in_plane(1, j); });
+  }
+  /// Of `lanes`, B's triangles that no plane keeps further from A's triangle i than
+  /// CrossingSearch::touch.
+  std::uint32_t within_touch(std::uint32_t i, std::uint32_t lanes) {
+    const auto beyond_plane = [&](int side, std::uint32_t t) {
+      return kept_apart(side, sides_by(side, t, search_.touch));
+    };
+    lanes &= ~beyond_plane(0, i);
+    return touch_.without(i, lanes, [&](std::uint32_t j) { return beyond_plane(1, j); });
   }
 
  private:
@@ -178,6 +188,14 @@ class Meeting {
     return sides_of(*vertices_[1 - side], planes_of(side), t, low, high,
                     (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin,
                     double{margin == Margin::reach ? reach_ : search_.room});
+  }
+  /// Of the other block's vertices, what is further from the plane of triangle t than `distance`.
+  PlaneSides sides_by(int side, std::uint32_t t, double distance) const {
+    const PlacedPlanes& planes = planes_of(side);
+    const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
+    const double far = distance * std::sqrt(dot(n, n));
+    return sides_of(*vertices_[1 - side], planes, t, -far, far, {0, 0, 0}, double{apart_},
+                    Margin::rounding, 0);
   }
   std::uint32_t kept_apart(int side, const PlaneSides& found) const {
     return triangles_of(found.above, block(1 - side)) | triangles_of(found.below, block(1 - side));
@@ -219,7 +237,7 @@ class Meeting {
   float apart_ = 0;                             ///< no coordinates of both blocks differ by more
   float blur_;                                  ///< and planes through edges are floats
   bool flat_[2] = {};                           ///< whose edges are asked
-  Columns columns_, edges_;
+  Columns columns_, edges_, touch_, flush_;
 };
 
 }  // namespace ist::HWY_NAMESPACE

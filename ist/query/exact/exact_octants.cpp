@@ -312,7 +312,8 @@ std::uint32_t ExactOctants::split(std::span<ExactPart> parts, bool by_b, double 
   const double least = out_.sums.volume() / static_cast<double>(room);
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     ExactPart& part = parts[p];
-    if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
+    // Where the whole is nothing, parts are what sums round.
+    if (part.kept != p || part.id == 0 || !(least > 0 && part.sums.volume() > least) ||
         slots == ExactScratch::kMostSplit)
       continue;
     part.slot = slots++;

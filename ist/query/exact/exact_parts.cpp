@@ -204,6 +204,9 @@ void ExactParts::join_edges() noexcept {
 }
 
 /// Returns what the middle of the edge hangs together with. `first`: of the list of its ends.
+///
+/// Where copies coincide ends lie nearer to each other than they are known, and their order may say
+/// that nothing is inside in the middle: the nearest end stands for it, so that sums lose nothing.
 std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed,
                                     std::uint32_t edge, std::uint32_t first) noexcept {
   PiercedEnd* const ends = scratch_.ends.get();
@@ -225,7 +228,7 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
   const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                       q = mesh.corner[(edge + 1) % 3][edge / 3];
   std::uint32_t inside = crossed.inside >> p & 1 ? vertex_element(own, crossed, p) : kNoIndex;
-  std::uint32_t middle = inside;
+  std::uint32_t middle = inside, nearest = ends[0].crossing;
   for (std::uint32_t i = 0; i < count; ++i) {
     if ((ends[i].edge & kEnters) != 0) {
       inside = ends[i].crossing;
@@ -233,11 +236,13 @@ std::uint32_t ExactParts::join_edge(const Side& own, const CrossedBlock& crossed
       if (inside != kNoIndex) unite(inside, ends[i].crossing);
       inside = kNoIndex;
     }
-    if ((ends[i].edge & kFromFirst) != 0) middle = inside;
+    if ((ends[i].edge & kFromFirst) == 0) continue;
+    middle = inside;
+    nearest = ends[i].crossing;
   }
   if (inside != kNoIndex && (crossed.inside >> q & 1) != 0)
     unite(inside, vertex_element(own, crossed, q));
-  return middle;
+  return middle != kNoIndex ? middle : nearest;
 }
 
 /// Vertices inside, along edges that nothing pierces and from block to block. A table finds those
@@ -366,8 +371,7 @@ bool ExactParts::are_one() noexcept {
       count_triangles(own.mesh.blocks[b], crossed, whole);
       for (std::uint32_t t = 0; one && t < kWidth; ++t) {
         if (whole[t] == 0) continue;
-        const std::uint32_t element = triangle_element(own, crossed, t);
-        one = element != kNoIndex && part_of(element) == 0;
+        one = part_of(triangle_element(own, crossed, t)) == 0;
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count,
@@ -395,9 +399,8 @@ void ExactParts::sum_parts() noexcept {
       for (std::uint32_t t = 0; t < mesh.triangles; ++t) {
         if (t % 8 == 0) triangle_terms(crossed, whole, static_cast<int>(t / 8), terms);
         if (whole[t] == 0) continue;
-        const std::uint32_t element = triangle_element(own, crossed, t);
-        if (element != kNoIndex)
-          add_triangle_term(terms, t % 8, scratch_.parts[part_of(element)].sums);
+        add_triangle_term(terms, t % 8,
+                          scratch_.parts[part_of(triangle_element(own, crossed, t))].sums);
       }
     });
     for_each_block(own.marks.inside, own.mesh.level[0].count, [&](std::uint32_t b) {

@@ -125,4 +125,8 @@ IST_HD inline double touching_distance(double moved, const MeshTree& a, const Me
   return moved + 4 * exact::kHalfUnit * (a.extent() + a_from_b.scale * b.extent() + shift);
 }
 
+/// Of solids that touch, faces whose corners are as near to one plane lie on each other: a kernel
+/// rounds the corners of a face apart, and the planes of its slivers turn with them.
+IST_HD constexpr double flush_distance(double touch) noexcept { return 64 * touch; }
+
 }  // namespace ist

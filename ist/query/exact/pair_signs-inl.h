@@ -257,27 +257,40 @@ class PairSigns {
     return apart | (all & ~round.undecided(all, parts, round.settled));
   }
 
-  /// Pairs that are further apart than `reach` across or along the plane of one of them.
+  /// Pairs that are further apart than `reach` across or along the plane of one of them, for
+  /// certain.
   HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
     const D d;
     std::uint32_t out = 0;
-    const V least = hn::Set(d, reach * reach * (1 + 1e-6));
+    const V least = hn::Set(d, reach * reach * (1 + 1e-6)), filter = hn::Set(d, exact::kFilter);
     for (std::size_t l = 0; l < count; l += hn::Lanes(d)) {
       Vec3 corner[2][3];
       for (int s = 0; s < 2; ++s)
         for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
       for (int s = 0; s < 2; ++s) {
-        const Vec3 normal = cross(corner[s][1] - corner[s][0], corner[s][2] - corner[s][0]);
-        const auto height = [&](int k) { return dot(normal, corner[1 - s][k] - corner[s][0]); };
+        const Vec3(&other)[3] = corner[1 - s];
+        const Vec3 u = corner[s][1] - corner[s][0], v = corner[s][2] - corner[s][0];
+        const Vec3 normal = cross(u, v);
+        const V wide = largest(u) + largest(v);
+        // What a coordinate of the normal is off by, in doubles of slivers.
+        const V off = filter * (wide * wide);
+        const auto beyond = [&](const Vec3& axis, V error, const auto& from, V gap) {
+          const V reached = hn::Max(largest(other[0] - from),
+                                    hn::Max(largest(other[1] - from), largest(other[2] - from)));
+          const V sure = gap - error * reached;
+          out |= mask_bits(d, sure * hn::Abs(sure) > least * dot(axis, axis)) << l;
+        };
+        const auto height = [&](int k) { return dot(normal, other[k] - corner[s][0]); };
         const V low = min3(height(0), height(1), height(2)),
-                high = max3(height(0), height(1), height(2)), off = hn::Max(low, hn::Neg(high));
-        out |= mask_bits(d, off * hn::Abs(off) > least * dot(normal, normal)) << l;
+                high = max3(height(0), height(1), height(2));
+        beyond(normal, hn::Set(d, 4.0) * off, corner[s][0], hn::Max(low, hn::Neg(high)));
         for (int k = 0; k < 3; ++k) {
-          const Vec3 &p = corner[s][k], out_of = cross(corner[s][(k + 1) % 3] - p, normal);
-          const V gap = min3(dot(out_of, corner[1 - s][0] - p), dot(out_of, corner[1 - s][1] - p),
-                             dot(out_of, corner[1 - s][2] - p));
-          out |= mask_bits(d, gap * hn::Abs(gap) > least * dot(out_of, out_of)) << l;
+          const Vec3 &p = corner[s][k], edge = corner[s][(k + 1) % 3] - p;
+          const Vec3 out_of = cross(edge, normal);
+          beyond(out_of, hn::Set(d, 8.0) * (off * largest(edge)), p,
+                 min3(dot(out_of, other[0] - p), dot(out_of, other[1] - p),
+                      dot(out_of, other[2] - p)));
         }
       }
     }
@@ -296,27 +309,33 @@ class PairSigns {
         for (int c = 0; c < 3; ++c) edge[s][c] = corner[s][(c + 1) % 3] - corner[s][c];
         normal[s] = cross(edge[s][0], edge[s][1]);
       }
-      const V zero = hn::Zero(d), reach = hn::Set(d, by);
+      const V zero = hn::Zero(d), reach = hn::Set(d, by), filter = hn::Set(d, 6 * exact::kFilter);
       V beyond = zero;
       // An axis and what both triangles reach along it, B's seen from a corner of A's.
-      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b) {
-        const V gap = hn::Max(low_b - high_a, low_a - high_b);
+      const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b, V off) {
+        const V gap = hn::Max(low_b - high_a, low_a - high_b) - off;
         beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
+      };
+      // Both ends of an edge are one along its axis, but for rounding: of edges that are parallel
+      // the axis is nothing else.
+      const auto rounding = [&](const Vec3& u, const Vec3& v) {
+        const V size_u = largest(u), size_v = largest(v);
+        return filter * ((size_u * size_v) * (size_u + size_v));
       };
       for (int s = 0; s < 2; ++s) {
         V at[3];
         for (int c = 0; c < 3; ++c) at[c] = dot(normal[s], corner[1 - s][c] - corner[s][0]);
-        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]));
+        look(normal[s], zero, zero, min3(at[0], at[1], at[2]), max3(at[0], at[1], at[2]),
+             rounding(edge[s][0], edge[s][1]));
       }
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
-          // Both ends of an edge are one along the axis.
           const Vec3 axis = cross(edge[0][i], edge[1][j]);
           const V other_a = dot(axis, corner[0][(i + 2) % 3] - corner[0][i]);
           const V at_b = dot(axis, corner[1][j] - corner[0][i]);
           const V other_b = at_b + dot(axis, corner[1][(j + 2) % 3] - corner[1][j]);
           look(axis, hn::Min(zero, other_a), hn::Max(zero, other_a), hn::Min(at_b, other_b),
-               hn::Max(at_b, other_b));
+               hn::Max(at_b, other_b), rounding(edge[0][i], edge[1][j]));
         }
       apart |= mask_bits(d, beyond > zero) << l;
     }

@@ -26,7 +26,14 @@ class ContactSearch : PairSigns {
   SurfaceContact contact(std::uint32_t count, const KeptPairs* kept) {
     SurfaceContact out;
     TrianglePairs& pairs = *scratch_.pairs;
+    const auto look = [&](std::uint32_t which) {
+      for (; which != 0 && !out.touching; which &= which - 1) {
+        const ExactCorners corners(pairs, static_cast<std::uint32_t>(std::countr_zero(which)));
+        out.touching = exact::come_within(search_.touch, corners.of[0], corners.of[1]);
+      }
+    };
     const auto add_areas = [&] {
+      look((1u << pairs.count) - 1);
       alignas(64) double area[8], along[3][8], moment[3][8];
       find_areas(pairs, area, along, moment);
       for (std::uint32_t n = 0; n < pairs.count; ++n) {
@@ -38,37 +45,49 @@ class ContactSearch : PairSigns {
     };
     std::optional<Meeting> now;
     std::uint64_t blocks = ~std::uint64_t{0};
+    const auto meet = [&](std::uint32_t number_a, std::uint32_t number_b) -> Meeting& {
+      const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
+      if (std::exchange(blocks, met) != met)
+        now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
+      return *now;
+    };
     visit_near(
         count, kept,
         [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b, std::uint32_t lanes) {
           lanes &= facing(placed_.triangles(false, number_a), i, placed_.triangles(true, number_b));
           if (lanes == 0) return false;
-          const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
-          if (std::exchange(blocks, met) != met)
-            now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
-          lanes &= now->flush(i);
-          if (lanes != 0) lanes = now->within_edges(i, lanes, edges_);
+          Meeting& both = meet(number_a, number_b);
+          lanes = both.flush(i, lanes);
+          if (lanes != 0) lanes = both.within_edges(i, lanes, edges_);
           for (; lanes != 0; lanes &= lanes - 1) {
             const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
-            gather(kWidth * number_a + i, now->vertices(0), kWidth * number_b + j,
-                   now->vertices(1));
+            gather(kWidth * number_a + i, both.vertices(0), kWidth * number_b + j,
+                   both.vertices(1));
             if (pairs.count == 8) add_areas();
           }
           return false;
         });
     add_areas();
-    out.touching = out.area > 0;
-    if (!out.touching)  // in a point or an edge, if at all
-      visit_near(
-          count, kept,
-          [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b,
-              std::uint32_t lanes) {
-            for (; lanes != 0 && !out.touching; lanes &= lanes - 1)
-              out.touching = exact::come_within(
-                  search_.touch, corners(false, number_a, i).of,
-                  corners(true, number_b, static_cast<std::uint32_t>(std::countr_zero(lanes))).of);
-            return out.touching;
-          });
+    if (out.touching) return out;
+    // By no face, but maybe in a point or an edge.
+    const auto look_at_near = [&] {
+      if (pairs.count != 0)
+        look(((1u << pairs.count) - 1) & ~far_by_planes(pairs, pairs.count, search_.touch));
+      pairs.count = 0;
+    };
+    visit_near(
+        count, kept,
+        [&](std::uint32_t number_a, std::uint32_t i, std::uint32_t number_b, std::uint32_t lanes) {
+          Meeting& both = meet(number_a, number_b);
+          for (lanes = both.within_touch(i, lanes); lanes != 0; lanes &= lanes - 1) {
+            const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
+            gather(kWidth * number_a + i, both.vertices(0), kWidth * number_b + j,
+                   both.vertices(1));
+            if (pairs.count == 8) look_at_near();
+          }
+          return out.touching;
+        });
+    look_at_near();
     return out;
   }
 
@@ -86,20 +105,6 @@ class ContactSearch : PairSigns {
   }
 
  private:
-  struct Corners {
-    exact::Point of[3];
-  };
-  Corners corners(bool of_b, std::uint32_t number, std::uint32_t t) {
-    const MeshBlock& block = (of_b ? *search_.b : *search_.a).blocks[number];
-    const PlacedVertices& vertices = placed_.vertices(of_b, number);
-    Corners out;
-    for (int c = 0; c < 3; ++c) {
-      const std::uint32_t v = block.corner[c][t];
-      out.of[c] = {vertices.at[0][v], vertices.at[1][v], vertices.at[2][v]};
-    }
-    return out;
-  }
-
   /// visit(A's block, its triangle, B's block, some of its triangles): until it returns true, of
   /// blocks that are marked as near, or of pairs that are kept, those whose boxes meet.
   template <class Visit>

@@ -4,7 +4,9 @@
 
 #include "query/base/budget.h"
 #include "query/base/relative_pose.h"
+#include "query/lod/coincident.h"
 #include "query/lod/level_chain.h"
+#include "query/lod/wanted_error.h"
 
 namespace ist {
 
@@ -24,6 +26,13 @@ class LargestPart {
 using ExactMeasure = Penetration (*)(const PlacedAsset& a, const PlacedAsset& b,
                                      const PenetrationSettings& settings, const RelativePose& pose,
                                      Workspace& workspace) noexcept;
+
+/// Whether other levels than the finest have a say in matched spheres' answer.
+inline bool asks_levels(const PlacedAsset& a, const PlacedAsset& b,
+                        const PenetrationSettings& settings) noexcept {
+  return settings.pair_budget > 0 || by_error(settings) ||
+         are_one_asset(a.asset.header(), b.asset.header());
+}
 
 /// The penetration from levels of detail. Under a wanted error they and the exact measure are
 /// blended by what they err (WantedError), under a pair budget by what they need (LevelChain), and
