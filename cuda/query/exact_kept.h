@@ -15,11 +15,14 @@
 
 namespace ist::gpu {
 
+/// Steps that a margin is made for: the fewer, the less is kept, and the more is searched.
+constexpr double kMostKeptSteps = 6, kLeastKeptSteps = 1.5;
+
 /// Whether what is kept of pair i holds at this place, or is to be made anew. Once a call.
 IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const MeshTree& a,
                                 const MeshTree& b, const Similarity& now) {
   // As the CPU's KeptRing: margins of so many steps, within parts of a triangle's side.
-  constexpr double kSteps = 6, kLeastSteps = 1.5, kLeast = 0.05, kMost = 0.3;
+  constexpr double kLeast = 0.05, kMost = 0.3;
   KeptHead& head = kept.head(i);
   const bool known =
       head.mesh[0] == a.hash && head.mesh[1] == b.hash && head.last.scale == now.scale;
@@ -29,6 +32,7 @@ IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const Me
     head.mesh[0] = a.hash;
     head.mesh[1] = b.hash;
     head.rest = 0;
+    head.steps = kMostKeptSteps;
     head.state = KeptState::none;
     return;
   }
@@ -48,8 +52,8 @@ IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const Me
   const double side = 0.5 * std::fmin(1 / std::sqrt(static_cast<double>(a.level[0].count)),
                                       now.scale / std::sqrt(static_cast<double>(b.level[0].count)));
   const double length = step.shift + step.turn * radius;
-  const double margin = std::fmin(std::fmax(kSteps * length, kLeast * side), kMost * side);
-  if (!(margin >= kLeastSteps * length)) return;
+  const double margin = std::fmin(std::fmax(head.steps * length, kLeast * side), kMost * side);
+  if (!(margin >= kLeastKeptSteps * length)) return;
   const double steps = length > 0 ? margin / length : 0;
   head.margin = {std::fmax(steps * step.shift, 0.25 * margin),
                  std::fmin(std::fmax(steps * step.turn, 0.25 * margin / radius), 0.5)};
@@ -114,14 +118,14 @@ class KeptWriter {
     const std::uint32_t at =
         blocks + static_cast<std::uint32_t>(team_.exclusive_count(fresh, more));
     const std::uint32_t blocks_then = blocks + static_cast<std::uint32_t>(more);
-    if (2 * blocks_then + triangles + count > list_.room) return false;
+    if (!list_.hold(blocks_then, triangles + count)) return false;
     if (fresh) {
       list_.blocks(at)[0] = block_a;
       list_.blocks(at)[1] = block_b;
     }
     if (has)
-      list_.triangles(triangles + lane) =
-          256 * (fresh ? at : at - 1) + kWidth * (a % kWidth) + b % kWidth;
+      list_.triangles(triangles + lane) = static_cast<std::uint16_t>(
+          256 * (fresh ? at : at - 1) + kWidth * (a % kWidth) + b % kWidth);
     blocks = blocks_then;
     triangles += count;
     last_[0] = team_.broadcast(block_a, static_cast<int>(count) - 1);
@@ -157,7 +161,10 @@ IST_HD void keep_query(const Team& team, const ExactArrays& batch, const ExactKe
   head.blocks = list.blocks;
   head.triangles = list.triangles;
   head.state = all ? KeptState::holds : KeptState::none;
-  head.rest = all ? 0 : kRest;
+  head.steps = all ? std::fmin(1.1 * head.steps, kMostKeptSteps) : 0.5 * head.steps;
+  if (head.steps >= kLeastKeptSteps) return;
+  head.rest = kRest;
+  head.steps = kMostKeptSteps;
 }
 
 /// Finds what ExactSearch does, in its order, among what is kept.
@@ -188,12 +195,12 @@ class KeptSearch {
       team_.sync();
       for (int total = Team::kWidth; total == Team::kWidth;) {
         const std::uint32_t n = next + lane;
-        const std::uint32_t word = n < triangles_ ? list_.triangles(n) : ~0u;
-        const bool here = word / 256 < first + kBatch;
-        const std::uint32_t slot = here ? word / 256 - first : 0;
-        const std::uint32_t* const blocks = list_.blocks(first + slot);
-        const std::uint32_t a = kWidth * blocks[0] + word / kWidth % kWidth,
-                            b = kWidth * blocks[1] + word % kWidth;
+        const std::uint32_t name = n < triangles_ ? list_.triangles(n) : 0u;
+        const std::uint32_t slot = (name / 256 - first) % 256;
+        const bool here = n < triangles_ && slot < kBatch;
+        const std::uint32_t* const blocks = list_.blocks(here ? first + slot : first);
+        const std::uint32_t a = kWidth * blocks[0] + name / kWidth % kWidth,
+                            b = kWidth * blocks[1] + name % kWidth;
         const bool waits = here && (found >> slot & 1) != 0 && triangles_meet(a, b, box(slot));
         team_.exclusive_count(here, total);
         next += static_cast<std::uint32_t>(total);

@@ -41,20 +41,29 @@ struct KeptHead {
   Similarity last;        ///< B in A in the last call
   Similarity found_at;    ///< when the list was made
   KeptMotion margin;      ///< that it may have moved since
+  double steps;           ///< that the next margin is made for
   KeptState state;
-  std::uint32_t rest;       ///< calls that make no list, after one that had no room
+  std::uint32_t rest;       ///< calls that make no list, after lists that had no room
   std::uint32_t blocks;     ///< pairs of blocks
   std::uint32_t triangles;  ///< of theirs
 };
 
-/// Pairs of blocks from the first word on, two words each; pairs of triangles from the last on
-/// backwards: 256 · the pair of blocks' place + 16 · A's lane + B's.
+/// Pairs of blocks from the front on, two words each; their pairs of triangles from the end on
+/// backwards, two bytes each: 256 · the place of the pair of blocks modulo 256 + 16 · A's lane +
+/// B's. Each pair of blocks has some.
 struct KeptList {
-  std::uint32_t* words;
-  std::uint32_t room;
+  std::byte* memory;
+  std::uint32_t bytes;
 
-  IST_HD std::uint32_t* blocks(std::uint32_t n) const { return words + std::size_t{2} * n; }
-  IST_HD std::uint32_t& triangles(std::uint32_t n) const { return words[room - 1 - n]; }
+  IST_HD std::uint32_t* blocks(std::uint32_t n) const {
+    return reinterpret_cast<std::uint32_t*>(memory) + std::size_t{2} * n;
+  }
+  IST_HD std::uint16_t& triangles(std::uint32_t n) const {
+    return reinterpret_cast<std::uint16_t*>(memory)[bytes / 2 - 1 - n];
+  }
+  IST_HD bool hold(std::uint32_t block_pairs, std::uint32_t triangle_pairs) const {
+    return 8 * std::uint64_t{block_pairs} + 2 * std::uint64_t{triangle_pairs} <= bytes;
+  }
 };
 
 /// Of a round, in turn.
@@ -74,8 +83,8 @@ struct ExactKept {
     return *reinterpret_cast<KeptHead*>(memory + std::size_t{bytes} * i);
   }
   IST_HD KeptList list_of(std::uint32_t i) const {
-    return {reinterpret_cast<std::uint32_t*>(&head(i) + 1),
-            static_cast<std::uint32_t>((bytes - sizeof(KeptHead)) / 4)};
+    return {reinterpret_cast<std::byte*>(&head(i) + 1),
+            bytes - static_cast<std::uint32_t>(sizeof(KeptHead))};
   }
   IST_HD KeptRound& round(std::uint32_t n) const { return rounds[n % 2]; }
 };

@@ -73,13 +73,13 @@ class GpuWorkspace {
 };
 
 /// What exact batches keep of each pair from call to call, in device memory: triangles that are
-/// near each other, so that a pair that has moved little need not be searched again. For
-/// simulators, which ask about the same pairs step by step. One batch at a time may use it.
+/// near each other, so that a pair that has moved little is not searched again. For simulators,
+/// which ask about the same pairs step by step. One batch at a time may use it.
 class GpuKept {
  public:
-  /// For batches of up to `most_pairs`, by their places in the batch. `bytes_each` [bytes] of
-  /// device memory for a pair, at least 1,024: the pairs of triangles that are near each other take
-  /// 4 each, their blocks 8. A pair with more is searched in each call.
+  /// For batches of up to `most_pairs`. `bytes_each` [bytes] of device memory for a pair, 1,024 to
+  /// 2^24: a pair of triangles that are near each other takes 2, a pair of their blocks 8. Pairs
+  /// that take more are searched in each call.
   ///
   /// Throws Error if the device cannot be used or has no memory left.
   explicit GpuKept(std::size_t most_pairs, std::size_t bytes_each = 8192,
@@ -108,11 +108,12 @@ struct GpuPenetrationSettings {
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
   /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
   std::uint32_t pair_budget = 0;
-  /// Exact measure only: what is kept of pair i of the last batch serves pair i of this one while
-  /// the solids are the same and have moved little against each other: by no more than 0.3 of a
-  /// triangle's side since they were searched. Else they are searched, and where their steps are
-  /// short what is near is kept anew. Pairs may be exchanged at will. Answers are the same bits as
-  /// without it, but for node_visits, which is 0 where nothing was searched. Null: nothing is kept.
+  /// Exact measure only. What is kept of pair i of the last batch serves pair i of this one while
+  /// the solids are the same and have moved little against each other since they were searched: by
+  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and what is near is kept
+  /// anew if it has room and steps are short. Solids and poses may change at will: answers have the
+  /// bits that they have without it, but for node_visits, which is 0 where nothing was searched.
+  /// Null: nothing is kept.
   GpuKept* kept = nullptr;
 };
 
