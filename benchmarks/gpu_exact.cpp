@@ -281,7 +281,7 @@ bool measure(Report& report) {
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
   right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
           right;
-  for (const double by : {1e-4, 1e-3, 3e-3}) {
+  for (const double by : {1e-4, 3e-4, 1e-3}) {
     for (const char* name : {"0.01 to 0.1 %", "0.1 to 1 %", "1 to 10 %"})
       right = ask_motion(report, name, two, classes.at(name), many / 20, by) && right;
     right = ask_motion(report, "engaged", thread, engaged, many / 20, by) && right;

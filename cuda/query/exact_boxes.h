@@ -175,9 +175,9 @@ class ExactBoxes {
     farthest += moved;
     if constexpr (kAhead) farthest += 2 * ahead;
     out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
+    // What is apart by more stays so, and doubles tell: floats need not.
     if constexpr (kAhead)
-      out.margin() =
-          4 * out.margin() +
+      out.margin() +=
           1.00001f * ahead * std::sqrt(n.x[0] * n.x[0] + n.x[1] * n.x[1] + n.x[2] * n.x[2]);
   }
 
