@@ -13,7 +13,9 @@
 #include "gpu_many.h"
 #include "mesh/samples/samples.h"
 #include "report.h"
+#include "support/answer_bits.h"
 #include "support/device_batch.h"
+#include "support/exact_pair.h"
 
 namespace {
 
@@ -135,6 +137,85 @@ bool ask(Report& report, const char* table, const std::string& name, const Solid
   return worst < 1e-11 && unanswered == 0 && otherwise == 0;
 }
 
+/// Reports the rate of pairs of which B moves and turns at each call by so much of its size, forth
+/// and back, beside that from scratch; false where their bits differ.
+bool ask_motion(Report& report, const std::string& name, const Solids& solids,
+                const std::vector<BatchPair>& some, std::size_t count, double by) {
+  if (some.empty()) return true;
+  constexpr int kSteps = 12;
+  constexpr std::size_t kBytesEach = 8192;
+  std::vector<BatchPair> pairs = drawn(some, count);
+  std::mt19937_64 random(11);
+  const auto direction = [&] {
+    Eigen::Vector3d x;
+    do
+      for (int k = 0; k < 3; ++k) x[k] = static_cast<double>(random() >> 11) * 0x1p-52 - 1;
+    while (!(x.norm() > 0.1 && x.norm() < 1));
+    return Eigen::Vector3d(x.normalized());
+  };
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> speed;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d moves = direction();
+    speed.emplace_back(moves, direction());
+  }
+  const GpuSolids on_device(solids.views());
+  GpuWorkspace workspace(count);
+  GpuKept kept(count, kBytesEach);
+  std::vector<std::unique_ptr<DeviceBatch>> steps;
+  for (int step = 0; step < kSteps; ++step) {
+    steps.push_back(std::make_unique<DeviceBatch>(pairs));
+    for (std::size_t i = 0; i < count; ++i) {
+      BatchPair& pair = pairs[i];
+      const double size = testing::size_of({solids.assets[pair.b]->view(), {}, pair.scale_b});
+      const double* const q = pair.pose_b.q;
+      const Eigen::Quaterniond turned = Eigen::Quaterniond(Eigen::AngleAxisd(by, speed[i].second)) *
+                                        Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized();
+      pair.pose_b.q[0] = turned.w();
+      for (int k = 0; k < 3; ++k) {
+        pair.pose_b.q[k + 1] = turned.vec()[k];
+        pair.pose_b.t[k] += by * size * speed[i].first[k];
+      }
+    }
+  }
+  // There and back: no jump from the last step to the first.
+  const auto ms = [&](GpuKept* keeps) {
+    return device_ms([&](cudaStream_t stream) {
+             for (int n = 0; n < 2 * kSteps - 2; ++n) {
+               const DeviceBatch& batch = *steps[n < kSteps ? n : 2 * kSteps - 2 - n];
+               penetration_batch(on_device, batch.pairs(), {Measure::exact, 0, keeps}, workspace,
+                                 batch.answers(), stream);
+             }
+           }) /
+           (2 * kSteps - 2);
+  };
+  const auto hash = [&](std::size_t& searched) {
+    testing::AnswerBits bits;
+    for (const auto& batch : steps)
+      for (Penetration answer : batch->get()) {
+        searched += answer.node_visits != 0;
+        answer.node_visits = 0;
+        bits.add(answer);
+      }
+    return bits.value();
+  };
+  std::size_t all = 0, searched = 0;
+  const double scratch_ms = ms(nullptr);
+  const std::uint64_t expected = hash(all);
+  const double kept_ms = ms(&kept);
+  const bool same = hash(searched) == expected;
+  const double pairs_a_call = static_cast<double>(count) * 1e-3;
+  report.row("Motions", {{"poses", name},
+                         {"moved a call, of the size", by},
+                         {"pairs", count},
+                         {"from scratch, M/s", pairs_a_call / scratch_ms},
+                         {"kept, M/s", pairs_a_call / kept_ms},
+                         {"kept over from scratch", scratch_ms / kept_ms},
+                         {"searched", static_cast<double>(searched) / static_cast<double>(all)},
+                         {"bytes a pair", kept.bytes() / count},
+                         {"same bits", same}});
+  return same;
+}
+
 /// Star-shaped bodies of some triangles, none convex, each beside its neighbours in a packed bed.
 TriangleMesh small_body(std::size_t triangles, unsigned seed) {
   std::mt19937_64 random(seed);
@@ -200,6 +281,13 @@ bool measure(Report& report) {
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
   right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
           right;
+  for (const double by : {1e-4, 3e-4, 1e-3}) {
+    for (const char* name : {"0.01 to 0.1 %", "0.1 to 1 %", "1 to 10 %"})
+      right = ask_motion(report, name, two, classes.at(name), many / 20, by) && right;
+    right = ask_motion(report, "engaged", thread, engaged, many / 20, by) && right;
+    right =
+        ask_motion(report, "in clearance", thread, clear_nut_poses(400), many / 20, by) && right;
+  }
   // Mated parts, as they are and all together.
   const MatedParts mated(mesh_of, [](const ist::testing::MatedRow& row) {
     return row.name + (row.moved == 0 ? ", in place" : row.moved < 1e-2 ? ", near" : ", moved");

@@ -4,6 +4,7 @@
 #include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
+#include "cuda/query/exact_kept.h"
 #include "cuda/query/exact_steps.h"
 #include "cuda/query/kernels.h"
 
@@ -16,29 +17,61 @@ constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kWholeWarps = 2;  ///< of kernels that need more memory each
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 // A multiprocessor; more leave too few registers.
-constexpr int kSearchBlocks = 6, kSumBlocks = 4, kExactBlocks = 2, kWholeBlocks = 4,
-              kTouchBlocks = 5;
+constexpr int kSearchBlocks = 6, kKeepBlocks = 5, kSumBlocks = 4, kExactBlocks = 2,
+              kWholeBlocks = 4, kTouchBlocks = 5;
 
-/// Lists pairs whose boxes meet.
-__global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays batch) {
+/// Lists pairs whose boxes meet: sift(i).
+template <class Sift>
+__device__ void sift_pairs(const ExactArrays& batch, const Sift& sift) {
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kThreadsEach + threadIdx.x;
-  const bool asks = i < batch.pairs.count && sift_exact(batch, static_cast<std::uint32_t>(i));
+  const bool asks = i < batch.pairs.count && sift(static_cast<std::uint32_t>(i));
   const std::uint32_t place = append(team, asks, &batch.counters->listed[0]);
   if (asks) batch.list[0][place] = static_cast<std::uint32_t>(i);
 }
-
-/// Begins the n-th round.
+__global__ void __launch_bounds__(kThreadsEach) sift_meshes(const ExactArrays batch) {
+  sift_pairs(batch, [&](std::uint32_t i) { return sift_exact(batch, i); });
+}
 __global__ void __launch_bounds__(kThreadsEach)
-    place_meshes(const ExactArrays batch, const std::uint32_t n) {
+    sift_kept_meshes(const ExactArrays batch, const ExactKept kept) {
+  sift_pairs(batch, [&](std::uint32_t i) { return sift_kept(batch, kept, i); });
+}
+
+/// Begins the n-th round; then placed(k).
+template <class Placed>
+__device__ void place_round(const ExactArrays& batch, const std::uint32_t n, const Placed& placed) {
   const std::uint32_t first = end_of(round_of(batch, n + 1));
   const std::uint32_t k = blockIdx.x * kThreadsEach + threadIdx.x, count = pairs_from(batch, first);
   if (k == 0) round_of(batch, n) = {first, count, 0, 0, 0, 0, 0, 0, 0, 0};
-  if (k < count) place_query(batch, k, first + k);
+  if (k >= count) return;
+  place_query(batch, k, first + k);
+  placed(k);
+}
+__global__ void __launch_bounds__(kThreadsEach)
+    place_meshes(const ExactArrays batch, const std::uint32_t n) {
+  place_round(batch, n, [](std::uint32_t) {});
+}
+__global__ void __launch_bounds__(kThreadsEach)
+    place_kept_meshes(const ExactArrays batch, const ExactKept kept, const std::uint32_t n) {
+  if (blockIdx.x == 0 && threadIdx.x == 0) kept.round(n + 1) = {};
+  place_round(batch, n, [&](std::uint32_t k) { list_fresh(batch, kept, n, k); });
 }
 
-__global__ void __launch_bounds__(kThreads, kSearchBlocks)
-    search_meshes(const ExactArrays batch, const std::uint32_t n) {
+__global__ void __launch_bounds__(kThreads, kKeepBlocks)
+    keep_meshes(const ExactArrays batch, const ExactKept kept, const std::uint32_t n) {
+  __shared__ Raw<ExactAheadPair, kWarps> pair;
+  __shared__ Raw<ExactSearchMemory, kWarps> memory;
+  const unsigned warp = threadIdx.x / 32;
+  KeptRound& round = kept.round(n);
+  by_warps(round.fresh, &round.taken, [&](const WarpTeam& team, std::uint32_t k) {
+    keep_query(team, batch, kept, kept.list[k], pair[warp], memory[warp]);
+  });
+}
+
+/// Calls search(team, round, k, pair, memory) for a round's queries.
+template <class Search>
+__device__ void search_round(const ExactArrays& batch, const std::uint32_t n,
+                             const Search& search) {
   __shared__ Raw<ExactPair, kWarps> pair;
   __shared__ Raw<ExactSearchMemory, kWarps> memory;
   const unsigned warp = threadIdx.x / 32;
@@ -47,10 +80,25 @@ __global__ void __launch_bounds__(kThreads, kSearchBlocks)
   by_warps(
       round.count, &round.searched,
       [&](const WarpTeam& team, std::uint32_t k) {
-        search_query(team, batch, round, k, pair[warp], memory[warp]);
+        search(team, round, k, pair[warp], memory[warp]);
         before = 0;
       },
       [&] { return goes_on(batch, n, before); });
+}
+__global__ void __launch_bounds__(kThreads, kSearchBlocks)
+    search_meshes(const ExactArrays batch, const std::uint32_t n) {
+  search_round(
+      batch, n,
+      [&](const WarpTeam& team, ExactRound& round, std::uint32_t k, ExactPair& pair,
+          ExactSearchMemory& memory) { search_query(team, batch, round, k, pair, memory); });
+}
+__global__ void __launch_bounds__(kThreads, kKeepBlocks)
+    search_kept_meshes(const ExactArrays batch, const ExactKept kept, const std::uint32_t n) {
+  search_round(batch, n,
+               [&](const WarpTeam& team, ExactRound& round, std::uint32_t k, ExactPair& pair,
+                   ExactSearchMemory& memory) {
+                 search_kept_query(team, batch, kept, round, k, pair, memory);
+               });
 }
 
 template <bool kExactly>
@@ -110,6 +158,7 @@ unsigned blocks_with_room(const ExactArrays& batch, int pass, std::size_t bytes,
 void find_exact_grids(Grids& grids) {
   grids.exact = {
       blocks_at_a_time(search_meshes, kThreads),
+      {blocks_at_a_time(keep_meshes, kThreads), blocks_at_a_time(search_kept_meshes, kThreads)},
       {blocks_at_a_time(sum_meshes<false>, kThreads), blocks_at_a_time(sum_meshes<true>, kThreads)},
       blocks_at_a_time(touch_meshes, kWholeThreads),
       blocks_at_a_time(ask_meshes, kWholeThreads)};
@@ -127,9 +176,16 @@ std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs) {
   return (std::min(teams, most_pairs) + kWarps) * (exact_room(0) + kUsualMesh);
 }
 
-void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream) {
+void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& grids,
+                  cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(ExactCounters), stream), "starting a batch");
-  sift_meshes<<<blocks_for(batch.pairs.count, kThreadsEach), kThreadsEach, 0, stream>>>(batch);
+  const unsigned all = blocks_for(batch.pairs.count, kThreadsEach);
+  if (kept == nullptr) {
+    sift_meshes<<<all, kThreadsEach, 0, stream>>>(batch);
+  } else {
+    check(cudaMemsetAsync(kept->rounds, 0, 2 * sizeof(KeptRound), stream), "starting a batch");
+    sift_kept_meshes<<<all, kThreadsEach, 0, stream>>>(batch, *kept);
+  }
   check_launch("sifting pairs of meshes");
   // Of many pairs rounds of 8,192 that keep some 30 chunks each; of few some of a quarter.
   constexpr std::uint64_t kLeast = 1 << 13, kFew = 1 << 11;
@@ -141,9 +197,20 @@ void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t str
       blocks_with_room(batch, 0, batch.bytes - static_cast<std::size_t>(batch.rooms - batch.memory),
                        kWarps, grids.exact.sum[0]);
   for (std::uint32_t n = 0; n < rounds; ++n) {
-    place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
-    check_launch("placing meshes");
-    search_meshes<<<blocks_of(batch, kWarps, grids.exact.search), kThreads, 0, stream>>>(batch, n);
+    if (kept == nullptr) {
+      place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
+      check_launch("placing meshes");
+      search_meshes<<<blocks_of(batch, kWarps, grids.exact.search), kThreads, 0, stream>>>(batch,
+                                                                                           n);
+    } else {
+      place_kept_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, *kept, n);
+      check_launch("placing meshes");
+      keep_meshes<<<blocks_of(batch, kWarps, grids.exact.kept[0]), kThreads, 0, stream>>>(batch,
+                                                                                          *kept, n);
+      check_launch("keeping triangles");
+      search_kept_meshes<<<blocks_of(batch, kWarps, grids.exact.kept[1]), kThreads, 0, stream>>>(
+          batch, *kept, n);
+    }
     check_launch("searching meshes");
     sum_meshes<false><<<sums, kThreads, 0, stream>>>(batch, n);
     check_launch("summing meshes");

@@ -5,6 +5,7 @@
 
 #include "base/team.h"
 #include "cuda/base/atomics.h"
+#include "cuda/query/exact_boxes.h"
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/exact_pair.h"
 
@@ -102,24 +103,78 @@ IST_HD void sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
   append(team, memory.pool, memory.near, apart == Apart::certain && !again, pair[0], pair[1]);
 }
 
+/// Pairs of triangles that wait until a team's width of them can be sifted, in the order in which
+/// they come.
+template <class Team>
+class WaitingTriangles {
+ public:
+  IST_HD WaitingTriangles(const Team& team, ExactSearchMemory& memory)
+      : team_(team), memory_(memory) {}
+
+  /// Each of a lane that has one, 16 · block + lane.
+  IST_HD void add(bool waits, std::uint32_t a, std::uint32_t b) {
+    int total = 0;
+    const auto before = static_cast<std::uint32_t>(team_.exclusive_count(waits, total));
+    if (waits) {
+      std::uint32_t(&slot)[2] = memory_.queue[(head_ + count_ + before) % kExactWaiting];
+      slot[0] = a;
+      slot[1] = b;
+    }
+    count_ += static_cast<std::uint32_t>(total);
+    team_.sync();
+  }
+
+  IST_HD bool is_empty() const { return count_ == 0; }
+  IST_HD bool is_full() const { return count_ >= kBatch; }
+
+  /// Calls sift(first, count) of the next that wait.
+  template <class Sift>
+  IST_HD bool sift_next(const Sift& sift) {
+    const std::uint32_t count = count_ < kBatch ? count_ : kBatch, first = head_;
+    head_ = (head_ + count) % kExactWaiting;
+    count_ -= count;
+    return sift(first, count);
+  }
+
+ private:
+  static constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
+  static_assert(kExactWaiting >= 2 * kBatch);
+
+  const Team& team_;
+  ExactSearchMemory& memory_;
+  std::uint32_t head_ = 0, count_ = 0;
+};
+
+/// Nothing is sifted yet.
+template <class Team>
+IST_HD void begin_sifting(const Team& team, ExactSearchMemory& memory, const ExactPool& pool) {
+  if (team.lane() != 0) return;
+  memory.pool = pool;
+  memory.crossing = memory.near = {};
+  memory.last_near[0] = memory.last_near[1] = ~0u;
+}
+
 /// Pairs of triangles of both meshes that may cross. Both trees are opened together, depth first;
 /// of pairs of blocks whose boxes and slabs meet the pairs of triangles whose boxes meet, and that
 /// no plane keeps apart in floats, wait until a team's width of them can be sifted.
-template <class Team>
+template <class Team, class Pair = ExactPair>
 class ExactSearch {
  public:
   /// `waiting`: room for pairs of nodes.
-  IST_HD ExactSearch(const Team& team, const ExactPair& pair, ExactSearchMemory& memory,
+  IST_HD ExactSearch(const Team& team, const Pair& pair, ExactSearchMemory& memory,
                      std::uint64_t* waiting, std::uint32_t most_waiting, const ExactPool& pool)
-      : team_(team), pair_(pair), memory_(memory), waiting_(waiting), most_waiting_(most_waiting) {
+      : team_(team),
+        pair_(pair),
+        boxes_(pair),
+        memory_(memory),
+        queue_(team, memory),
+        waiting_(waiting),
+        most_waiting_(most_waiting) {
     for (auto k = static_cast<std::uint32_t>(team_.lane()); k <= kWidth; k += kBatch)
       memory_.inverse[k] = k == 0 ? 0 : (0xFFFFu + k) / k;
-    if (team_.lane() == 0) {
-      memory_.pool = pool;
-      memory_.crossing = memory_.near = {};
-      memory_.last_near[0] = memory_.last_near[1] = ~0u;
+    begin_sifting(team_, memory_, pool);
+    if (team_.lane() == 0)
       waiting_[0] = pair_of(MeshNode::at(pair_.mesh[0].top, 0), MeshNode::at(pair_.mesh[1].top, 0));
-    }
   }
 
   /// Calls sift(first, count) of pairs of triangles that wait. False where that says so, or where
@@ -135,20 +190,20 @@ class ExactSearch {
         const int met = meet_triangles(static_cast<int>(left % 256), static_cast<int>(left / 256));
         for (int first = 0; first < met; first += Team::kWidth) {
           test_planes(first, met);
-          if (queued_ >= kBatch && !sift_next(sift)) return false;
+          if (queue_.is_full() && !queue_.sift_next(sift)) return false;
         }
       }
     }
-    return queued_ == 0 || sift_next(sift);
+    return queue_.is_empty() || queue_.sift_next(sift);
   }
 
   std::uint32_t visits = 0;  ///< pairs of nodes opened
 
  private:
-  static constexpr float kError = 4e-7f;  ///< relative, of a few operations
+  using Boxes = ExactBoxes<Pair>;
+  using Box = typename Boxes::Box;
   static constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
   static constexpr int kBoth = 2 * static_cast<int>(kWidth);
-  static_assert(kExactWaiting >= 2 * kBatch);
 
   IST_HD static std::uint64_t pair_of(MeshNode a, MeshNode b) {
     return std::uint64_t{a.word} << 32 | b.word;
@@ -171,13 +226,7 @@ class ExactSearch {
     node_[1] = {static_cast<std::uint32_t>(waiting)};
     ++visits;
     const int level[2] = {node_[0].level(), node_[1].level()};
-    // Nodes tile a surface: squares of their sizes, times both counts.
-    const auto scale = static_cast<float>(pair_.place.a_from_b.scale);
-    const float size[2] = {static_cast<float>(pair_.mesh[1].level[level[1]].count),
-                           scale * scale * static_cast<float>(pair_.mesh[0].level[level[0]].count)};
-    constexpr float kAlone = kOpenedAlone * kOpenedAlone;
-    opens_[0] = level[0] > 0 && (level[1] == 0 || size[1] <= kAlone * size[0]);
-    opens_[1] = level[1] > 0 && (level[0] == 0 || size[0] <= kAlone * size[1]);
+    boxes_.open(node_, opens_);
     team_.sync();
     int of_a = 0, of_b = 0;
     for (int first = 0; first < kBoth; first += Team::kWidth) {
@@ -186,7 +235,7 @@ class ExactSearch {
       Box box = {};
       const bool meets = place_child(side, l, box);
       const int at = listed(meets, side, of_a, of_b);
-      if (meets) keep(side, l, box, memory_.boxes[side][at]);
+      if (meets) boxes_.keep(side, child_of(side, l), l, box, memory_.boxes[side][at]);
     }
     team_.sync();
     found_ = 0;
@@ -198,7 +247,7 @@ class ExactSearch {
       const int k = first + team_.lane();
       const std::uint32_t i = k < pairs ? of.row(static_cast<std::uint32_t>(k)) : 0,
                           j = k < pairs ? static_cast<std::uint32_t>(k) - i * of.columns : 0;
-      const bool meets = k < pairs && meet(memory_.boxes[0][i], memory_.boxes[1][j]);
+      const bool meets = k < pairs && boxes_.meet(memory_.boxes[0][i], memory_.boxes[1][j]);
       int total = 0;
       const auto before = static_cast<std::uint32_t>(team_.exclusive_count(meets, total));
       if (leaves) {
@@ -222,39 +271,6 @@ class ExactSearch {
                : of;
   }
 
-  /// A node's box in its own frame and, with what rounding does, in the other's.
-  struct Box {
-    float low[3], high[3], other_low[3], other_high[3];
-  };
-  IST_HD void place(int side, int level, std::uint32_t n, Box& box) const {
-    const MeshTree& mesh = pair_.mesh[side];
-    if (level == mesh.top) {
-      for (int k = 0; k < 3; ++k) box.low[k] = mesh.low[k], box.high[k] = mesh.high[k];
-    } else {
-      const BoxBlock& from = in_global_memory(mesh.level[level + 1].boxes)[n / kWidth];
-      for (int k = 0; k < 3; ++k) {
-        box.low[k] = from.low[k][n % kWidth];
-        box.high[k] = from.high[k][n % kWidth];
-      }
-    }
-    float middle[3], half[3];
-    for (int k = 0; k < 3; ++k) {
-      middle[k] = 0.5f * (box.low[k] + box.high[k]);
-      half[k] = 0.5f * (box.high[k] - box.low[k]);
-    }
-    const float pad = pair_.pad[side];
-    for (int k = 0; k < 3; ++k) {
-      const Quad m = pair_.row[side][k];
-      const float c = std::fma(m.x[0], middle[0],
-                               std::fma(m.x[1], middle[1], std::fma(m.x[2], middle[2], m.x[3])));
-      const float h = std::fma(std::abs(m.x[0]), half[0],
-                               std::fma(std::abs(m.x[1]), half[1], std::abs(m.x[2]) * half[2]));
-      const float around = std::fma(1 + kError, h, pad);
-      box.other_low[k] = c - around;
-      box.other_high[k] = c + around;
-    }
-  }
-
   /// Place of a lane's item in the list of its side, of which there are so many before.
   IST_HD int listed(bool adds, int side, int& of_a, int& of_b) const {
     int more_a = 0, more_b = 0;
@@ -272,82 +288,14 @@ class ExactSearch {
   /// Of a side's node the l-th child, or the node alone as the first; whether there is one, and
   /// its box meets that of the other side's node.
   IST_HD bool place_child(int side, std::uint32_t l, Box& box) const {
-    const MeshNode node = child_of(side, l), other = node_of(1 - side);
+    const MeshNode node = child_of(side, l);
     if (opened(side) ? node.number() >= pair_.mesh[side].level[node.level()].count : l > 0)
       return false;
-    Box by;
-    place(side, node.level(), node.number(), box);
-    place(1 - side, other.level(), other.number(), by);
-    const float reach = pair_.reach[side], by_reach = pair_.reach[1 - side];
-    bool meets = true;
-    for (int k = 0; k < 3; ++k) {
-      box.low[k] -= reach;
-      box.high[k] += reach;
-      meets = meets && box.low[k] <= by.other_high[k] && box.high[k] >= by.other_low[k] &&
-              by.low[k] - by_reach <= box.other_high[k] &&
-              by.high[k] + by_reach >= box.other_low[k];
-    }
-    return meets;
+    return boxes_.place_child(side, node, node_of(1 - side), box);
   }
   IST_HD MeshNode child_of(int side, std::uint32_t l) const {
     const MeshNode node = node_of(side);
     return opened(side) ? MeshNode::at(node.level() - 1, kWidth * node.number() + l) : node;
-  }
-
-  IST_HD void keep(int side, std::uint32_t l, const Box& box, ExactBox& out) const {
-    const MeshNode node = child_of(side, l);
-    const int level = node.level();
-    const std::uint32_t n = node.number();
-    float normal[3] = {0, 0, 0}, low = -kFar, high = kFar;
-    if (level < pair_.mesh[side].top) {
-      const BoxBlock& from = in_global_memory(pair_.mesh[side].level[level + 1].boxes)[n / kWidth];
-      for (int k = 0; k < 3; ++k) normal[k] = from.normal[k][n % kWidth];
-      low = from.slab_low[n % kWidth], high = from.slab_high[n % kWidth];
-    }
-    const auto scale = static_cast<float>(pair_.place.a_from_b.scale);
-    float shift = 0, turned[3], reach[3];
-    for (int k = 0; k < 3; ++k) {
-      const Quad m = pair_.turn[side][k];
-      turned[k] = std::fma(m.x[0], normal[0], std::fma(m.x[1], normal[1], m.x[2] * normal[2]));
-      shift = std::fma(turned[k], pair_.row[1][k].x[3], shift);
-      reach[k] = scale * (std::abs(turned[k]) + kError);
-    }
-    if (side == 1) {
-      for (int k = 0; k < 3; ++k) normal[k] = turned[k];
-      low = scale * low + shift - 2 * pair_.pad[1];
-      high = scale * high + shift + 2 * pair_.pad[1];
-    }
-    out.low = {{box.low[0], box.low[1], box.low[2], low}};
-    out.high = {{box.high[0], box.high[1], box.high[2], high}};
-    out.other_low = {{box.other_low[0], box.other_low[1], box.other_low[2], 0}};
-    out.other_high = {{box.other_high[0], box.other_high[1], box.other_high[2], 0}};
-    out.normal = {{normal[0], normal[1], normal[2], 0}};
-    out.turned = {{reach[0], reach[1], reach[2], 0}};
-    out.lane = l;
-  }
-  static constexpr float kFar = 3e38f;  ///< beyond any slab
-
-  IST_HD bool meet(const ExactBox& a, const ExactBox& b) const {
-    const Quad a_low = a.low, a_high = a.high, b_at = b.other_low, b_to = b.other_high;
-    bool meets = true;
-    for (int k = 0; k < 3; ++k)
-      meets = meets && a_low.x[k] <= b_to.x[k] && a_high.x[k] >= b_at.x[k];
-    if (!meets) return false;
-    const Quad b_low = b.low, b_high = b.high, a_at = a.other_low, a_to = a.other_high;
-    for (int k = 0; k < 3; ++k)
-      meets = meets && b_low.x[k] <= a_to.x[k] && b_high.x[k] >= a_at.x[k];
-    if (!meets) return false;
-    // Whether each reaches into the other's slab.
-    const Quad normal = a.normal, turned = a.turned, normal_b = b.normal;
-    float along = 0, reach = pair_.slack, along_b = 0, reach_b = pair_.slack;
-    for (int k = 0; k < 3; ++k) {
-      along = std::fma(normal.x[k], 0.5f * (b_at.x[k] + b_to.x[k]), along);
-      reach = std::fma(turned.x[k], 0.5f * (b_high.x[k] - b_low.x[k]), reach);
-      along_b = std::fma(normal_b.x[k], 0.5f * (a_low.x[k] + a_high.x[k]), along_b);
-      reach_b = std::fma(std::abs(normal_b.x[k]), 0.5f * (a_high.x[k] - a_low.x[k]), reach_b);
-    }
-    return along - reach <= a_high.x[3] && along + reach >= a_low.x[3] &&
-           along_b - reach_b <= b_high.x[3] && along_b + reach_b >= b_low.x[3];
   }
 
   /// Of two blocks the triangles whose boxes meet that of the other; of A's how many, and
@@ -359,14 +307,7 @@ class ExactSearch {
       const int side = k / static_cast<int>(kWidth), v = k % static_cast<int>(kWidth);
       const FloatBlock& block = float_block(side);
       float at[3] = {block.x[0][v], block.x[1][v], block.x[2][v]};
-      if (side == 1) {
-        const float own[3] = {at[0], at[1], at[2]};
-        for (int axis = 0; axis < 3; ++axis) {
-          const Quad m = pair_.row[1][axis];
-          at[axis] =
-              std::fma(m.x[0], own[0], std::fma(m.x[1], own[1], std::fma(m.x[2], own[2], m.x[3])));
-        }
-      }
+      boxes_.place_vertex(side, at);
       for (int axis = 0; axis < 3; ++axis) memory_.vertices[axis][side][v] = at[axis];
     }
     team_.sync();
@@ -381,7 +322,7 @@ class ExactSearch {
       vertex(side, corners >> 16, r);
       const Quad by_low = side == 0 ? memory_.boxes[1][j].other_low : memory_.boxes[0][i].low,
                  by_high = side == 0 ? memory_.boxes[1][j].other_high : memory_.boxes[0][i].high;
-      const float slack = pair_.slack, wider = side == 0 ? slack : 0;
+      const float slack = boxes_.slack(), wider = side == 0 ? slack : 0;
       ExactTriangle out;
       bool meets = corners >> 24 != 0;
       for (int axis = 0; axis < 3; ++axis) {
@@ -394,7 +335,11 @@ class ExactSearch {
       // Most pairs of blocks end here.
       const std::uint32_t lanes = team_.ballot(meets);
       if (Team::kWidth == kBoth && (lanes >> kWidth == 0 || lanes << kWidth == 0)) break;
-      place_plane(p, q, r, by_low, by_high, out);
+      // A's box keeps how far its points may move, and B's.
+      float ahead = 0;
+      if constexpr (Boxes::kAhead)
+        ahead = side == 0 ? memory_.boxes[1][j].normal.x[3] : memory_.boxes[0][i].normal.x[3];
+      boxes_.place_plane(p, q, r, by_low, by_high, ahead, out);
       out.call(t | corners << 8);
       const int at = listed(meets, side, of_a, of_b);
       if (meets) {
@@ -414,29 +359,6 @@ class ExactSearch {
   /// The vertex of a block that the last byte names.
   IST_HD void vertex(int side, std::uint32_t name, float (&out)[3]) const {
     for (int k = 0; k < 3; ++k) out[k] = memory_.vertices[k][side][name & 0xFF];
-  }
-
-  /// A triangle's plane, for heights of points of a box.
-  IST_HD void place_plane(const float (&p)[3], const float (&q)[3], const float (&r)[3],
-                          const Quad& low, const Quad& high, ExactTriangle& out) const {
-    float u[3], v[3], longest = 0, farthest = 0;
-    for (int k = 0; k < 3; ++k) {
-      u[k] = q[k] - p[k];
-      v[k] = r[k] - p[k];
-      longest = std::fmax(longest, std::fmax(std::abs(u[k]), std::abs(v[k])));
-      farthest = std::fmax(farthest, std::fmax(high.x[k] - p[k], p[k] - low.x[k]));
-    }
-    Quad& n = out.plane;
-    for (int k = 0; k < 3; ++k) {
-      const int l = (k + 1) % 3, m = (k + 2) % 3;
-      n.x[k] = std::fma(u[l], v[m], -(u[m] * v[l]));
-    }
-    n.x[3] = -std::fma(n.x[0], p[0], std::fma(n.x[1], p[1], n.x[2] * p[2]));
-    // What moves points, as in by_plane(), and places them in floats; and what floats round.
-    const float moved = 0.5f * pair_.slack;
-    longest += moved;
-    farthest += moved;
-    out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
   }
 
   /// Their pairs of triangles whose boxes meet: how many.
@@ -469,44 +391,21 @@ class ExactSearch {
     const ExactTriangle &a = memory_.triangles[0][pair / kWidth],
                         &b = memory_.triangles[1][pair % kWidth];
     const bool waits = k < met && !apart_by(a, b.name(), 1) && !apart_by(b, a.name(), 0);
-    int total = 0;
-    const auto before = static_cast<std::uint32_t>(team_.exclusive_count(waits, total));
-    if (waits) {
-      std::uint32_t(&slot)[2] = memory_.queue[(head_ + queued_ + before) % kExactWaiting];
-      slot[0] = kWidth * block_[0] + a.name() % kWidth;
-      slot[1] = kWidth * block_[1] + b.name() % kWidth;
-    }
-    queued_ += static_cast<std::uint32_t>(total);
-    team_.sync();
-  }
-
-  /// The next that wait.
-  template <class Sift>
-  IST_HD bool sift_next(const Sift& sift) {
-    const std::uint32_t count = queued_ < kBatch ? queued_ : kBatch, first = head_;
-    head_ = (head_ + count) % kExactWaiting;
-    queued_ -= count;
-    return sift(first, count);
+    queue_.add(waits, kWidth * block_[0] + a.name() % kWidth,
+               kWidth * block_[1] + b.name() % kWidth);
   }
 
   /// Whether a triangle's plane has another, of a side, on one side for certain.
   IST_HD bool apart_by(const ExactTriangle& plane, std::uint32_t name, int side) const {
-    const Quad n = plane.plane;
-    float least = kFar, most = -kFar;
-    for (int k = 0; k < 3; ++k) {
-      float x[3];
-      vertex(side, name >> (8 + 8 * k), x);
-      const float height =
-          std::fma(n.x[0], x[0], std::fma(n.x[1], x[1], std::fma(n.x[2], x[2], n.x[3])));
-      least = std::fmin(least, height);
-      most = std::fmax(most, height);
-    }
-    return least > plane.margin() || most < -plane.margin();
+    return Boxes::apart_by(plane,
+                           [&](int k, float(&x)[3]) { vertex(side, name >> (8 + 8 * k), x); });
   }
 
   const Team& team_;
-  const ExactPair& pair_;
+  const Pair& pair_;
+  const Boxes boxes_;
   ExactSearchMemory& memory_;
+  WaitingTriangles<Team> queue_;
   std::uint64_t* const waiting_;
   const std::uint32_t most_waiting_;
   MeshNode node_[2] = {};            ///< that are opened
@@ -514,7 +413,6 @@ class ExactSearch {
   std::uint32_t count_ = 1;          ///< that wait
   std::uint32_t found_ = 0;          ///< pairs of blocks
   std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
-  std::uint32_t head_ = 0, queued_ = 0;
 };
 
 }  // namespace ist::gpu

@@ -33,10 +33,9 @@ IST_HD inline bool boxes_meet(const MeshTree& a, const MeshTree& b, const Simila
   return true;
 }
 
-/// Whether pair i is to be asked; else it is answered. One thread a pair.
-IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
+/// Whether pair i is to be asked, and its place; else it is answered. One thread a pair.
+IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i, PairPlace& place) {
   const PairKind kind = kind_of(batch, i);
-  PairPlace place;
   QueryStatus status = QueryStatus::ok;
   if (kind == PairKind::missing)
     status = QueryStatus::invalid_input;
@@ -54,6 +53,11 @@ IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
   }
   write_nothing(batch.answers, i, status);
   return false;
+}
+
+IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
+  PairPlace place;
+  return sift_exact(batch, i, place);
 }
 
 /// What the steps of pair i begin with, once it is placed. One thread a pair.
@@ -253,12 +257,32 @@ IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint3
   return (busy == 0 && chunks == 0) || chunks + std::uint64_t{busy + 1} * each <= batch.pool.room;
 }
 
+/// What a search of the k-th pair of a round has found; `all`: its nodes had room.
+template <class Team>
+IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& round,
+                       std::uint32_t k, const ExactSearchMemory& memory, bool all,
+                       std::uint32_t visits) {
+  if (team.lane() != 0) return;
+  ExactQuery& query = batch.queries[k];
+  const ExactPool& pool = memory.pool;
+  const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
+  query.state = fits ? ExactState::ok : ExactState::no_room;
+  // What others left no chunks for is listed again.
+  if (!fits && round.chunks > batch.pool.room) {
+    query.state = ExactState::later;
+    batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
+  }
+  query.visits = visits;
+  query.crossing = memory.crossing;
+  query.near = memory.near;
+  atomic_add(&round.found, 1);
+}
+
 /// Searches the k-th pair of a round.
 template <class Team>
 IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound& round,
                          std::uint32_t k, ExactPair& pair, ExactSearchMemory& memory) {
-  ExactQuery& query = batch.queries[k];
-  load_query(team, batch, query, pair);
+  load_query(team, batch, batch.queries[k], pair);
   ExactPool pool = batch.pool;
   pool.taken = &round.chunks;
   ExactSearch<Team> search(team, pair, memory, memory.waiting, ExactSearchMemory::kWaiting, pool);
@@ -266,19 +290,7 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
     sift_triangles(team, pair, memory, first, count);
     return true;
   });
-  if (team.lane() == 0) {
-    const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
-    query.state = fits ? ExactState::ok : ExactState::no_room;
-    // What others left no chunks for is listed again.
-    if (!fits && round.chunks > batch.pool.room) {
-      query.state = ExactState::later;
-      batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
-    }
-    query.visits = search.visits;
-    query.crossing = memory.crossing;
-    query.near = memory.near;
-    atomic_add(&round.found, 1);
-  }
+  end_search(team, batch, round, k, memory, all, search.visits);
 }
 
 /// Answers the k-th pair of a round, or of those that doubles do not decide.

@@ -229,6 +229,43 @@ GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 std::size_t GpuWorkspace::bytes() const noexcept { return impl_->memory.bytes(); }
 
+struct GpuKept::Impl {
+  int device = 0;
+  gpu::DeviceBytes memory;
+  gpu::ExactKept arrays{};
+};
+
+GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettings& settings)
+    : impl_(std::make_unique<Impl>()) {
+  gpu::check_gpu(settings.device);
+  if (most_pairs > 0xFFFFFFFFu || bytes_each < 1024 || bytes_each > 1 << 24)
+    throw Error("GPU: what is kept is for up to 2^32 - 1 pairs, with 1,024 to 2^24 bytes each");
+  gpu::Queue queue(settings);
+  gpu::ExactKept& arrays = impl_->arrays;
+  arrays.pairs = static_cast<std::uint32_t>(most_pairs);
+  arrays.bytes = static_cast<std::uint32_t>((bytes_each + 127) / 128 * 128);
+  const auto place = [&](std::byte* from) {
+    gpu::Parts parts(from);
+    arrays.rounds = parts.take<gpu::KeptRound>(2);
+    arrays.list = parts.take<std::uint32_t>(std::min<std::size_t>(most_pairs, kRoomForMeshes));
+    arrays.memory = parts.take<std::byte>(most_pairs * arrays.bytes);
+    return parts.used();
+  };
+  impl_->device = settings.device;
+  impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr));
+  place(impl_->memory.data());
+  gpu::check(cudaMemsetAsync(impl_->memory.data(), 0, impl_->memory.bytes(), queue.stream()),
+             "readying what is kept");
+  queue.wait();
+}
+
+GpuKept::~GpuKept() = default;
+GpuKept::GpuKept(GpuKept&&) noexcept = default;
+GpuKept& GpuKept::operator=(GpuKept&&) noexcept = default;
+
+std::size_t GpuKept::most_pairs() const noexcept { return impl_->arrays.pairs; }
+std::size_t GpuKept::bytes() const noexcept { return impl_->memory.bytes(); }
+
 namespace {
 
 /// What all kinds of batches begin with; throws where a batch cannot be launched.
@@ -263,8 +300,17 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
     batch.most_blocks = solids.impl().most_blocks;
     if (!gpu::has_room(batch))
       throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
+    const gpu::ExactKept* kept = nullptr;
+    if (settings.kept != nullptr) {
+      kept = &settings.kept->impl().arrays;
+      if (pairs.count > kept->pairs)
+        throw Error("GPU: a batch of " + std::to_string(pairs.count) +
+                    " pairs; what is kept is for " + std::to_string(kept->pairs));
+      if (settings.kept->impl().device != room.device)
+        throw Error("GPU: what is kept is on another device than the workspace");
+    }
     const gpu::DeviceGuard guard(room.device);
-    gpu::launch_exact(batch, room.grids, stream);
+    gpu::launch_exact(batch, kept, room.grids, stream);
     return;
   }
   gpu::BatchArrays batch = room.arrays;

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "cuda/query/exact_arrays.h"
+#include "cuda/query/exact_kept_arrays.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
@@ -19,7 +20,8 @@ struct TriangleGrids {
 
 struct ExactGrids {
   int search;
-  int sum[2];  ///< by signs in doubles, by exact ones
+  int kept[2];  ///< that keep what they find, that look among what is kept
+  int sum[2];   ///< by signs in doubles, by exact ones
   int touch, whole;
 };
 
@@ -49,7 +51,9 @@ void find_exact_grids(Grids& grids);
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
-void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream);
+/// `kept`: may be null.
+void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& grids,
+                  cudaStream_t stream);
 /// Whether a batch's memory holds rooms for its largest mesh.
 bool has_room(const ExactArrays& batch);
 /// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.

@@ -72,6 +72,32 @@ class GpuWorkspace {
   std::unique_ptr<Impl> impl_;
 };
 
+/// What exact batches keep of each pair from call to call, in device memory: triangles that are
+/// near each other, so that a pair that has moved little is not searched again. For simulators,
+/// which ask about the same pairs step by step. One batch at a time may use it.
+class GpuKept {
+ public:
+  /// For batches of up to `most_pairs`. `bytes_each` [bytes] of device memory for a pair, 1,024 to
+  /// 2^24: a pair of triangles that are near each other takes 2, a pair of their blocks 8. Pairs
+  /// that take more are searched in each call.
+  ///
+  /// Throws Error if the device cannot be used or has no memory left.
+  explicit GpuKept(std::size_t most_pairs, std::size_t bytes_each = 8192,
+                   const GpuSettings& settings = {});
+  ~GpuKept();
+  GpuKept(GpuKept&&) noexcept;
+  GpuKept& operator=(GpuKept&&) noexcept;
+
+  std::size_t most_pairs() const noexcept;
+  std::size_t bytes() const noexcept;  ///< of device memory
+
+  struct Impl;
+  const Impl& impl() const noexcept { return *impl_; }
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
 /// Settings of a batch, as in PenetrationSettings. There is no relative_error: nothing goes over
 /// from spheres to meshes within a batch.
 struct GpuPenetrationSettings {
@@ -82,6 +108,13 @@ struct GpuPenetrationSettings {
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
   /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
   std::uint32_t pair_budget = 0;
+  /// Exact measure only. What is kept of pair i of the last batch serves pair i of this one while
+  /// the solids are the same and have moved little against each other since they were searched: by
+  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and what is near is kept
+  /// anew if it has room and steps are short. Solids and poses may change at will: answers have the
+  /// bits that they have without it, but for node_visits, which is 0 where nothing was searched.
+  /// Null: nothing is kept.
+  GpuKept* kept = nullptr;
 };
 
 /// answers[i] = penetration(pairs[i]) as a finished sum, of two assets by lenses
@@ -109,8 +142,8 @@ struct GpuPenetrationSettings {
 /// Only launches kernels on `stream`: it allocates nothing and waits for nothing, so a CUDA graph
 /// may capture it.
 ///
-/// Throws Error if a batch is larger than the workspace, if the devices differ, if a mesh is too
-/// large for the workspace (tens of millions of triangles), or if a launch fails.
+/// Throws Error if a batch is larger than the workspace or what is kept, if the devices differ, if
+/// a mesh is too large for the workspace (tens of millions of triangles), or if a launch fails.
 void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream);

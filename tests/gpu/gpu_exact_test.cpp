@@ -86,6 +86,49 @@ TEST_F(GpuExactTest, AGraphMayCaptureThem) {
   cudaGraphDestroy(graph);
 }
 
+/// Steps, in a graph too: bits of a search, but for the counts of nodes.
+TEST_F(GpuExactTest, WhatIsKeptDoesNotShow) {
+  std::vector<BatchPair> pairs = exact_pairs(48, 20'000);
+  for (const BatchPair& pair : aligned_pairs(49, 10'000)) pairs.push_back(pair);
+  const GpuSolids solids(exact_solids());
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  RandomPairs random(50);
+  for (const std::size_t bytes_each : {1024u, 8192u}) {
+    GpuKept kept(pairs.size(), bytes_each);
+    std::size_t held = 0;
+    for (int step = 0; step < 12; ++step) {
+      const DeviceBatch batch(pairs), beside(pairs);
+      cudaGraph_t graph = nullptr;
+      cudaGraphExec_t ready = nullptr;
+      gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
+      penetration_batch(solids, batch.pairs(), {Measure::exact, 0, &kept}, workspace,
+                        batch.answers(), stream);
+      gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
+      gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
+      gpu::check(cudaGraphLaunch(ready, stream), "launching a graph");
+      penetration_batch(solids, beside.pairs(), {Measure::exact}, workspace, beside.answers(),
+                        stream);
+      stream.wait();
+      cudaGraphExecDestroy(ready);
+      cudaGraphDestroy(graph);
+      std::vector<Penetration> found = batch.get(), expected = beside.get();
+      for (std::size_t i = 0; i < pairs.size(); ++i) {
+        held += found[i].node_visits == 0 && expected[i].node_visits != 0;
+        found[i].node_visits = expected[i].node_visits = 0;
+        const double by = std::pow(10.0, -2 - static_cast<double>(i % 5));
+        for (double& t : pairs[i].pose_b.t) t += by * random.uniform(-1, 1);
+        if (i % 2 == 0)
+          for (double& q : pairs[i].pose_b.q) q += by * random.uniform(-1, 1);
+      }
+      expect_same_bits(found, expected);
+      std::swap(pairs[7 * static_cast<std::size_t>(step)], pairs[9000]);
+    }
+    std::printf("%zu of %zu not searched\n", held, 12 * pairs.size());
+    EXPECT_GT(held, pairs.size());
+  }
+}
+
 TEST_F(GpuExactTest, AnswersAreTheCpus) {
   for (const std::vector<BatchPair>& pairs : {exact_pairs(43, 100'000), aligned_pairs(44, 30'000)})
     expect_near(compare_exactly(exact_assets(), pairs, ask_device(exact_solids(), pairs)));

@@ -7,6 +7,7 @@
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/exact_arrays.h"
+#include "cuda/query/exact_kept_arrays.h"
 #include "cuda/query/field_batch.h"
 #include "support/batch_pair.h"
 #include "support/host_solids.h"
@@ -38,6 +39,11 @@ class HostBatch {
   std::uint32_t mesh_room = 50, mesh_chunks = 400;
   std::uint32_t most_rounds = ~0u;
   std::uint32_t rounds = 0;  ///< of the last run
+  // What exact runs keep from one to the next: see GpuKept.
+  std::uint32_t held = 0, fresh = 0;  ///< of the last run: pairs not searched; searched and kept
+
+  /// Of so many pairs from now on.
+  void keep(std::uint32_t most_pairs, std::uint32_t bytes_each);
 
   /// How pairs are cut up in a workspace for so many; for few at first.
   void cut_for(std::size_t most_pairs);
@@ -55,6 +61,8 @@ class HostBatch {
   std::vector<gpu::TriangleQuery> queries_;
   std::vector<gpu::MetPart> parts_;
   std::vector<std::uint32_t> words_;
+  std::vector<std::uint64_t> kept_memory_;
+  gpu::ExactKept kept_ = {};  ///< of no pairs: nothing is kept
 };
 
 }  // namespace ist::testing

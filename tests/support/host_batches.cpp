@@ -7,6 +7,7 @@
 
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/detail_sums.h"
+#include "cuda/query/exact_kept.h"
 #include "cuda/query/exact_steps.h"
 #include "cuda/query/field_steps.h"
 #include "cuda/query/patch_steps.h"
@@ -74,6 +75,12 @@ std::vector<Penetration> HostBatch::run(const std::vector<BatchPair>& pairs, Mea
   return to.rows();
 }
 
+void HostBatch::keep(std::uint32_t most_pairs, std::uint32_t bytes_each) {
+  kept_memory_.assign(most_pairs * std::size_t{bytes_each} / 8, 0);
+  kept_ = {reinterpret_cast<std::byte*>(kept_memory_.data()), most_pairs, bytes_each, nullptr,
+           nullptr};
+}
+
 /// The kernels of exact_kernels.cu.
 void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   gpu::ExactArrays batch = {};
@@ -92,8 +99,18 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   batch.pool = {chunks.data(), next.data(), nullptr, mesh_chunks};
   for (const gpu::SolidRef& solid : solids_.refs())
     batch.most_blocks = std::max(batch.most_blocks, solid.mesh.count);
-  for (std::uint32_t i = 0; i < asked.pairs.count; ++i)
-    if (gpu::sift_exact(batch, i)) lists[0][exact_counters.listed[0]++] = i;
+  gpu::ExactKept kept = kept_;
+  gpu::KeptRound kept_rounds[2] = {};
+  std::vector<std::uint32_t> kept_list(mesh_room);
+  kept.rounds = kept_rounds;
+  kept.list = kept_list.data();
+  if (kept.pairs > 0 && kept.pairs < asked.pairs.count) throw std::logic_error("too few are kept");
+  held = fresh = 0;
+  for (std::uint32_t i = 0; i < asked.pairs.count; ++i) {
+    if (!(kept.pairs > 0 ? gpu::sift_kept(batch, kept, i) : gpu::sift_exact(batch, i))) continue;
+    lists[0][exact_counters.listed[0]++] = i;
+    if (kept.pairs > 0 && kept.head(i).state == gpu::KeptState::holds) ++held;
+  }
   std::vector<std::uint64_t> bytes;
   const auto room = [&](int pass) {
     bytes.assign(batch.bytes_of_team(pass) / 8, ~std::uint64_t{0});
@@ -103,6 +120,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     return of_pass;
   };
   const auto pair = std::make_unique<gpu::ExactPair>();
+  const auto ahead = std::make_unique<gpu::ExactAheadPair>();
   const auto search = std::make_unique<gpu::ExactSearchMemory>();
   const auto sum = std::make_unique<gpu::ExactSumMemory>();
   const auto contact = std::make_unique<gpu::ExactContactMemory>();
@@ -114,10 +132,23 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     gpu::ExactRound& round = gpu::round_of(batch, n);
     const std::uint32_t count = gpu::pairs_from(batch, first);
     round = {first, count, 0, 0, 0, 0, 0, 0, 0, 0};
-    for (std::uint32_t k = 0; k < count; ++k) gpu::place_query(batch, k, first + k);
+    kept.round(n + 1) = {};
+    for (std::uint32_t k = 0; k < count; ++k) {
+      gpu::place_query(batch, k, first + k);
+      if (kept.pairs > 0) gpu::list_fresh(batch, kept, n, k);
+    }
+    for (std::uint32_t k = 0; k < kept.round(n).fresh; ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::keep_query(team, batch, kept, kept.list[k], *ahead, *search);
+        if (team.lane() == 0)
+          fresh += kept.head(batch.queries[kept.list[k]].pair).state == gpu::KeptState::holds;
+      });
     for (; round.searched < count && gpu::goes_on(batch, n, 0); ++round.searched)
       by_team(seed, [&](const auto& team) {
-        gpu::search_query(team, batch, round, round.searched, *pair, *search);
+        if (kept.pairs > 0)
+          gpu::search_kept_query(team, batch, kept, round, round.searched, *pair, *search);
+        else
+          gpu::search_query(team, batch, round, round.searched, *pair, *search);
       });
     const auto sum_all = [&]<bool kExactly>(std::uint32_t all) {
       for (std::uint32_t k = 0; k < all; ++k)

@@ -34,6 +34,16 @@ GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return 0; }
 std::size_t GpuWorkspace::bytes() const noexcept { return 0; }
 
+struct GpuKept::Impl {};
+GpuKept::GpuKept(std::size_t, std::size_t, const GpuSettings& settings) {
+  gpu_info(settings.device);
+}
+GpuKept::~GpuKept() = default;
+GpuKept::GpuKept(GpuKept&&) noexcept = default;
+GpuKept& GpuKept::operator=(GpuKept&&) noexcept = default;
+std::size_t GpuKept::most_pairs() const noexcept { return 0; }
+std::size_t GpuKept::bytes() const noexcept { return 0; }
+
 void penetration_batch(const GpuSolids&, const GpuPairs&, const GpuPenetrationSettings&,
                        GpuWorkspace&, const GpuPenetrations&, CUstream_st*) {
   gpu_info(0);
