@@ -1,0 +1,364 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "query/base/smooth_step.h"
+#include "query/exact/exact_sums.h"
+#include "query/exact/octant_joins.h"
+#include "query/exact/overlap_formulas.h"
+#include "query/exact/overlap_parts.h"
+
+namespace ist {
+
+/// Connected parts of an overlap, divided into the octants around their centroids, on the host and
+/// on a GPU.
+///
+/// Every piece of both surfaces is cut by three planes through the centroid, which add nothing to
+/// cones from there: volumes are exact. Pieces change over where they have no area, so the sums are
+/// continuous in the pose. An octant's gradient is half of what each of the two surfaces has in it.
+/// They agree where a contact is thin. Octants join where they do not. Where a part is thin along
+/// an axis, its octants on both sides of the middle are one, and it is not cut there.
+///
+/// Of `Overlap` it asks besides: map(), A's unit frame from B's; find_octant_pieces(first), pieces()
+/// of eight crossings in its view. All of a team together.
+template <class Overlap>
+class OverlapOctants : public OverlapParts<Overlap> {
+  using Parts = OverlapParts<Overlap>;
+  using Point = exact::Point;
+
+ public:
+  using Parts::Parts;
+
+  /// Divides parts of divide() that are kept, in the frame of A or B: all those for which there is
+  /// room if each patch is to have its share of the volume. Returns how many octants are in
+  /// PartMemory::octants: their names are 8 times the part's, and the octant's number. `near`:
+  /// octants that are not further apart are one.
+  IST_HD std::uint32_t split(std::uint32_t parts, bool by_b, double near,
+                             std::uint32_t room) noexcept {
+    const Similarity& map = this->map();
+    for (int k = 0; k < 3; ++k)
+      axis_[k] = by_b ? (1 / map.scale) * Point{map.m[k], map.m[3 + k], map.m[6 + k]}
+                      : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
+    const double least = this->whole().volume() / static_cast<double>(room);
+    meet();
+    if (leads()) pieces().any = begin_octants(parts, least) && find_planes(parts, near);
+    meet();
+    if (pieces().any) sum_octants();
+    return leads() ? write_all(parts, least, near) : 0;
+  }
+
+ private:
+  using Parts::leads;
+  using Parts::meet;
+  using Parts::memory;
+  using Parts::mesh;
+  using Parts::pieces;
+
+  /// A point seen from a part's centroid, in the axes of the octants.
+  struct Corner {
+    double at[3];
+    int octant;
+
+    IST_HD Point point() const noexcept { return {at[0], at[1], at[2]}; }
+  };
+
+  /// Whether there are parts to divide.
+  IST_HD bool begin_octants(std::uint32_t parts, double least) noexcept {
+    std::uint32_t slots = 0;
+    for (std::uint32_t p = 0; p < parts; ++p) {
+      ExactPart& part = memory().parts[p];
+      if (part.kept != p || part.id == 0 || !(part.sums.volume() > least) ||
+          slots == PartMemory::kMostSplit)
+        continue;
+      part.slot = slots++;
+      OctantSums* const octants = &memory().octant_sums[8 * part.slot];
+      for (int i = 0; i < 8; ++i) octants[i] = OctantSums{};
+      octants->centre = part.sums.moment / (24 * part.sums.volume());
+    }
+    return slots > 0;
+  }
+
+  IST_HD std::uint32_t write_all(std::uint32_t parts, double least, double near) noexcept {
+    std::uint32_t count = 0;
+    for (std::uint32_t p = 0; p < parts; ++p) {
+      const ExactPart& part = memory().parts[p];
+      if (part.kept != p) continue;
+      const std::uint32_t first = count;
+      if (part.slot != kNoIndex)
+        count = write_octants(part, octants::falls(part.sums.volume(), least), near, count);
+      if (count > first) continue;
+      ExactPart& whole = memory().octants[count] = part;
+      whole.id *= 8;
+      whole.kept = count++;
+    }
+    return count;
+  }
+
+  IST_HD Point in_axes(const Point& x) const noexcept {
+    return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
+  }
+
+  IST_HD Corner corner(const OctantSums* octants, const Point& x) const noexcept {
+    const Point from = in_axes(x - octants->centre);
+    Corner out = {{from.x, from.y, from.z}, 0};
+    for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
+    out.octant &= octants->planes;
+    return out;
+  }
+
+  /// Where a side goes through a plane, on the side of `from`.
+  IST_HD static Corner between(const Corner& from, const Corner& to, int plane) noexcept {
+    const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
+    Corner out = {{0, 0, 0}, from.octant};
+    for (int k = 0; k < 3; ++k) {
+      if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
+      // What has both ends on one side stays there, whatever rounding does.
+      const int bit = 1 << k;
+      if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
+        out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
+    }
+    return out;
+  }
+
+  /// A piece that no plane before `kPlane` cuts.
+  template <int kPlane = 0>
+  IST_HD_COLD static void add_triangle(OctantSums* octants, bool of_b, double times,
+                                       const Corner& p, const Corner& q, const Corner& r) noexcept {
+    const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
+    if (unlike == 0) {
+      octants::add(octants[p.octant], of_b,
+                   exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(),
+                                       r.point()));
+      return;
+    }
+    if constexpr (kPlane < 3) {
+      constexpr int kBit = 1 << kPlane;
+      if ((unlike & kBit) == 0) {
+        add_triangle<kPlane + 1>(octants, of_b, times, p, q, r);
+        return;
+      }
+      // One corner is alone on its side.
+      const Corner* const corners[3] = {&p, &q, &r};
+      const int alone = ((q.octant ^ r.octant) & kBit) == 0   ? 0
+                        : ((p.octant ^ r.octant) & kBit) == 0 ? 1
+                                                              : 2;
+      const Corner &lone = *corners[alone], &next = *corners[(alone + 1) % 3],
+                   &other = *corners[(alone + 2) % 3];
+      Corner to_next = between(lone, next, kPlane), to_other = between(lone, other, kPlane);
+      add_triangle<kPlane + 1>(octants, of_b, times, lone, to_next, to_other);
+      to_next.octant ^= kBit;
+      to_other.octant ^= kBit;
+      add_triangle<kPlane + 1>(octants, of_b, times, to_next, next, other);
+      add_triangle<kPlane + 1>(octants, of_b, times, to_next, other, to_other);
+    }
+  }
+
+  /// Those of a crossing. Most lie in one octant.
+  IST_HD static void add_pieces(const OctantPieces& pieces, std::uint32_t lane,
+                                OctantSums* octants) noexcept {
+    int octant[6], all = 7, any = 0;
+    for (int c = 0; c < 6; ++c) {
+      octant[c] = pieces.octant[c][lane] & octants->planes;
+      all &= octant[c];
+      any |= octant[c];
+    }
+    const auto lanes = [&](const double(&of)[3][8]) -> Point {
+      return {of[0][lane], of[1][lane], of[2][lane]};
+    };
+    if (all == any) {
+      OctantSums& sums = octants[all];
+      sums.six_volumes += pieces.sum_six_volumes[lane];
+      sums.moment = sums.moment + lanes(pieces.sum_moment);
+      for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + lanes(pieces.sum_area[s]);
+      sums.torque = sums.torque + lanes(pieces.sum_torque);
+      return;
+    }
+    for (int t = 0; t < OctantPieces::kTriangles; ++t) {
+      if (pieces.times[t][lane] == 0) continue;
+      const bool of_b = pieces.of_b[t][lane] != 0;
+      const int c[3] = {pieces.corner(t, 0, lane), pieces.corner(t, 1, lane),
+                        pieces.corner(t, 2, lane)};
+      if (octant[c[0]] == octant[c[1]] && octant[c[0]] == octant[c[2]]) {
+        octants::add(octants[octant[c[0]]], of_b,
+                     {pieces.six_volumes[t][lane], lanes(pieces.moment[t]), lanes(pieces.area[t]),
+                      lanes(pieces.torque[t])});
+        continue;
+      }
+      const auto at = [&](int k) -> Corner {
+        const double(&x)[3][8] = pieces.at[c[k]];
+        return {{x[0][lane], x[1][lane], x[2][lane]}, octant[c[k]]};
+      };
+      add_triangle(octants, of_b, pieces.times[t][lane], at(0), at(1), at(2));
+    }
+  }
+
+  IST_HD OctantSums* octants_of(std::uint32_t element) noexcept {
+    const ExactPart& part = memory().parts[this->part_of(element)];
+    const std::uint32_t slot = memory().parts[part.kept].slot;
+    return slot == kNoIndex ? nullptr : &memory().octant_sums[8 * slot];
+  }
+
+  /// The boxes of parts, and the planes that cut them: those across which octants are not one
+  /// anyway. Whether there are any.
+  IST_HD bool find_planes(std::uint32_t parts, double near) noexcept {
+    const auto reach = [&](OctantSums& sums, const Point& x) {
+      const Point from = in_axes(x - sums.centre);
+      for (int k = 0; k < 3; ++k) {
+        if (from[k] < sums.low[k]) sums.low[k] = from[k];
+        if (from[k] > sums.high[k]) sums.high[k] = from[k];
+      }
+    };
+    // The surface between its curves may reach further than these.
+    for (std::uint32_t i = 0; i < this->crossings(); ++i)
+      if (OctantSums* const sums = octants_of(i)) reach(*sums, this->place_of(i, 0));
+    for (int side = 0; side < 2; ++side) {
+      this->for_each_pierced(side, [&](std::uint32_t b) {
+        const std::uint32_t r = this->record_of(side, b);
+        for_each_bit(this->inside_of(r), [&](std::uint32_t v) {
+          if (OctantSums* const sums = octants_of(this->vertex_element(r, v)))
+            reach(*sums, this->at(r, v));
+        });
+      });
+      this->for_each_inside(side, [&](std::uint32_t b) {
+        OctantSums* const sums = octants_of(this->block_element(side, b));
+        if (sums == nullptr || octants::is_large(*sums, near)) return;
+        const MeshBlock& block = mesh(side).blocks[b];
+        for (std::uint32_t v = 0; v < block.vertices; ++v)
+          reach(*sums, this->vertex(side, block.vertex[v]));
+      });
+    }
+    bool any = false;
+    for (std::uint32_t p = 0; p < parts; ++p) {
+      ExactPart& part = memory().parts[p];
+      if (part.slot == kNoIndex) continue;
+      OctantSums& sums = memory().octant_sums[8 * part.slot];
+      sums.planes = octants::planes_of(sums, near);
+      if (sums.planes == 0) part.slot = kNoIndex;
+      any = any || sums.planes != 0;
+    }
+    return any;
+  }
+
+  /// The pieces that parts are summed of: see ExactTerms.
+  IST_HD void sum_octants() noexcept {
+    meet();
+    OctantView& view = pieces().view;
+    if (leads()) {
+      view.origin = this->origin();
+      for (int k = 0; k < 3; ++k) view.axis[k] = axis_[k];
+    }
+    for (std::uint32_t first = 0; first < this->crossings(); first += 8) {
+      const std::uint32_t left = this->crossings() - first, count = left < 8 ? left : 8;
+      OctantSums* octants[8] = {};
+      if (leads()) {
+        pieces().any = false;
+        for (std::uint32_t l = 0; l < count; ++l) {
+          octants[l] = octants_of(first + l);
+          if (octants[l] == nullptr) continue;
+          pieces().any = true;
+          for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
+        }
+      }
+      meet();
+      if (pieces().any) this->find_octant_pieces(first);
+      for (std::uint32_t l = 0; l < count; ++l)
+        if (octants[l] != nullptr) add_pieces(pieces().octants, l, octants[l]);
+      meet();
+    }
+    for (int side = 0; leads() && side < 2; ++side) {
+      this->for_each_pierced(side, [&](std::uint32_t b) {
+        const std::uint32_t r = this->record_of(side, b);
+        for (std::uint32_t t = 0; t < mesh(side).blocks[b].triangles; ++t) {
+          const int whole = this->whole_of(r, t);
+          const std::uint32_t element = whole == 0 ? kNoIndex : this->triangle_element(r, t);
+          if (element == kNoIndex) continue;
+          OctantSums* const octants = octants_of(element);
+          if (octants == nullptr) continue;
+          // From the apex on.
+          const std::uint32_t opposite = this->opposite_edge(r, t);
+          const auto at = [&](std::uint32_t k) {
+            return corner(octants,
+                          this->at(r, mesh(side).blocks[b].corner[(opposite + 2 + k) % 3][t]));
+          };
+          add_triangle(octants, side == 1, whole, at(0), at(1), at(2));
+        }
+      });
+      this->for_each_inside(side, [&](std::uint32_t b) {
+        if (OctantSums* const octants = octants_of(this->block_element(side, b)))
+          sum_block(side, b, octants);
+      });
+    }
+  }
+
+  /// A block inside as a whole: by its integrals if it lies in one octant.
+  IST_HD void sum_block(int side, std::uint32_t b, OctantSums* octants) noexcept {
+    const MeshBlock& block = mesh(side).blocks[b];
+    Corner at[kWidth];
+    int all = 7, any = 0;
+    for (std::uint32_t v = 0; v < block.vertices; ++v) {
+      at[v] = corner(octants, this->vertex(side, block.vertex[v]));
+      all &= at[v].octant;
+      any |= at[v].octant;
+    }
+    if (all == any) {
+      const LaneSums found = this->lane_sums(side, b, octants->centre);
+      OctantSums& sums = octants[all];
+      sums.six_volumes += found.six_volumes;
+      sums.moment = sums.moment + in_axes(found.moment);
+      sums.area[side] = sums.area[side] + in_axes(found.normal);
+      sums.torque = sums.torque + (side == 1 ? 0.5 : -0.5) * in_axes(found.torque);
+      return;
+    }
+    for (std::uint32_t t = 0; t < block.triangles; ++t)
+      add_triangle(octants, side == 1, 1, at[block.corner[0][t]], at[block.corner[1][t]],
+                   at[block.corner[2][t]]);
+  }
+
+  /// Appends the octants of a part. Returns how many are written then: `first` if they are not
+  /// those of the part, as where rounding is more than what it has.
+  IST_HD std::uint32_t write_octants(const ExactPart& part, double small, double near,
+                                     std::uint32_t first) noexcept {
+    const auto in_frame = [&](const Point& v) {
+      return v.x * axis_[0] + (v.y * axis_[1] + v.z * axis_[2]);
+    };
+    OctantSums* const sums = &memory().octant_sums[8 * part.slot];
+    const Point centre = sums->centre;
+    const double smallness = octants::smallness(*sums, near);
+    octants::join(sums, near, small < smallness ? smallness : small);
+    ExactSums missing = part.sums;  // but for rounding nothing
+    const double volume = part.sums.volume();
+    double areas = 0;
+    std::uint32_t count = first, largest = first;
+    for (std::uint32_t i = 0; i < 8; ++i) {
+      const OctantSums& octant = sums[i];
+      if (!(octant.six_volumes > octants::kRounding * (6 * volume))) continue;
+      ExactPart& found = memory().octants[count] = ExactPart{};
+      found.id = 8 * part.id + i;
+      found.kept = count;
+      found.sums.six_volumes.add(octant.six_volumes);
+      found.sums.moment = in_frame(octant.moment) + (4 * octant.six_volumes) * centre;
+      found.sums.force = in_frame(0.5 * (octant.area[1] - octant.area[0]));
+      found.sums.torque = in_frame(octant.torque) + cross(centre, found.sums.force);
+      missing.six_volumes.add(-octant.six_volumes);
+      missing.moment = missing.moment - found.sums.moment;
+      missing.force = missing.force - found.sums.force;
+      missing.torque = missing.torque - found.sums.torque;
+      areas += octants::both_areas(octant);
+      if (octant.six_volumes > 6 * memory().octants[largest].sums.volume()) largest = count;
+      ++count;
+    }
+    const double size = std::sqrt(areas) + norm(centre), rounding = 100 * octants::kRounding;
+    if (!(std::abs(missing.volume()) <= rounding * volume &&
+          norm(missing.moment) <= 24 * rounding * (volume * size) &&
+          norm(missing.force) <= rounding * areas &&
+          norm(missing.torque) <= rounding * (areas * size)))
+      return first;
+    memory().octants[largest].sums.add(missing);
+    return count;
+  }
+
+  Point axis_[3] = {};
+};
+
+}  // namespace ist
