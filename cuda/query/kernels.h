@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "cuda/query/exact_arrays.h"
+#include "cuda/query/exact_patches.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
@@ -21,6 +21,7 @@ struct ExactGrids {
   int search;
   int sum[2];  ///< by signs in doubles, by exact ones
   int touch, whole;
+  int divide;  ///< into patches
 };
 
 struct MeshGapGrids {
@@ -46,12 +47,15 @@ void find_separation_grids(Grids& grids);
 void find_patch_grids(Grids& grids);
 void find_field_grids(Grids& grids);
 void find_exact_grids(Grids& grids);
+void find_exact_patch_grids(Grids& grids);
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
 void launch_exact(const ExactArrays& batch, const Grids& grids, cudaStream_t stream);
+void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cudaStream_t stream);
 /// Whether a batch's memory holds rooms for its largest mesh.
 bool has_room(const ExactArrays& batch);
+bool has_room(const ExactPatchArrays& batch);
 /// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.
 std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs);
 /// `has_spheres`: some solids have no mesh; `has_meshes`: some have one.

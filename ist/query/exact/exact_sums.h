@@ -88,7 +88,7 @@ struct PartMemory {
   std::uint32_t* middles;            ///< of an edge of a crossed block
   ExactPart *parts, *octants;
   OctantSums* octant_sums;
-  std::uint32_t most_parts;  ///< fewer than kMostParts: it may not hold all
+  std::uint32_t most_parts;
 };
 
 /// What eight pieces of the boundary add to the sums of an overlap, a lane each.
@@ -125,7 +125,7 @@ struct alignas(64) OctantPieces {
 /// Where octants are seen from: the axes, and for each lane the centre of its part, from the origin
 /// of the sums.
 struct alignas(64) OctantView {
-  double centre[3][8] = {};
+  double centre[3][8];
   exact::Point origin, axis[3];
 };
 
@@ -136,10 +136,8 @@ struct PieceMemory {
     OctantPieces octants;
   };
   OctantView view;
-  bool any;                  ///< of the eight crossings is to be divided
-  std::int8_t whole[kWidth]; ///< how often the cone over a triangle's edge counts
-
-  IST_HD PieceMemory() {}
+  std::int8_t whole[kWidth];  ///< how often the cone over a triangle's edge counts
+  bool says;                  ///< what the lane that leads tells the others
 };
 
 /// Adds lane l of terms.

@@ -20,8 +20,8 @@ namespace ist {
 /// They agree where a contact is thin. Octants join where they do not. Where a part is thin along
 /// an axis, its octants on both sides of the middle are one, and it is not cut there.
 ///
-/// Of `Overlap` it asks besides: map(), A's unit frame from B's; find_octant_pieces(first), pieces()
-/// of eight crossings in its view. All of a team together.
+/// Of `Overlap` it asks besides: map(), A's unit frame from B's; find_octant_pieces(first),
+/// pieces() of eight crossings in its view. All of a team together.
 template <class Overlap>
 class OverlapOctants : public OverlapParts<Overlap> {
   using Parts = OverlapParts<Overlap>;
@@ -42,9 +42,9 @@ class OverlapOctants : public OverlapParts<Overlap> {
                       : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
     const double least = this->whole().volume() / static_cast<double>(room);
     meet();
-    if (leads()) pieces().any = begin_octants(parts, least) && find_planes(parts, near);
+    if (leads()) pieces().says = begin_octants(parts, least) && find_planes(parts, near);
     meet();
-    if (pieces().any) sum_octants();
+    if (pieces().says) sum_octants();
     return leads() ? write_all(parts, least, near) : 0;
   }
 
@@ -246,22 +246,25 @@ class OverlapOctants : public OverlapParts<Overlap> {
     OctantView& view = pieces().view;
     if (leads()) {
       view.origin = this->origin();
-      for (int k = 0; k < 3; ++k) view.axis[k] = axis_[k];
+      for (int k = 0; k < 3; ++k) {
+        view.axis[k] = axis_[k];
+        for (double& x : view.centre[k]) x = 0;
+      }
     }
     for (std::uint32_t first = 0; first < this->crossings(); first += 8) {
       const std::uint32_t left = this->crossings() - first, count = left < 8 ? left : 8;
       OctantSums* octants[8] = {};
       if (leads()) {
-        pieces().any = false;
+        pieces().says = false;
         for (std::uint32_t l = 0; l < count; ++l) {
           octants[l] = octants_of(first + l);
           if (octants[l] == nullptr) continue;
-          pieces().any = true;
+          pieces().says = true;
           for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
         }
       }
       meet();
-      if (pieces().any) this->find_octant_pieces(first);
+      if (pieces().says) this->find_octant_pieces(first);
       for (std::uint32_t l = 0; l < count; ++l)
         if (octants[l] != nullptr) add_pieces(pieces().octants, l, octants[l]);
       meet();

@@ -55,7 +55,8 @@ IST_HD void heap_sort(T* items, std::uint32_t count, const Less& less) {
 /// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
 /// - crossings(), triangle(side, i), end_of(i, e), way_of(i, e), place_of(i, e): crossings in the
 ///   order of the meshes; an end's share of the way along its edge, and its place from the origin
-/// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks, those
+/// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks,
+/// those
 ///   of a side among these numbers
 /// - block_of(r), inside_of(r), pierced_of(r), opposite_edge(r, triangle), at(r, vertex)
 /// - is_inside(side, block), is_pierced(side, block), for_each_inside(side, visit),
@@ -146,9 +147,9 @@ class OverlapParts : public Overlap {
   /// Sums them.
   IST_HD std::uint32_t finish() noexcept {
     meet();
-    if (leads()) pieces().any = one_ && this->whole().volume() > 0;
+    if (leads()) pieces().says = one_ && this->whole().volume() > 0;
     meet();
-    if (!pieces().any)
+    if (!pieces().says)
       sum_parts();
     else if (leads())
       memory().parts[0].sums = this->whole();
@@ -168,8 +169,6 @@ class OverlapParts : public Overlap {
         memory().parts[part] = {};
         memory().parts[part].kept = part;
         ++parts_;
-      } else {
-        full_ = true;
       }
     }
     return known = part;
@@ -195,9 +194,8 @@ class OverlapParts : public Overlap {
   }
 
   std::uint32_t parts_ = 0;
-  bool one_ = false;       ///< all that counts is in one part
-  bool by_names_ = true;   ///< what hangs together follows from names of crossings and their ends
-  bool full_ = false;      ///< there are more parts than the memory holds
+  bool one_ = false;      ///< all that counts is in one part
+  bool by_names_ = true;  ///< what hangs together follows from names of crossings and their ends
 
  private:
   /// Of an end in the list of its edge, above the number of the next.
