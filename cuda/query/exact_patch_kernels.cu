@@ -42,7 +42,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach)
 }  // namespace
 
 void find_exact_patch_grids(Grids& grids) {
-  grids.exact.divide = blocks_at_a_time(divide_meshes, kThreads);
+  grids.divide_meshes = blocks_at_a_time(divide_meshes, kThreads);
 }
 
 bool has_room(const ExactPatchArrays& batch) {
@@ -57,7 +57,7 @@ void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cud
   for (int pass = kFirstPatchPass; pass < kExactPasses; ++pass) {
     const std::size_t fit = batch.bytes / (kWarps * batch.bytes_of_team(pass));
     const auto most = static_cast<std::size_t>(
-        std::min(blocks_for(batch.pairs.count, kWarps), static_cast<unsigned>(grids.exact.divide)));
+        std::min(blocks_for(batch.pairs.count, kWarps), static_cast<unsigned>(grids.divide_meshes)));
     divide_meshes<<<static_cast<unsigned>(std::clamp(fit, std::size_t{1}, most)), kThreads, 0,
                     stream>>>(batch, pass);
     check_launch("dividing contacts of meshes into patches");

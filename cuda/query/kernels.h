@@ -21,7 +21,6 @@ struct ExactGrids {
   int search;
   int sum[2];  ///< by signs in doubles, by exact ones
   int touch, whole;
-  int divide;  ///< into patches
 };
 
 struct MeshGapGrids {
@@ -36,6 +35,7 @@ struct Grids {
   int search[2];     ///< of separations, in float and in double
   MeshGapGrids mesh_gaps;
   int divide;            ///< of contact patches
+  int divide_meshes;     ///< of contact patches by Measure::exact
   int smooth;            ///< of trees in smooth fields
   TriangleGrids facets;  ///< of trees in boxes and terrains
   ExactGrids exact;

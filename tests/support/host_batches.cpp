@@ -307,8 +307,7 @@ void HostPatches::divide_exactly(const gpu::SolidPairs& asked, const GpuContactP
     batch.memory = reinterpret_cast<std::byte*>(bytes.data());
     const gpu::ExactRoom room = batch.room(pass, 0);
     gpu::PartRoom parts = batch.part_room(pass, 0);
-    if (pass == gpu::kFirstPatchPass)
-      parts.end = parts.at + std::min(parts.end - parts.at, part_bytes);
+    parts.end = parts.at + std::min(parts.end - parts.at, part_bytes[pass]);
     gpu::clear_marks(SerialTeam(), room);
     for (std::uint32_t k = 0; k < exact_counters.listed[pass]; ++k)
       by_team(seed, [&](const auto& team) {

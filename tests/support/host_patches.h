@@ -24,8 +24,9 @@ class HostPatches {
                                std::uint32_t most, unsigned seed = 0);
 
   // Of Measure::exact:
-  gpu::ExactCounters exact_counters;        ///< of the last run
-  std::ptrdiff_t part_bytes = PTRDIFF_MAX;  ///< of the first pass's room, at most
+  gpu::ExactCounters exact_counters;  ///< of the last run
+  /// [bytes] of a pass's room for parts, at most.
+  std::ptrdiff_t part_bytes[gpu::kExactPasses] = {0, PTRDIFF_MAX, PTRDIFF_MAX};
 
  private:
   void divide_exactly(const gpu::SolidPairs& asked, const GpuContactPatches& patches,
