@@ -153,7 +153,10 @@ class OverlapRef {
  protected:
   IST_HD const PartMemory& memory() const { return memory_; }
   IST_HD bool leads() const { return team_.lane() == 0; }
+  IST_HD std::uint32_t lane() const { return static_cast<std::uint32_t>(team_.lane()); }
+  IST_HD static constexpr std::uint32_t width() { return static_cast<std::uint32_t>(Team::kWidth); }
   IST_HD void meet() const { team_.sync(); }
+  IST_HD bool any(bool flag) const { return team_.any(flag); }
   IST_HD const MeshTree& mesh(int side) const { return pair_.mesh[side]; }
   IST_HD PieceMemory& pieces() { return pieces_; }
   IST_HD const Similarity& map() const { return pair_.place.a_from_b; }
@@ -236,8 +239,7 @@ class OverlapRef {
   }
   IST_HD void count_triangles(std::uint32_t r) {
     const MeshBlock& block = mesh(side_of(r)).blocks[number_of(r)];
-    for (auto t = static_cast<std::uint32_t>(team_.lane()); t < kWidth;
-         t += static_cast<std::uint32_t>(Team::kWidth))
+    for (std::uint32_t t = lane(); t < kWidth; t += width())
       pieces_.whole[t] = static_cast<std::int8_t>(t < block.triangles ? whole_of(r, t) : 0);
     meet();
   }
@@ -264,9 +266,7 @@ class OverlapRef {
   /// work(l) of the eight lanes that pieces have.
   template <class Work>
   IST_HD void for_each_lane(const Work& work) {
-    for (auto l = static_cast<std::uint32_t>(team_.lane()); l < 8;
-         l += static_cast<std::uint32_t>(Team::kWidth))
-      work(l);
+    for (std::uint32_t l = lane(); l < 8; l += width()) work(l);
     meet();
   }
   IST_HD void put(const exact::PieceTerms& terms, int volumes, std::uint32_t l) {
@@ -361,16 +361,13 @@ class OverlapRef {
   /// No fewer than vertices inside of the crossed blocks of a side.
   IST_HD std::uint32_t inside_vertices() const {
     int mine = 0;
-    for (auto r = static_cast<std::uint32_t>(team_.lane()); r < records_;
-         r += static_cast<std::uint32_t>(Team::kWidth))
-      mine += count_bits(inside_of(r));
+    for (std::uint32_t r = lane(); r < records_; r += width()) mine += count_bits(inside_of(r));
     return static_cast<std::uint32_t>(team_.sum(mine));
   }
 
   /// As the CPU finds crossings: by the blocks, then by the triangles in them.
   IST_HD void sort(std::uint32_t places) {
-    for (auto i = static_cast<std::uint32_t>(team_.lane()); i < places;
-         i += static_cast<std::uint32_t>(Team::kWidth)) {
+    for (std::uint32_t i = lane(); i < places; i += width()) {
       std::uint64_t key = ~std::uint64_t{0};
       if (i < crossings_) {
         const std::uint32_t a = crossing_[i].triangle[0], b = crossing_[i].triangle[1];
@@ -383,8 +380,7 @@ class OverlapRef {
 
   /// Of each triangle of a crossed block the edge that is opposite to its apex.
   IST_HD void find_apexes() {
-    for (auto n = static_cast<std::uint32_t>(team_.lane()); n < kWidth * records_;
-         n += static_cast<std::uint32_t>(Team::kWidth)) {
+    for (std::uint32_t n = lane(); n < kWidth * records_; n += width()) {
       const std::uint32_t r = n / kWidth, t = n % kWidth;
       const MeshBlock& block = mesh(side_of(r)).blocks[number_of(r)];
       const auto far = [&](int k) { return exact::length_bound(at(r, block.corner[k][t])); };
@@ -397,9 +393,10 @@ class OverlapRef {
   /// The whole's sums in the CPU's order.
   IST_HD void sum_whole() {
     if (leads()) *slots_ = SlotSums();
+    meet();
     for (std::uint32_t first = 0; first < crossings_; first += 8) {
       find_crossing_terms(first);
-      if (leads()) slots_->add_crossings(pieces_.terms);
+      for (std::uint32_t l = lane(); l < 8; l += width()) slots_->add_crossing(pieces_.terms, l);
       meet();
     }
     for (int side = 0; side < 2; ++side) {
@@ -407,7 +404,8 @@ class OverlapRef {
         count_triangles(record_of(side, b));
         for (std::uint32_t h = 0; h < 2; ++h) {
           find_triangle_terms(record_of(side, b), h);
-          if (leads()) slots_->add_triangles(pieces_.terms);
+          for (std::uint32_t l = lane(); l < 8; l += width())
+            slots_->add_triangle(pieces_.terms, l);
           meet();
         }
       });

@@ -56,8 +56,8 @@ void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cud
   check_launch("sifting pairs of meshes");
   for (int pass = kFirstPatchPass; pass < kExactPasses; ++pass) {
     const std::size_t fit = batch.bytes / (kWarps * batch.bytes_of_team(pass));
-    const auto most = static_cast<std::size_t>(
-        std::min(blocks_for(batch.pairs.count, kWarps), static_cast<unsigned>(grids.divide_meshes)));
+    const auto most = static_cast<std::size_t>(std::min(
+        blocks_for(batch.pairs.count, kWarps), static_cast<unsigned>(grids.divide_meshes)));
     divide_meshes<<<static_cast<unsigned>(std::clamp(fit, std::size_t{1}, most)), kThreads, 0,
                     stream>>>(batch, pass);
     check_launch("dividing contacts of meshes into patches");

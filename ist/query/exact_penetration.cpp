@@ -148,9 +148,8 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
       const bool by_b = volume_of(b) <= volume_of(a);
       const PlacedAsset& smaller = by_b ? b : a;
       const double radius = smaller.scale * smaller.asset.header().ball_radius / pose->unit_a;
-      parts = {scratch.octants.get(),
-               query.split(static_cast<std::uint32_t>(parts.size()), by_b, kNearOctants * radius,
-                           room)};
+      parts = {scratch.octants.get(), query.split(static_cast<std::uint32_t>(parts.size()), by_b,
+                                                  kNearOctants * radius, room)};
       keep(true);
     } else if (divides) {
       for (ExactPart& part : parts) part.id *= 8;

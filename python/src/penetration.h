@@ -20,8 +20,8 @@ namespace ist::python {
 inline constexpr std::pair<const char*, Measure> kMeasures[] = {
     {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
 /// Of the spheres of an asset.
-inline constexpr std::pair<const char*, Measure> kSphereMeasures[] = {
-    {"matched", Measure::matched}, {"inner", Measure::inner}};
+inline constexpr std::pair<const char*, Measure> kSphereMeasures[] = {{"matched", Measure::matched},
+                                                                      {"inner", Measure::inner}};
 
 /// Keywords that penetrations and contact patches share.
 ContactSettings contact_settings(const std::string& measure, bool spheres_only,

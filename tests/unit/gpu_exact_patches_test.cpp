@@ -104,9 +104,9 @@ TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
   const MatedBatch mated(64, 6);
   std::vector<BatchPair> pairs = exact_pairs(65, 30);
   for (const BatchPair& pair : aligned_pairs(66, 30)) pairs.push_back(pair);
-  for (const auto& [assets, asked] : {std::pair(&exact_assets(), &std::as_const(pairs)),
-                                      std::pair(&mated.assets, &mated.pairs),
-                                      std::pair(&many.assets, &many.pairs)}) {
+  for (const auto& [assets, asked] :
+       {std::pair(&exact_assets(), &std::as_const(pairs)), std::pair(&mated.assets, &mated.pairs),
+        std::pair(&many.assets, &many.pairs)}) {
     HostPatches batch(views_of(*assets));
     const std::vector<PatchedPair> expected = batch.run(*asked, Measure::exact, 8, 1);
     expect_near(compare_patches(*assets, *asked, expected, 8));
@@ -117,8 +117,7 @@ TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
 /// The whole is that of a batch of penetrations; without patches it is all that is asked.
 TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
   const std::vector<BatchPair> pairs = aligned_pairs(67, 200);
-  const std::vector<Penetration> expected =
-      HostBatch(exact_solids()).run(pairs, Measure::exact);
+  const std::vector<Penetration> expected = HostBatch(exact_solids()).run(pairs, Measure::exact);
   for (const std::uint32_t most : {0u, 4u}) {
     std::vector<Penetration> wholes;
     for (const PatchedPair& pair : HostPatches(exact_solids()).run(pairs, Measure::exact, most)) {

@@ -15,7 +15,10 @@ class MeshOverlap : public ExactQuery {
 
  protected:
   static constexpr bool leads() noexcept { return true; }
+  static constexpr std::uint32_t lane() noexcept { return 0; }
+  static constexpr std::uint32_t width() noexcept { return 1; }
   static void meet() noexcept {}
+  static bool any(bool flag) noexcept { return flag; }
 
   const MeshTree& mesh(int side) const noexcept { return sides_[side].mesh; }
   const PartMemory& memory() const noexcept { return memory_; }

@@ -289,9 +289,10 @@ struct ExactScratch {
   BlockMarks a, b;
 
   PartMemory part_memory() noexcept {
-    return {ends.get(),    curves.get(), keys.get(),    other_keys.get(), parent.get(),
-            part.get(),    middles.get(), parts.get(), octants.get(),    octant_sums.get(),
-            PartMemory::kMostParts};
+    return {ends.get(),        curves.get(),          keys.get(),
+            other_keys.get(),  parent.get(),          part.get(),
+            middles.get(),     parts.get(),           octants.get(),
+            octant_sums.get(), PartMemory::kMostParts};
   }
 };
 

@@ -135,9 +135,8 @@ IST_FORMULA void octant_triangles(const Vec3 (&corner)[6], const Mask (&by_b)[2]
     const Vec3 apex = {choose(by_b[e], corner[1].x, corner[0].x),
                        choose(by_b[e], corner[1].y, corner[0].y),
                        choose(by_b[e], corner[1].z, corner[0].z)};
-    const OctantTerms& terms = out.of[2 + e] =
-        octant_terms(half * times[e], choose(by_b[e], third, less_third), apex, corner[2 + e],
-                     corner[4 + e]);
+    const OctantTerms& terms = out.of[2 + e] = octant_terms(
+        half * times[e], choose(by_b[e], third, less_third), apex, corner[2 + e], corner[4 + e]);
     const Real b = choose(by_b[e], constant(1.0), constant(0.0));
     all.six_volumes = all.six_volumes + terms.six_volumes;
     all.moment = all.moment + terms.moment;

@@ -49,11 +49,13 @@ class OverlapOctants : public OverlapParts<Overlap> {
   }
 
  private:
+  using Parts::lane;
   using Parts::leads;
   using Parts::meet;
   using Parts::memory;
   using Parts::mesh;
   using Parts::pieces;
+  using Parts::width;
 
   /// A point seen from a part's centroid, in the axes of the octants.
   struct Corner {
@@ -97,14 +99,6 @@ class OverlapOctants : public OverlapParts<Overlap> {
 
   IST_HD Point in_axes(const Point& x) const noexcept {
     return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
-  }
-
-  IST_HD Corner corner(const OctantSums* octants, const Point& x) const noexcept {
-    const Point from = in_axes(x - octants->centre);
-    Corner out = {{from.x, from.y, from.z}, 0};
-    for (int k = 0; k < 3; ++k) out.octant |= (out.at[k] >= 0 ? 1 : 0) << k;
-    out.octant &= octants->planes;
-    return out;
   }
 
   /// Where a side goes through a plane, on the side of `from`.
@@ -155,42 +149,43 @@ class OverlapOctants : public OverlapParts<Overlap> {
   }
 
   /// Those of a crossing. Most lie in one octant.
-  IST_HD static void add_pieces(const OctantPieces& pieces, std::uint32_t lane,
-                                OctantSums* octants) noexcept {
-    int octant[6], all = 7, any = 0;
+  IST_HD void add_pieces(std::uint32_t l, OctantSums* octants) noexcept {
+    const OctantPieces& seen = pieces().octants;
+    int all = 7, any = 0;
     for (int c = 0; c < 6; ++c) {
-      octant[c] = pieces.octant[c][lane] & octants->planes;
-      all &= octant[c];
-      any |= octant[c];
+      all &= seen.octant[c][l] & octants->planes;
+      any |= seen.octant[c][l] & octants->planes;
     }
-    const auto lanes = [&](const double(&of)[3][8]) -> Point {
-      return {of[0][lane], of[1][lane], of[2][lane]};
-    };
     if (all == any) {
       OctantSums& sums = octants[all];
-      sums.six_volumes += pieces.sum_six_volumes[lane];
-      sums.moment = sums.moment + lanes(pieces.sum_moment);
-      for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + lanes(pieces.sum_area[s]);
-      sums.torque = sums.torque + lanes(pieces.sum_torque);
+      sums.six_volumes += seen.sum_six_volumes[l];
+      sums.moment = sums.moment + of_lane(seen.sum_moment, l);
+      for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + of_lane(seen.sum_area[s], l);
+      sums.torque = sums.torque + of_lane(seen.sum_torque, l);
       return;
     }
-    for (int t = 0; t < OctantPieces::kTriangles; ++t) {
-      if (pieces.times[t][lane] == 0) continue;
-      const bool of_b = pieces.of_b[t][lane] != 0;
-      const int c[3] = {pieces.corner(t, 0, lane), pieces.corner(t, 1, lane),
-                        pieces.corner(t, 2, lane)};
-      if (octant[c[0]] == octant[c[1]] && octant[c[0]] == octant[c[2]]) {
-        octants::add(octants[octant[c[0]]], of_b,
-                     {pieces.six_volumes[t][lane], lanes(pieces.moment[t]), lanes(pieces.area[t]),
-                      lanes(pieces.torque[t])});
-        continue;
-      }
-      const auto at = [&](int k) -> Corner {
-        const double(&x)[3][8] = pieces.at[c[k]];
-        return {{x[0][lane], x[1][lane], x[2][lane]}, octant[c[k]]};
-      };
-      add_triangle(octants, of_b, pieces.times[t][lane], at(0), at(1), at(2));
-    }
+    for (int t = 0; t < OctantPieces::kTriangles; ++t)
+      if (seen.times[t][l] != 0)
+        add_seen(octants, seen.of_b[t][l] != 0, t, l, seen.corner(t, 0, l), seen.corner(t, 1, l),
+                 seen.corner(t, 2, l));
+  }
+
+  /// Triangle t of lane l, of these corners.
+  IST_HD void add_seen(OctantSums* octants, bool of_b, int t, std::uint32_t l, int p, int q,
+                       int r) noexcept {
+    const OctantPieces& seen = pieces().octants;
+    const int planes = octants->planes;
+    const Corner at[3] = {seen_corner(p, l, planes), seen_corner(q, l, planes),
+                          seen_corner(r, l, planes)};
+    if (at[0].octant == at[1].octant && at[0].octant == at[2].octant)
+      octants::add(octants[at[0].octant], of_b,
+                   {seen.six_volumes[t][l], of_lane(seen.moment[t], l), of_lane(seen.area[t], l),
+                    of_lane(seen.torque[t], l)});
+    else
+      add_triangle(octants, of_b, seen.times[t][l], at[0], at[1], at[2]);
+  }
+  IST_HD static Point of_lane(const double (&of)[3][8], std::uint32_t l) noexcept {
+    return {of[0][l], of[1][l], of[2][l]};
   }
 
   IST_HD OctantSums* octants_of(std::uint32_t element) noexcept {
@@ -266,41 +261,100 @@ class OverlapOctants : public OverlapParts<Overlap> {
       meet();
       if (pieces().says) this->find_octant_pieces(first);
       for (std::uint32_t l = 0; l < count; ++l)
-        if (octants[l] != nullptr) add_pieces(pieces().octants, l, octants[l]);
+        if (octants[l] != nullptr) add_pieces(l, octants[l]);
       meet();
     }
-    for (int side = 0; leads() && side < 2; ++side) {
+    for (int side = 0; side < 2; ++side) {
       this->for_each_pierced(side, [&](std::uint32_t b) {
-        const std::uint32_t r = this->record_of(side, b);
-        for (std::uint32_t t = 0; t < mesh(side).blocks[b].triangles; ++t) {
-          const int whole = this->whole_of(r, t);
-          const std::uint32_t element = whole == 0 ? kNoIndex : this->triangle_element(r, t);
-          if (element == kNoIndex) continue;
-          OctantSums* const octants = octants_of(element);
-          if (octants == nullptr) continue;
-          // From the apex on.
-          const std::uint32_t opposite = this->opposite_edge(r, t);
-          const auto at = [&](std::uint32_t k) {
-            return corner(octants,
-                          this->at(r, mesh(side).blocks[b].corner[(opposite + 2 + k) % 3][t]));
-          };
-          add_triangle(octants, side == 1, whole, at(0), at(1), at(2));
-        }
+        for (std::uint32_t first = 0; first < mesh(side).blocks[b].triangles; first += 8)
+          sum_triangles(side, b, first);
       });
-      this->for_each_inside(side, [&](std::uint32_t b) {
-        if (OctantSums* const octants = octants_of(this->block_element(side, b)))
-          sum_block(side, b, octants);
-      });
+      this->for_each_inside(side, [&](std::uint32_t b) { sum_block(side, b); });
     }
   }
 
-  /// A block inside as a whole: by its integrals if it lies in one octant.
-  IST_HD void sum_block(int side, std::uint32_t b, OctantSums* octants) noexcept {
+  /// Eight triangles of a crossed block: the lanes see them, one adds them up.
+  IST_HD void sum_triangles(int side, std::uint32_t b, std::uint32_t first) noexcept {
     const MeshBlock& block = mesh(side).blocks[b];
+    const std::uint32_t r = this->record_of(side, b), left = block.triangles - first;
+    const std::uint32_t count = left < 8 ? left : 8;
+    OctantPieces& seen = pieces().octants;
+    OctantView& view = pieces().view;
+    OctantSums* octants[8] = {};
+    if (leads()) {
+      pieces().says = false;
+      for (std::uint32_t l = 0; l < count; ++l) {
+        const int whole = this->whole_of(r, first + l);
+        const std::uint32_t element = whole == 0 ? kNoIndex : this->triangle_element(r, first + l);
+        octants[l] = element == kNoIndex ? nullptr : octants_of(element);
+        seen.times[0][l] = octants[l] == nullptr ? 0 : whole;
+        if (octants[l] == nullptr) continue;
+        pieces().says = true;
+        for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
+      }
+    }
+    meet();
+    if (pieces().says)
+      for (std::uint32_t l = lane(); l < count; l += width()) {
+        if (seen.times[0][l] == 0) continue;
+        // From the apex on.
+        const std::uint32_t apex = this->opposite_edge(r, first + l) + 2;
+        Point at[3];
+        for (std::uint32_t k = 0; k < 3; ++k)
+          at[k] = see(this->at(r, block.corner[(apex + k) % 3][first + l]), k, l);
+        const exact::OctantTerms terms = exact::octant_terms(
+            0.5 * seen.times[0][l], (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
+        seen.six_volumes[0][l] = terms.six_volumes;
+        for (int k = 0; k < 3; ++k) {
+          seen.moment[0][k][l] = terms.moment[k];
+          seen.area[0][k][l] = terms.area[k];
+          seen.torque[0][k][l] = terms.torque[k];
+        }
+      }
+    meet();
+    for (std::uint32_t l = 0; l < count; ++l)
+      if (octants[l] != nullptr) add_seen(octants[l], side == 1, 0, l, 0, 1, 2);
+    meet();
+  }
+
+  /// The c-th corner of lane l, in its view.
+  IST_HD Point see(const Point& x, std::uint32_t c, std::uint32_t l) noexcept {
+    OctantPieces& seen = pieces().octants;
+    const OctantView& view = pieces().view;
+    const Point from = in_axes(x - Point{view.centre[0][l], view.centre[1][l], view.centre[2][l]});
+    int octant = 0;
+    for (int k = 0; k < 3; ++k) {
+      seen.at[c][k][l] = from[k];
+      octant |= (from[k] >= 0 ? 1 : 0) << k;
+    }
+    seen.octant[c][l] = static_cast<std::uint8_t>(octant);
+    return from;
+  }
+  IST_HD Corner seen_corner(int c, std::uint32_t l, int planes) noexcept {
+    const OctantPieces& seen = pieces().octants;
+    return {{seen.at[c][0][l], seen.at[c][1][l], seen.at[c][2][l]}, seen.octant[c][l] & planes};
+  }
+
+  /// A block inside as a whole: by its integrals if it lies in one octant.
+  IST_HD void sum_block(int side, std::uint32_t b) noexcept {
+    const MeshBlock& block = mesh(side).blocks[b];
+    OctantSums* octants = nullptr;
+    if (leads()) {
+      octants = octants_of(this->block_element(side, b));
+      pieces().says = octants != nullptr;
+      for (int k = 0; octants != nullptr && k < 3; ++k)
+        for (double& x : pieces().view.centre[k]) x = octants->centre[k];
+    }
+    meet();
+    // Vertices by eight.
+    for (std::uint32_t v = lane(); pieces().says && v < block.vertices; v += width())
+      see(this->vertex(side, block.vertex[v]), v / 8, v % 8);
+    meet();
+    if (octants == nullptr) return;
     Corner at[kWidth];
     int all = 7, any = 0;
     for (std::uint32_t v = 0; v < block.vertices; ++v) {
-      at[v] = corner(octants, this->vertex(side, block.vertex[v]));
+      at[v] = seen_corner(static_cast<int>(v / 8), v % 8, octants->planes);
       all &= at[v].octant;
       any |= at[v].octant;
     }

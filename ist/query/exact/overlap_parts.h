@@ -51,7 +51,8 @@ IST_HD void heap_sort(T* items, std::uint32_t count, const Less& less) {
 ///
 /// `Overlap` is what a query found, with these members; sides are 0, A's, and 1, B's:
 ///
-/// - leads(), meet(): whether this lane does what is done one by one; all of a team come together
+/// - leads(), lane(), width(), meet(), any(flag): of a team's lanes the one that does what is done
+///   one by one, this one's number, how many; all come together; whether one raises the flag
 /// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
 /// - crossings(), triangle(side, i), end_of(i, e), way_of(i, e), place_of(i, e): crossings in the
 ///   order of the meshes; an end's share of the way along its edge, and its place from the origin
@@ -75,7 +76,7 @@ class OverlapParts : public Overlap {
     start(false);
     join();
     name_parts();
-    if (leads()) one_ = are_one();
+    one_ = are_one();
     return finish();
   }
 
@@ -85,12 +86,14 @@ class OverlapParts : public Overlap {
   }
 
  protected:
+  using Overlap::lane;
   using Overlap::leads;
   using Overlap::meet;
   using Overlap::memory;
   using Overlap::mesh;
   using Overlap::opposite_edge;
   using Overlap::pieces;
+  using Overlap::width;
 
   /// `one`: all that counts is known to be in one part.
   IST_HD void start(bool one) noexcept {
@@ -103,8 +106,11 @@ class OverlapParts : public Overlap {
   }
 
   IST_HD void join() noexcept {
-    if (!leads()) return;
     begin();
+    meet();
+    join_within_blocks();
+    meet();
+    if (!leads()) return;
     join_curves();
     for (int side = 0; side < 2; ++side) join_holes(side);
     join_edges();
@@ -128,20 +134,24 @@ class OverlapParts : public Overlap {
 
   /// Whether all that counts is in one part.
   IST_HD bool are_one() noexcept {
-    bool one = parts_ == 1;
-    for (int side = 0; side < 2 && one; ++side) {
-      this->for_each_pierced(side, [&](std::uint32_t b) {
-        const std::uint32_t r = this->record_of(side, b);
-        for (std::uint32_t t = 0; one && t < mesh(side).blocks[b].triangles; ++t) {
-          if (this->whole_of(r, t) == 0) continue;
-          const std::uint32_t element = triangle_element(r, t);
-          one = element != kNoIndex && part_of(element) == 0;
-        }
-      });
-      this->for_each_inside(
-          side, [&](std::uint32_t b) { one = one && part_of(block_element(side, b)) == 0; });
+    meet();
+    if (leads()) pieces().says = parts_ == 1;
+    meet();
+    if (one_ || !pieces().says) return one_;
+    bool one = true;
+    const std::uint32_t first = top(0);
+    for (std::uint32_t r = lane(); r < records() && one; r += width()) {
+      if (this->pierced_of(r) == 0) continue;
+      for (std::uint32_t t = 0; one && t < block_of(r).triangles; ++t) {
+        if (this->whole_of(r, t) == 0) continue;
+        const std::uint32_t element = triangle_element(r, t);
+        one = element != kNoIndex && top(element) == first;
+      }
     }
-    return one;
+    for (int side = 0; side < 2; ++side)
+      for_each_of_lane(side,
+                       [&](std::uint32_t b) { one = one && top(block_element(side, b)) == first; });
+    return !this->any(!one);
   }
 
   /// Sums them.
@@ -215,6 +225,13 @@ class OverlapParts : public Overlap {
     return element;
   }
 
+  /// The same, and leaves all as it is.
+  IST_HD std::uint32_t top(std::uint32_t element) const noexcept {
+    const std::uint32_t* const parent = memory().parent;
+    while (parent[element] != element) element = parent[element];
+    return element;
+  }
+
   /// The lower number stays the root, so that parts do not depend on the order.
   IST_HD void unite(std::uint32_t x, std::uint32_t y) noexcept {
     x = root(x);
@@ -234,13 +251,39 @@ class OverlapParts : public Overlap {
       memory().parent[element] = element;
       memory().part[element] = kNoIndex;
     };
-    for (std::uint32_t i = 0; i < first_block_[0]; ++i) alone(i);
+    for (std::uint32_t i = lane(); i < first_block_[0]; i += width()) alone(i);
     for (int side = 0; side < 2; ++side)
-      this->for_each_inside(side, [&](std::uint32_t b) { alone(block_element(side, b)); });
-    for (std::uint32_t r = 0; r < records(); ++r)
+      for_each_of_lane(side, [&](std::uint32_t b) { alone(block_element(side, b)); });
+    for (std::uint32_t r = lane(); r < records(); r += width())
       for_each_bit(this->pierced_of(r), [&](std::uint32_t edge) {
         memory().middles[first_middle(r) + edge] = kNoIndex;
       });
+  }
+
+  /// visit(block) of those inside as a whole that are this lane's.
+  template <class Visit>
+  IST_HD void for_each_of_lane(int side, const Visit& visit) noexcept {
+    std::uint32_t next = lane();
+    this->for_each_inside(side, [&](std::uint32_t b) {
+      if (next == 0) visit(b);
+      next = next == 0 ? width() - 1 : next - 1;
+    });
+  }
+
+  /// Vertices inside, along edges that nothing pierces: each lane's of crossed blocks of its own.
+  IST_HD void join_within_blocks() noexcept {
+    for (std::uint32_t r = lane(); r < records(); r += width()) {
+      const std::uint64_t pierced = this->pierced_of(r);
+      const std::uint32_t inside = this->inside_of(r);
+      if (pierced == 0 || inside == 0) continue;
+      const MeshBlock& block = block_of(r);
+      for (std::uint32_t edge = 0; edge < 3u * block.triangles; ++edge) {
+        const std::uint32_t p = block.corner[edge % 3][edge / 3],
+                            q = block.corner[(edge + 1) % 3][edge / 3];
+        if ((pierced >> edge & 1) == 0 && (inside >> p & 1) != 0)
+          unite(vertex_element(r, p), vertex_element(r, q));
+      }
+    }
   }
 
   /// Segments that end at the same place go on in each other: it is an edge of one triangle and
@@ -400,8 +443,7 @@ class OverlapParts : public Overlap {
       if (this->side_of(r) == side && this->pierced_of(r) != 0 && this->inside_of(r) != 0) visit(r);
   }
 
-  /// Vertices inside, along edges that nothing pierces and from block to block. A table finds those
-  /// that are one.
+  /// Vertices inside, from block to block. A table finds those that are one.
   IST_HD void join_vertices(int side) noexcept {
     int count = 0;
     for_each_mixed(side, [&](std::uint32_t r) { count += count_bits(this->inside_of(r)); });
@@ -411,15 +453,7 @@ class OverlapParts : public Overlap {
     for (std::uint32_t i = 0; i <= mask; ++i) table[i] = kEmpty;
     for_each_mixed(side, [&](std::uint32_t r) {
       const MeshBlock& block = block_of(r);
-      const std::uint64_t pierced = this->pierced_of(r);
-      const std::uint32_t inside = this->inside_of(r);
-      for (std::uint32_t edge = 0; edge < 3u * block.triangles; ++edge) {
-        const std::uint32_t p = block.corner[edge % 3][edge / 3],
-                            q = block.corner[(edge + 1) % 3][edge / 3];
-        if ((pierced >> edge & 1) == 0 && (inside >> p & 1) != 0)
-          unite(vertex_element(r, p), vertex_element(r, q));
-      }
-      for_each_bit(inside, [&](std::uint32_t v) {
+      for_each_bit(this->inside_of(r), [&](std::uint32_t v) {
         const std::uint32_t vertex = block.vertex[v], element = vertex_element(r, v);
         std::uint32_t slot = vertex * 2654435769u >> 7 & mask;
         while (table[slot] != kEmpty && table[slot] >> 32 != vertex) slot = (slot + 1) & mask;

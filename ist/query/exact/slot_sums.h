@@ -24,6 +24,22 @@ class SlotSums {
     }
   }
 
+  // Of lane l alone.
+  IST_HD void add_triangle(const ExactTerms& terms, std::uint32_t l) noexcept {
+    add_volume(terms.six_volumes[0], l);
+    for (int k = 0; k < 3; ++k) moment_[k][l] += terms.moment[k][l];
+    rounding_[l] += terms.rounding[l];
+  }
+  IST_HD void add_crossing(const ExactTerms& terms, std::uint32_t l) noexcept {
+    add_triangle(terms, l);
+    add_volume(terms.six_volumes[1], l);
+    add_volume(terms.six_volumes[2], l);
+    for (int k = 0; k < 3; ++k) {
+      force_[k][l] += terms.force[k][l];
+      torque_[k][l] += terms.torque[k][l];
+    }
+  }
+
   IST_HD ExactSums total() const noexcept {
     ExactSums out;
     for (int l = 0; l < 8; ++l) {
@@ -46,12 +62,13 @@ class SlotSums {
   IST_HD static void add_to(double (&sums)[8], const double (&from)[8]) {
     for (int l = 0; l < 8; ++l) sums[l] += from[l];
   }
+  IST_HD void add_volume(const double (&six_volumes)[8], std::uint32_t l) noexcept {
+    double rest;
+    exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
+    low_[l] += rest;
+  }
   IST_HD void add_volumes(const double (&six_volumes)[8]) noexcept {
-    for (int l = 0; l < 8; ++l) {
-      double rest;
-      exact::two_sum(high_[l], six_volumes[l], high_[l], rest);
-      low_[l] += rest;
-    }
+    for (std::uint32_t l = 0; l < 8; ++l) add_volume(six_volumes, l);
   }
 
   double high_[8] = {}, low_[8] = {};
