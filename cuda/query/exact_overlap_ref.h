@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "cuda/query/exact_insides.h"
+#include "cuda/query/exact_patch_arrays.h"
 #include "query/exact/overlap_octants.h"
 #include "query/exact/slot_sums.h"
 
@@ -11,24 +12,6 @@
 // OverlapParts (query/exact/overlap_parts.h) asks on a GPU.
 
 namespace ist::gpu {
-
-/// A team's memory that is handed out piece by piece. All lanes ask alike.
-struct PartRoom {
-  std::byte* at;
-  std::byte* end;
-
-  /// Null where there is no more.
-  template <class T>
-  IST_HD T* take(std::size_t count) {
-    constexpr std::size_t kAlign = 16;
-    static_assert(alignof(T) <= kAlign);
-    const std::size_t bytes = (count * sizeof(T) + kAlign - 1) / kAlign * kAlign;
-    if (static_cast<std::size_t>(end - at) < bytes) return nullptr;
-    T* const taken = reinterpret_cast<T*>(at);
-    at += bytes;
-    return taken;
-  }
-};
 
 /// Two triangles that cross.
 struct CrossingRef {

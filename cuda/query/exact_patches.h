@@ -12,30 +12,6 @@
 
 namespace ist::gpu {
 
-/// It is asked in the later passes of a batch of penetrations, from this on: teams search too.
-constexpr int kFirstPatchPass = 1;
-/// [bytes] of a team's room for crossings and parts.
-IST_HD constexpr std::size_t patch_room(int pass) {
-  return pass == kFirstPatchPass ? 256u << 10 : 16u << 20;
-}
-
-struct ExactPatchArrays : ExactArrays {
-  GpuContactPatches patches;
-
-  IST_HD std::size_t bytes_of_team(int pass) const {
-    return ExactArrays::bytes_of_team(pass) + patch_room(pass) + 16 * std::size_t{most_blocks};
-  }
-  IST_HD std::byte* team(int pass, std::uint32_t n) const {
-    return memory + n * bytes_of_team(pass);
-  }
-  IST_HD ExactRoom room(int pass, std::uint32_t n) const {
-    return ExactRoom::at(team(pass, n), most_blocks, pass);
-  }
-  IST_HD PartRoom part_room(int pass, std::uint32_t n) const {
-    return {team(pass, n) + ExactArrays::bytes_of_team(pass), team(pass, n + 1)};
-  }
-};
-
 /// Whether pair i is to be asked; else it is answered. One thread a pair.
 IST_HD inline bool sift_exact_patches(const ExactPatchArrays& batch, std::uint32_t i) {
   if (batch.patches.count != nullptr) batch.patches.count[i] = 0;

@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-#include "cuda/query/exact_patches.h"
+#include "cuda/query/exact_patch_arrays.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
