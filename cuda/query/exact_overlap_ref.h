@@ -94,7 +94,8 @@ class OverlapRef {
     opposite_ = room.take<std::uint8_t>(kWidth * std::size_t{records_});
     slots_ = room.take<SlotSums>(1);
     stack_ = room.take<MeshNode>(kWidth * kMaxLevels);
-    const std::uint32_t table = power_from(2 * (n > inside_vertices() ? n : inside_vertices()) + 1);
+    const std::uint32_t inside = inside_vertices();
+    const std::uint32_t table = power_from(2 * (n > inside ? n : inside) + 1);
     const std::size_t elements = n + kWidth * std::size_t{records_} + mesh(0).level[0].count +
                                  std::size_t{mesh(1).level[0].count};
     memory_.ends = room.take<PiercedEnd>(2 * std::size_t{n});
