@@ -266,25 +266,26 @@ class OverlapOctants : public OverlapParts<Overlap> {
     }
     for (int side = 0; side < 2; ++side) {
       this->for_each_pierced(side, [&](std::uint32_t b) {
+        const std::uint32_t r = this->record_of(side, b);
+        this->count_triangles(r);
         for (std::uint32_t first = 0; first < mesh(side).blocks[b].triangles; first += 8)
-          sum_triangles(side, b, first);
+          sum_triangles(side, r, first);
       });
       this->for_each_inside(side, [&](std::uint32_t b) { sum_block(side, b); });
     }
   }
 
   /// Eight triangles of a crossed block: the lanes see them, one adds them up.
-  IST_HD void sum_triangles(int side, std::uint32_t b, std::uint32_t first) noexcept {
-    const MeshBlock& block = mesh(side).blocks[b];
-    const std::uint32_t r = this->record_of(side, b), left = block.triangles - first;
-    const std::uint32_t count = left < 8 ? left : 8;
+  IST_HD void sum_triangles(int side, std::uint32_t r, std::uint32_t first) noexcept {
+    const MeshBlock& block = this->block_of(r);
+    const std::uint32_t left = block.triangles - first, count = left < 8 ? left : 8;
     OctantPieces& seen = pieces().octants;
     OctantView& view = pieces().view;
     OctantSums* octants[8] = {};
     if (leads()) {
       pieces().says = false;
       for (std::uint32_t l = 0; l < count; ++l) {
-        const int whole = this->whole_of(r, first + l);
+        const int whole = pieces().whole[first + l];
         const std::uint32_t element = whole == 0 ? kNoIndex : this->triangle_element(r, first + l);
         octants[l] = element == kNoIndex ? nullptr : octants_of(element);
         seen.times[0][l] = octants[l] == nullptr ? 0 : whole;
@@ -294,23 +295,22 @@ class OverlapOctants : public OverlapParts<Overlap> {
       }
     }
     meet();
-    if (pieces().says)
-      for (std::uint32_t l = lane(); l < count; l += width()) {
-        if (seen.times[0][l] == 0) continue;
-        // From the apex on.
-        const std::uint32_t apex = this->opposite_edge(r, first + l) + 2;
-        Point at[3];
-        for (std::uint32_t k = 0; k < 3; ++k)
-          at[k] = see(this->at(r, block.corner[(apex + k) % 3][first + l]), k, l);
-        const exact::OctantTerms terms = exact::octant_terms(
-            0.5 * seen.times[0][l], (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
-        seen.six_volumes[0][l] = terms.six_volumes;
-        for (int k = 0; k < 3; ++k) {
-          seen.moment[0][k][l] = terms.moment[k];
-          seen.area[0][k][l] = terms.area[k];
-          seen.torque[0][k][l] = terms.torque[k];
-        }
+    for (std::uint32_t l = lane(); pieces().says && l < count; l += width()) {
+      if (seen.times[0][l] == 0) continue;
+      // From the apex on.
+      const std::uint32_t apex = this->opposite_edge(r, first + l) + 2;
+      Point at[3];
+      for (std::uint32_t k = 0; k < 3; ++k)
+        at[k] = see(this->at(r, block.corner[(apex + k) % 3][first + l]), k, l);
+      const exact::OctantTerms terms = exact::octant_terms(
+          0.5 * seen.times[0][l], (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
+      seen.six_volumes[0][l] = terms.six_volumes;
+      for (int k = 0; k < 3; ++k) {
+        seen.moment[0][k][l] = terms.moment[k];
+        seen.area[0][k][l] = terms.area[k];
+        seen.torque[0][k][l] = terms.torque[k];
       }
+    }
     meet();
     for (std::uint32_t l = 0; l < count; ++l)
       if (octants[l] != nullptr) add_seen(octants[l], side == 1, 0, l, 0, 1, 2);
