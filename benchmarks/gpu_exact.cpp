@@ -15,6 +15,7 @@
 #include "report.h"
 #include "support/answer_bits.h"
 #include "support/device_batch.h"
+#include "support/device_patches.h"
 #include "support/exact_pair.h"
 
 namespace {
@@ -22,6 +23,7 @@ namespace {
 using namespace ist;
 using namespace ist::benchmark;
 using ist::testing::DeviceBatch;
+using ist::testing::DevicePatches;
 
 Asset mesh_of(const TriangleMesh& mesh, const std::string& name) {
   return bake_mesh_only(close_mesh(mesh, name), 0);
@@ -32,6 +34,42 @@ double batch_ms(const GpuSolids& solids, GpuWorkspace& workspace, const DeviceBa
   return device_ms([&](cudaStream_t stream) {
     penetration_batch(solids, batch.pairs(), {Measure::exact}, workspace, batch.answers(), stream);
   });
+}
+
+/// [ms] with patches, so many at most.
+double patches_ms(const GpuSolids& solids, GpuWorkspace& workspace, const DeviceBatch& batch,
+                  std::size_t count, std::uint32_t most) {
+  const DevicePatches patches(count, most);
+  return device_ms([&](cudaStream_t stream) {
+    contact_patches_batch(solids, batch.pairs(), Measure::exact, workspace, batch.answers(),
+                          patches.patches(), stream);
+  });
+}
+
+/// Reports the rate of contact patches, of fewer pairs.
+void ask_patches(Report& report, const std::string& name, const Solids& solids,
+                 const std::vector<BatchPair>& some, std::size_t count) {
+  const GpuSolids on_device(solids.views());
+  GpuWorkspace workspace(count);
+  const std::vector<BatchPair> pairs = drawn(some, count);
+  const DeviceBatch batch(pairs);
+  const double whole = batch_ms(on_device, workspace, batch);
+  const double ms = patches_ms(on_device, workspace, batch, count, 8);
+  std::vector<BatchPair> asked = pairs;
+  asked.resize(std::min<std::size_t>(count, 5'000));
+  const std::vector<PlacedPair> placed = solids.placed(asked);
+  std::vector<ContactPatches> cpu(asked.size());
+  std::vector<ContactPatch> patches(8 * asked.size());
+  ContactSettings settings;
+  settings.measure = Measure::exact;
+  const double by_cores = rate_of_cores(cpu.size(), 2, [&](std::span<Workspace> workspaces) {
+    contact_patches_batch(placed, settings, workspaces, cpu, patches, tbb_parallel_for());
+  });
+  report.row("Contact patches, up to 8", {{"poses", name},
+                                          {"pairs", count},
+                                          {"M/s", static_cast<double>(count) / ms * 1e-3},
+                                          {"times the penetrations' time", ms / whole},
+                                          {"M/s by all cores", by_cores}});
 }
 
 /// Reports the time of few pairs.
@@ -271,6 +309,8 @@ bool measure(Report& report) {
     right = ask(report, "Elephant and dino", name, two, poses, many,
                 wanted.contains(name) ? wanted.at(name) : 0) &&
             right;
+  for (const char* name : {"0.1 to 1 %", "1 to 10 %", "deep"})
+    ask_patches(report, name, two, classes.at(name), many / 10);
   for (const char* name : {"apart", "0.1 to 1 %", "deep"})
     ask_few(report, name, two, classes.at(name));
   ask_cards(report, two, classes.at("1 to 10 %"), many);
@@ -279,6 +319,7 @@ bool measure(Report& report) {
   for (BatchPair& pair : engaged) pair.b = 1;
   const Solids thread = {{&bolt, &nut}};
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
+  ask_patches(report, "nut on bolt, engaged", thread, engaged, many / 10);
   right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
           right;
   for (const double by : {1e-4, 3e-4, 1e-3}) {
@@ -294,6 +335,8 @@ bool measure(Report& report) {
   });
   for (const char* name : {"bolt_in_plate, in place", "plate_on_plate, in place"})
     ask_few(report, name, mated.solids, mated.mates.at(name));
+  ask_patches(report, "plate_on_plate, in place", mated.solids,
+              mated.mates.at("plate_on_plate, in place"), many / 50);
   for (const auto& [name, poses] : mated.mates)
     right = ask(report, "Mated parts", name, mated.solids, poses, many / 50, 0) && right;
   for (const std::size_t triangles : {8u, 24u, 80u, 200u}) {

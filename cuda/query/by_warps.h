@@ -14,7 +14,7 @@ namespace ist::gpu {
 /// Shared memory runs no constructors.
 template <class T, unsigned kCount>
 struct Raw {
-  alignas(16) std::byte bytes[kCount][sizeof(T)];
+  alignas(alignof(T) > 16 ? alignof(T) : 16) std::byte bytes[kCount][sizeof(T)];
   __device__ T& operator[](unsigned warp) { return *reinterpret_cast<T*>(bytes[warp]); }
 };
 

@@ -84,10 +84,10 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
 }
 
 /// Of pair i, whose volume may be nothing and is answered as if it were not: whether the solids
-/// touch, and where. What sums round is nothing if it is no thicker than what poses and vertices
-/// round, over the faces that lie on each other or push.
+/// touch, and where; lane 0 says so. What sums round is nothing if it is no thicker than what poses
+/// and vertices round, over the faces that lie on each other or push.
 template <class Team>
-IST_HD void find_contact(const Team& team, const SolidPairs& batch, std::uint32_t i,
+IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_t i,
                          const ExactPair& pair, ExactContactMemory& memory, const ExactLeft& left,
                          std::uint64_t* waiting, std::uint32_t most_waiting) {
   team.sync();
@@ -103,7 +103,7 @@ IST_HD void find_contact(const Team& team, const SolidPairs& batch, std::uint32_
     total[k] = team.sum(memory.contact.of[k][team.lane()]);
   const double area = total[ContactSums::kArea];
   if (team.lane() != 0 || !all || !touches || left.volume > 8 * pair.touch * (area + left.push))
-    return;
+    return false;
   const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
   const PairPlace& place = pair.place;
   ContactRow row = {};
@@ -116,6 +116,7 @@ IST_HD void find_contact(const Team& team, const SolidPairs& batch, std::uint32_
   if (const double length = norm(normal); length > 1e-9 * area)
     row.contact_normal = turned(place.rotation_a, normal / length);
   write_row(batch.answers, i, row);
+  return true;
 }
 
 }  // namespace ist::gpu

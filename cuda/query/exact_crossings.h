@@ -15,14 +15,23 @@ IST_HD_COLD bool nearly_cross(const CornerView& view, const exact::Point& aside,
   return cross_pair<Signs::settled>(view, aside, end, room) != PairSays::apart;
 }
 
+/// What is to be kept of crossings: nothing.
+struct KeepNone {
+  IST_HD bool operator()(bool, const std::uint32_t (&)[2], const PiercingEdge (&)[2],
+                         const exact::EdgeEnd (&)[2]) {
+    return true;
+  }
+};
+
 /// Of pairs of triangles those that cross: what their segments add to the sums, and how often each
 /// edge is pierced. In their order, each a team's width at a time.
-template <class Team, bool kExactly>
+/// keep(crosses, pair, end, at) of all lanes together; false where it lacks room.
+template <class Team, bool kExactly, class Keep = KeepNone>
 class ExactCrossings {
  public:
   IST_HD ExactCrossings(const Team& team, const ExactPair& pair, ExactSumMemory& memory,
-                        const ExactRoom& room)
-      : team_(team), pair_(pair), memory_(memory), room_(room) {}
+                        const ExactRoom& room, const Keep& keep = {})
+      : team_(team), pair_(pair), memory_(memory), room_(room), keep_(keep) {}
 
   IST_HD ExactState run(const ExactPool& pool, const ExactChain& crossing, const ExactChain& near) {
     const auto each = [&](const ExactChain& chain, const auto& work) {
@@ -125,6 +134,7 @@ class ExactCrossings {
       if (state_ != ExactState::ok) return;
     }
     if (crosses) add(pair, view, end, at);
+    if (!keep_(crosses, pair, end, at)) state_ = ExactState::no_room;
   }
 
   IST_HD void add(const std::uint32_t (&pair)[2], const CornerView& view,
@@ -178,6 +188,7 @@ class ExactCrossings {
   const ExactPair& pair_;
   ExactSumMemory& memory_;
   const ExactRoom& room_;
+  Keep keep_;
   ExactState state_ = ExactState::ok;
   std::uint32_t crossings_ = 0, records_ = 0;
   bool nearly_ = false;

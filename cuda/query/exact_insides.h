@@ -8,6 +8,24 @@
 
 namespace ist::gpu {
 
+/// Whether all or none of the blocks below a lane of a level are inside, of which there is a bit
+/// each.
+IST_HD inline void look_below(const std::uint32_t* inside, const MeshTree& mesh, int level,
+                              std::uint32_t number, bool& all, bool& none) {
+  const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
+  const std::uint32_t count = mesh.level[0].count;
+  const std::uint32_t first = number << shift;
+  const std::uint32_t end = count - first < 1u << shift ? count : first + (1u << shift);
+  all = none = true;
+  for (std::uint32_t b = first; b < end; b += 32 - b % 32) {
+    const std::uint32_t left = end - b < 32 - b % 32 ? end - b : 32 - b % 32;
+    const std::uint32_t mask = (left == 32 ? ~0u : (1u << left) - 1) << b % 32;
+    const std::uint32_t word = inside[b / 32] & mask;
+    all = all && word == mask;
+    none = none && word == 0;
+  }
+}
+
 /// What lies inside of each mesh once all crossings are known, and what it adds to the sums.
 template <class Team, bool kExactly>
 class ExactInsides {
@@ -181,7 +199,8 @@ class ExactInsides {
       for (int first = 0; first < static_cast<int>(kWidth); first += Team::kWidth) {
         const auto l = static_cast<std::uint32_t>(first + team_.lane());
         bool all = false, none = true;
-        if (l < kWidth && l < used) look(side, level, kWidth * number + l, all, none);
+        if (l < kWidth && l < used)
+          look_below(room_.inside[side], mesh, level, kWidth * number + l, all, none);
         if (all) add_lane(side, level, number, l);
         int total = 0;
         const int before = team_.exclusive_count(!all && !none, total);
@@ -191,22 +210,6 @@ class ExactInsides {
         waiting += static_cast<std::uint32_t>(total);
       }
       team_.sync();
-    }
-  }
-
-  /// Whether all or none of the blocks below a lane are inside.
-  IST_HD void look(int side, int level, std::uint32_t number, bool& all, bool& none) const {
-    const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
-    const std::uint32_t count = pair_.mesh[side].level[0].count;
-    const std::uint32_t first = number << shift;
-    const std::uint32_t end = count - first < 1u << shift ? count : first + (1u << shift);
-    all = none = true;
-    for (std::uint32_t b = first; b < end; b += 32 - b % 32) {
-      const std::uint32_t left = end - b < 32 - b % 32 ? end - b : 32 - b % 32;
-      const std::uint32_t mask = (left == 32 ? ~0u : (1u << left) - 1) << b % 32;
-      const std::uint32_t word = room_.inside[side][b / 32] & mask;
-      all = all && word == mask;
-      none = none && word == 0;
     }
   }
 

@@ -9,6 +9,7 @@
 #include "query/base/pair_place.h"
 #include "query/exact/block_insides.h"
 #include "query/exact/box_integrals.h"
+#include "query/exact/exact_sums.h"
 
 namespace ist::gpu {
 
@@ -135,6 +136,7 @@ struct ExactWholeMemory {
   union {
     ExactContactMemory search;
     ExactSumMemory sum;
+    PieceMemory pieces;  ///< of its patches
   };
 };
 

@@ -191,18 +191,18 @@ IST_HD void clear_room(const Team& team, const ExactRoom& room, std::uint32_t re
   team.sync();
 }
 
-/// Answers pair i if it can, ok or nothing, from what was found.
-template <bool kExactly, class Team>
-IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                              const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
-                              const ExactPool& pool, const ExactChain& crossing,
-                              const ExactChain& near, std::uint32_t visits) {
+/// Answers pair i if it can, ok or nothing, from what was found; marks stay.
+template <class Team, bool kExactly, class Keep>
+IST_HD ExactState sum_marked(const Team& team, const ExactArrays& batch, std::uint32_t i,
+                             const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
+                             const ExactPool& pool, const ExactChain& crossing,
+                             const ExactChain& near, std::uint32_t visits,
+                             ExactCrossings<Team, kExactly, Keep>& crossings) {
   team.sync();
   for (auto& sums : memory.sum)
     for (int k = team.lane(); k < 32; k += Team::kWidth) sums[k] = 0;
   if (team.lane() == 0) memory.origin = {0, 0, 0};
   team.sync();
-  ExactCrossings<Team, kExactly> crossings(team, pair, memory, room);
   ExactState state = crossings.run(pool, crossing, near);
   team.sync();
   if (state == ExactState::ok &&
@@ -213,6 +213,16 @@ IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::u
   if (state == ExactState::ok &&
       write_exact(team, batch, i, pair, memory, visits, crossings.count()) && crossings.nearly())
     state = ExactState::nothing;
+  return state;
+}
+template <bool kExactly, class Team>
+IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
+                              const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
+                              const ExactPool& pool, const ExactChain& crossing,
+                              const ExactChain& near, std::uint32_t visits) {
+  ExactCrossings<Team, kExactly> crossings(team, pair, memory, room);
+  const ExactState state =
+      sum_marked(team, batch, i, room, pair, memory, pool, crossing, near, visits, crossings);
   clear_room(team, room, crossings.records());
   return state;
 }
@@ -334,15 +344,10 @@ IST_HD inline std::uint32_t pairs_of_pass(const ExactArrays& batch, int pass,
          (pass == 1 ? counters.listed[0] - end_of(round_of(batch, rounds + 1)) : 0);
 }
 
-/// A later pass over the k-th of its pairs, of which so many are `listed`. All of a team together.
+/// Pairs of triangles of pair i that may cross, in the room's pool; whether it holds them.
 template <class Team>
-IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::uint32_t rounds,
-                     std::uint32_t listed, std::uint32_t k, const ExactRoom& room,
-                     ExactWholeMemory& memory) {
-  const std::uint32_t i =
-      k < listed
-          ? batch.list[pass][k]
-          : batch.list[0][(end_of(round_of(batch, rounds + 1)) + (k - listed)) % batch.pairs.count];
+IST_HD bool search_pair(const Team& team, const ExactArrays& batch, std::uint32_t i,
+                        const ExactRoom& room, ExactWholeMemory& memory, std::uint32_t& visits) {
   team.sync();
   if (team.lane() == 0) {
     place_exactly(batch, i, memory.pair.place);
@@ -356,12 +361,26 @@ IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::
     sift_triangles(team, memory.pair, memory.search, first, count);
     return true;
   });
+  visits = search.visits;
+  return all && held(room.pool, memory.search.crossing) && held(room.pool, memory.search.near);
+}
+
+/// A later pass over the k-th of its pairs, of which so many are `listed`. All of a team together.
+template <class Team>
+IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::uint32_t rounds,
+                     std::uint32_t listed, std::uint32_t k, const ExactRoom& room,
+                     ExactWholeMemory& memory) {
+  const std::uint32_t i =
+      k < listed
+          ? batch.list[pass][k]
+          : batch.list[0][(end_of(round_of(batch, rounds + 1)) + (k - listed)) % batch.pairs.count];
+  std::uint32_t visits = 0;
+  const bool all = search_pair(team, batch, i, room, memory, visits);
   const ExactChain crossing = memory.search.crossing, near = memory.search.near;
   ExactState state = ExactState::no_room;
-  if (all && held(room.pool, crossing) && held(room.pool, near)) {
+  if (all)
     state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
-                              near, search.visits);
-  }
+                              near, visits);
   if (state == ExactState::nothing) {
     const ExactLeft left = memory.sum.left;
     find_contact(team, batch, i, memory.pair, memory.search, left, room.waiting, room.most_waiting);

@@ -214,6 +214,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::find_patch_grids(impl_->grids);
   gpu::find_field_grids(impl_->grids);
   gpu::find_exact_grids(impl_->grids);
+  gpu::find_exact_patch_grids(impl_->grids);
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
   gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kRoomForTasks * sizeof(std::uint32_t),
@@ -271,11 +272,8 @@ namespace {
 /// What all kinds of batches begin with; throws where a batch cannot be launched.
 gpu::SolidPairs asked_of(const GpuSolids& solids, const GpuPairs& pairs,
                          const GpuWorkspace::Impl& room, Measure measure,
-                         const GpuPenetrations& answers, Measure last = Measure::inner) {
-  if (measure > last)
-    throw Error(last == Measure::exact ? "GPU: a measure that has no name"
-                                       : "GPU: contact patches are of the matched and the inner "
-                                         "measure only: use the CPU for the exact measure");
+                         const GpuPenetrations& answers) {
+  if (measure > Measure::exact) throw Error("GPU: a measure that has no name");
   if (pairs.count > room.most_pairs)
     throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
                 std::to_string(room.most_pairs));
@@ -285,21 +283,29 @@ gpu::SolidPairs asked_of(const GpuSolids& solids, const GpuPairs& pairs,
   return {solids.impl().refs, static_cast<std::uint32_t>(solids.size()), measure, pairs, answers};
 }
 
+/// Throws where the workspace does not hold what the largest mesh takes.
+template <class Arrays>
+Arrays exact_batch(const GpuSolids& solids, const GpuWorkspace::Impl& room,
+                   const gpu::SolidPairs& asked) {
+  Arrays batch = {};
+  static_cast<gpu::ExactArrays&>(batch) = room.exact;
+  static_cast<gpu::SolidPairs&>(batch) = asked;
+  batch.most_blocks = solids.impl().most_blocks;
+  if (!gpu::has_room(batch))
+    throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
+  return batch;
+}
+
 }  // namespace
 
 void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream) {
   const GpuWorkspace::Impl& room = workspace.impl();
-  const gpu::SolidPairs asked =
-      asked_of(solids, pairs, room, settings.measure, answers, Measure::exact);
+  const gpu::SolidPairs asked = asked_of(solids, pairs, room, settings.measure, answers);
   if (pairs.count == 0) return;
   if (settings.measure == Measure::exact) {
-    gpu::ExactArrays batch = room.exact;
-    static_cast<gpu::SolidPairs&>(batch) = asked;
-    batch.most_blocks = solids.impl().most_blocks;
-    if (!gpu::has_room(batch))
-      throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
+    const auto batch = exact_batch<gpu::ExactArrays>(solids, room, asked);
     const gpu::ExactKept* kept = nullptr;
     if (settings.kept != nullptr) {
       kept = &settings.kept->impl().arrays;
@@ -351,11 +357,17 @@ void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measu
     throw Error("GPU: " + std::to_string(patches.most) + " patches a pair; at most " +
                 std::to_string(kMostGpuPatches));
   if (pairs.count == 0) return;
+  const gpu::DeviceGuard guard(room.device);
+  if (measure == Measure::exact) {
+    auto batch = exact_batch<gpu::ExactPatchArrays>(solids, room, asked);
+    batch.patches = patches;
+    gpu::launch_exact_patches(batch, room.grids, stream);
+    return;
+  }
   gpu::PatchArrays batch = room.patches;
   static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.patches = patches;
   batch.most_bins = solids.impl().most_bins;
-  const gpu::DeviceGuard guard(room.device);
   gpu::launch_patches(batch, room.grids, room.patch_room, stream);
 }
 

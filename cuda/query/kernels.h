@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_kept_arrays.h"
+#include "cuda/query/exact_patch_arrays.h"
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
@@ -37,6 +37,7 @@ struct Grids {
   int search[2];     ///< of separations, in float and in double
   MeshGapGrids mesh_gaps;
   int divide;            ///< of contact patches
+  int divide_meshes;     ///< of contact patches by Measure::exact
   int smooth;            ///< of trees in smooth fields
   TriangleGrids facets;  ///< of trees in boxes and terrains
   ExactGrids exact;
@@ -48,14 +49,17 @@ void find_separation_grids(Grids& grids);
 void find_patch_grids(Grids& grids);
 void find_field_grids(Grids& grids);
 void find_exact_grids(Grids& grids);
+void find_exact_patch_grids(Grids& grids);
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
 /// `kept`: may be null.
 void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& grids,
                   cudaStream_t stream);
+void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cudaStream_t stream);
 /// Whether a batch's memory holds rooms for its largest mesh.
 bool has_room(const ExactArrays& batch);
+bool has_room(const ExactPatchArrays& batch);
 /// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.
 std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs);
 /// `has_spheres`: some solids have no mesh; `has_meshes`: some have one.

@@ -207,6 +207,7 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
     ref.in_floats = put(float_blocks(mesh));
   }
   ref.volume = std::ldexp(header.volume + header.volume_error, 3 * header.exponent);
+  ref.radius = header.ball_radius;
   if (asset.sphere_count() == 0) return ref;
   for (const Measure measure : {Measure::matched, Measure::inner}) {
     const TreeHeader& tree = measure == Measure::inner ? header.inner_tree : header.matched_tree;

@@ -24,6 +24,7 @@ struct SolidRef {
   MeshTree mesh;                ///< without a header: none is kept
   const FloatBlock* in_floats;  ///< its blocks
   double volume;                ///< [u³] at most
+  double radius;                ///< [u] of a ball around it
 
   IST_HD bool is_field() const { return field.kind != FieldKind::none; }
   IST_HD bool has_spheres() const { return tree[0].leaf_blocks > 0; }

@@ -178,21 +178,26 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
                       const GpuSeparationSettings& settings, GpuWorkspace& workspace,
                       const GpuSeparations& answers, CUstream_st* stream);
 
-/// answers[i] and its patches = contact_patches(pairs[i]) of two assets by lenses
-/// (PenetrationSettings::spheres_only), without limits: the contact condensed into at most
-/// `patches.most`.
+/// answers[i] and its patches = contact_patches(pairs[i]) of two assets, without limits: the contact
+/// condensed into at most `patches.most`.
 ///
-/// Patches are the same regions of the same tree as there, with the same ids, unless two divisions
+/// By lenses (PenetrationSettings::spheres_only) patches are the same regions of the same tree as there, with the same ids, unless two divisions
 /// are equally good to a float's digits. Answers equal those of penetration_batch() to its
 /// precision, not bit for bit; copies of one asset at nearly the same pose are not treated
 /// specially. Volumes, forces and torques of a pair's patches sum to its answer's to about 1e-15.
+/// Measure::exact, of two assets that keep their meshes: the connected parts of the overlap and
+/// their octants, as contact_patches() has them of a pair without an id, within 1e-12 of the pair's
+/// size and mostly the same doubles, flush, coaxial and copied ones too. answers[i] has the bits of
+/// penetration_batch(). A pair that needs more memory than the workspace has for it is
+/// budget_exhausted, with NaN and a count of 0.
+///
 /// The bits are the same in every run, whatever else is in the batch.
 ///
 /// Only launches kernels on `stream`, as penetration_batch(). One warp processes a pair, so a very
 /// large contact takes long.
 ///
-/// Throws Error for Measure::exact, if a batch is larger than the workspace, if patches.most
-/// exceeds kMostGpuPatches, if the devices differ, or if a launch fails.
+/// Throws Error if a batch is larger than the workspace, if patches.most exceeds kMostGpuPatches,
+/// if the devices differ, if a mesh is too large for the workspace, or if a launch fails.
 void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream);

@@ -10,6 +10,7 @@
 #include "query/base/turned_over.h"
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
+#include "query/exact/keep_largest.h"
 #include "query/exact_penetration.h"
 #include "query/lod/level_blend.h"
 #include "query/lod/unlike_sizes.h"

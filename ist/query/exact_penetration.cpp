@@ -9,7 +9,8 @@
 #include "query/base/solid_bounds.h"
 #include "query/contact/write_patches.h"
 #include "query/exact/exact_in_world.h"
-#include "query/exact/exact_octants.h"
+#include "query/exact/exact_parts.h"
+#include "query/exact/keep_largest.h"
 #include "query/exact/kept_mesh.h"
 #include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
@@ -67,74 +68,14 @@ Answer stopped(const PlacedAsset& a, const PlacedAsset& b, Answer answer, const 
   return answer;
 }
 
-/// Of the smaller solid's radius: octants of a contact this near to each other hold it as one does.
-constexpr double kNearOctants = 0.15;
-
-/// As many parts as there is room for: the least joins the nearest of those that push like it, if
-/// there are any. Least is by volume; of octants by volume times the fourth power of the distance
-/// to the one that it joins: a crumb beside a contact goes, a small foot far from it stays.
-std::uint32_t keep_largest(std::span<ExactPart> parts, std::size_t room, bool octants) {
-  std::uint32_t kept[ExactScratch::kMostParts], count = 0;
-  for (std::uint32_t p = 0; p < parts.size(); ++p)
-    if (parts[p].kept == p) kept[count++] = p;
-  if (count <= room) return count;
-  for (ExactPart& part : parts) part.centre = (1 / (24 * part.sums.volume())) * part.sums.moment;
-  std::pair<bool, double> cost[ExactScratch::kMostParts];
-  std::uint32_t nearest[ExactScratch::kMostParts];
-  const auto weigh = [&](std::uint32_t p) {
-    bool unlike = false;
-    double square = 0;
-    nearest[p] = p;
-    for (std::uint32_t k = 0; k < count; ++k) {
-      const std::uint32_t q = kept[k];
-      if (q == p) continue;
-      const exact::Point between = parts[q].centre - parts[p].centre;
-      const bool against = dot(parts[q].sums.force, parts[p].sums.force) < 0;
-      const double apart = dot(between, between);
-      if (nearest[p] != p && (against != unlike ? against : !(apart < square))) continue;
-      nearest[p] = q;
-      unlike = against;
-      square = apart;
-    }
-    cost[p] = {unlike, parts[p].sums.volume() * (square * square)};
-  };
-  for (std::uint32_t k = 0; k < count; ++k) {
-    nearest[kept[k]] = kept[k];
-    cost[kept[k]] = {false, parts[kept[k]].sums.volume()};
-    if (octants) weigh(kept[k]);
-  }
-  while (count > room) {
-    const auto less = [&](std::uint32_t p, std::uint32_t q) { return cost[p] < cost[q]; };
-    std::uint32_t* const least = std::min_element(kept, kept + count, less);
-    const std::uint32_t joins = *least;
-    std::copy(least + 1, kept + count--, least);
-    weigh(joins);
-    parts[joins].kept = nearest[joins];
-    for (std::uint32_t k = 0; k < count; ++k)
-      if (nearest[kept[k]] == joins) weigh(kept[k]);
-  }
-  for (ExactPart& part : parts)
-    while (parts[part.kept].kept != part.kept) part.kept = parts[part.kept].kept;
-  return count;
-}
-
-/// Adds to the kept parts what joined them.
-void join(std::span<ExactPart> parts) {
-  for (const ExactPart& part : parts) {
-    ExactPart& into = parts[part.kept];
-    if (&into != &part) into.sums.add(part.sums);
-  }
-}
-
 /// Writes the kept parts in their order; `kept` becomes the patch.
 std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
                         const RelativePose& pose, std::span<ContactPatch> patches) {
   std::uint32_t count = 0;
-  std::uint32_t place[ExactScratch::kMostParts];
   for (std::uint32_t p = 0; p < parts.size(); ++p) {
     if (parts[p].kept != p) continue;
     const ExactInWorld sums = in_world(parts[p].sums, origin, pose);
-    ContactPatch& patch = patches[place[p] = count++];
+    ContactPatch& patch = patches[parts[p].listed = count++];
     patch = {};
     patch.id = parts[p].id;
     patch.centroid = vector(sums.centroid);
@@ -142,19 +83,11 @@ std::size_t write_parts(std::span<ExactPart> parts, const exact::Point& origin,
     patch.force = -vector(sums.force);
     patch.torque = -vector(sums.torque);
   }
-  for (ExactPart& part : parts) part.kept = place[part.kept];
+  for (ExactPart& part : parts) part.kept = parts[part.kept].listed;
   return count;
 }
 
 }  // namespace
-
-double exact_deepest(double volume) noexcept {
-  // The cube root from square roots alone: the C library's differs between processors. Each step
-  // leaves a quarter of the error of the logarithm.
-  double y = std::sqrt(volume);
-  for (int k = 0; k < 30; ++k) y = std::sqrt(std::sqrt(volume * y));
-  return y;
-}
 
 Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
@@ -186,7 +119,7 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
   OverlapOutline answer;
   const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
   ExactScratch& scratch = workspace.impl()->exact;
-  auto query = query_of<ExactOctants>(a, mesh_a, b, mesh_b, *pose, scratch);
+  auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (!found.complete || !query.holds_crossings()) {
     const auto by_spheres = [&] {
@@ -205,19 +138,23 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
   answer.segments = found.crossings;
   if (!patches.empty()) {
     std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-    const std::uint32_t kept = keep_largest(parts, patches.size(), false);
-    if (divides && kept <= ExactScratch::kMostSplit && patches.size() > 1) {
-      join(parts);
+    const auto room = static_cast<std::uint32_t>(std::min<std::size_t>(patches.size(), ~0u));
+    const auto keep = [&](bool octants) {
+      return keep_largest(parts.data(), static_cast<std::uint32_t>(parts.size()), room, octants);
+    };
+    const std::uint32_t kept = keep(false);
+    if (divides && kept <= PartMemory::kMostSplit && room > 1) {
+      join_parts(parts.data(), static_cast<std::uint32_t>(parts.size()));
       const bool by_b = volume_of(b) <= volume_of(a);
       const PlacedAsset& smaller = by_b ? b : a;
       const double radius = smaller.scale * smaller.asset.header().ball_radius / pose->unit_a;
-      parts = {scratch.octants.get(),
-               query.split(parts, by_b, kNearOctants * radius, patches.size())};
-      keep_largest(parts, patches.size(), true);
+      parts = {scratch.octants.get(), query.split(static_cast<std::uint32_t>(parts.size()), by_b,
+                                                  kNearOctants * radius, room)};
+      keep(true);
     } else if (divides) {
       for (ExactPart& part : parts) part.id *= 8;
     }
-    join(parts);
+    join_parts(parts.data(), static_cast<std::uint32_t>(parts.size()));
     answer.contact.count = write_parts(parts, found.origin, *pose, patches);
     finish_patches(patches.first(answer.contact.count), b.pose,
                    exact_deepest(answer.contact.penetration.volume));

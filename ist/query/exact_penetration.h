@@ -11,9 +11,6 @@ Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept;
 
-/// [u] Depth that no patch of such a contact [u³] exceeds.
-double exact_deepest(double volume) noexcept;
-
 /// contact_patches() and overlap_outline() by Measure::exact. `divides`: parts into octants, as far
 /// as there is room.
 OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,

@@ -19,9 +19,9 @@ namespace ist::python {
 
 inline constexpr std::pair<const char*, Measure> kMeasures[] = {
     {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
-/// What a GPU's contact patches answer.
-inline constexpr std::pair<const char*, Measure> kGpuMeasures[] = {{"matched", Measure::matched},
-                                                                   {"inner", Measure::inner}};
+/// Of the spheres of an asset.
+inline constexpr std::pair<const char*, Measure> kSphereMeasures[] = {{"matched", Measure::matched},
+                                                                      {"inner", Measure::inner}};
 
 /// Keywords that penetrations and contact patches share.
 ContactSettings contact_settings(const std::string& measure, bool spheres_only,

@@ -28,7 +28,7 @@ std::unique_ptr<Lenses> lenses(const py::object& a, const py::object& b, const p
   if (pose.is_none()) take_poses(pose, "pose", "(7,) or (4, 4)");
   const PlacedAsset first{tree_of(a, "a"), take_pose(pose_a, scale_a), scale_a};
   const PlacedAsset second{tree_of(b, "b"), take_pose(pose, scale), scale};
-  const LensSettings settings{named(measure, "measure", kGpuMeasures), detail_a, detail_b};
+  const LensSettings settings{named(measure, "measure", kSphereMeasures), detail_a, detail_b};
   std::vector<OverlapLens> room(4096);
   OverlapLenses found;
   {

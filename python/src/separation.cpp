@@ -150,7 +150,8 @@ constexpr const char* kPatchesDoc =
 Arguments as for penetration(). The patches sum to the whole contact. max_patches:
 on the CPU any number from 1.
 
-Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Shape is missing_data. Beyond
+Solids on a GPU: of two Assets, 1 to 32 patches, without limits; a row of a Shape is missing_data, and
+by 'exact' a pair that lacks memory is budget_exhausted, with count 0. Patches are in order of id. Beyond
 count[i] a pair's patches are zero, or unchanged with `out`.
 
 Returns ContactPatches: arrays of shape (n, max_patches), or (max_patches,) for one pose.)";
@@ -271,7 +272,7 @@ void add_separation(py::module_& module) {
           refuse_given("not on a GPU", {{"pair_budget", pair_budget != 0},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          const Measure which = named(measure, "measure", kGpuMeasures);
+          const Measure which = named(measure, "measure", kMeasures);
           if (max_patches < 1 || max_patches > kMostGpuPatches)
             throw value_error("max_patches: " + std::to_string(max_patches) + "; wanted 1 to " +
                               std::to_string(kMostGpuPatches) + " on a GPU");

@@ -9,6 +9,7 @@
 #include "cuda/base/check.h"
 #include "support/detailed_pairs.h"
 #include "support/device_patches.h"
+#include "support/exact_patch_checks.h"
 #include "support/gpu_test.h"
 #include "support/host_patches.h"
 #include "support/random_pairs.h"
@@ -91,6 +92,60 @@ TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
   stream.wait();
   expect_same_bits(captured.get(wholes.get()), expected);
   expect_same_bits(batch.get(), direct.get());
+  cudaGraphExecDestroy(ready);
+  cudaGraphDestroy(graph);
+}
+
+/// By Measure::exact: general poses, aligned ones, mates, and what cannot be asked.
+TEST_F(GpuPatchesTest, ExactOnesHaveTheBitsOfAWarpOnTheHost) {
+  std::vector<BatchPair> pairs = exact_pairs(57, 60);
+  for (const BatchPair& pair : aligned_pairs(58, 60)) pairs.push_back(pair);
+  pairs[20].pose_b.t[0] = std::nan("");
+  pairs[30].scale_b = -1;
+  pairs[40].a = 1000;
+  const MatedBatch mated(59, 20);
+  for (const std::uint32_t most : {0u, 1u, 6u, kMostGpuPatches}) {
+    expect_same_bits(on_device(GpuSolids(exact_solids()), pairs, Measure::exact, most),
+                     HostPatches(exact_solids()).run(pairs, Measure::exact, most, 1));
+    expect_same_bits(
+        on_device(GpuSolids(views_of(mated.assets)), mated.pairs, Measure::exact, most),
+        HostPatches(views_of(mated.assets)).run(mated.pairs, Measure::exact, most, 1));
+  }
+}
+
+TEST_F(GpuPatchesTest, ExactOnesAreTheCpus) {
+  const GpuSolids solids(exact_solids());
+  for (const std::uint32_t most : {1u, 4u, 16u})
+    for (const std::vector<BatchPair>& pairs : {exact_pairs(60, 10'000), aligned_pairs(61, 10'000)})
+      expect_near(compare_patches(exact_assets(), pairs,
+                                  on_device(solids, pairs, Measure::exact, most), most));
+  const MatedBatch mated(62, 2000);
+  expect_near(compare_patches(
+      mated.assets, mated.pairs,
+      on_device(GpuSolids(views_of(mated.assets)), mated.pairs, Measure::exact, 8), 8));
+}
+
+TEST_F(GpuPatchesTest, AGraphMayCaptureExactOnes) {
+  std::vector<BatchPair> pairs = exact_pairs(63, 5000);
+  for (const BatchPair& pair : aligned_pairs(64, 5000)) pairs.push_back(pair);
+  const GpuSolids solids(exact_solids());
+  const std::vector<PatchedPair> expected = on_device(solids, pairs, Measure::exact, 5);
+  GpuWorkspace workspace(pairs.size());
+  const Stream stream;
+  const DeviceBatch wholes(pairs), alone(pairs);
+  const DevicePatches captured(pairs.size(), 5);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t ready = nullptr;
+  gpu::check(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), "capturing");
+  contact_patches_batch(solids, wholes.pairs(), Measure::exact, workspace, wholes.answers(),
+                        captured.patches(), stream);
+  penetration_batch(solids, alone.pairs(), {Measure::exact}, workspace, alone.answers(), stream);
+  gpu::check(cudaStreamEndCapture(stream, &graph), "capturing");
+  gpu::check(cudaGraphInstantiate(&ready, graph, 0), "making a graph");
+  for (int k = 0; k < 3; ++k) gpu::check(cudaGraphLaunch(ready, stream), "launching a graph");
+  stream.wait();
+  expect_same_bits(captured.get(wholes.get()), expected);
+  expect_same_bits(alone.get(), wholes.get());
   cudaGraphExecDestroy(ready);
   cudaGraphDestroy(graph);
 }

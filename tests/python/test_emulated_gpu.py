@@ -131,6 +131,25 @@ def test_the_exact_measure_is_that_of_the_cpu(random_poses):
     assert (found.status.numpy() == 0).all()
 
 
+def test_exact_patches_are_those_of_the_cpu(random_poses):
+    mesh = ist.sample_mesh("cube")
+    cube, edge = ist.bake_mesh_only(mesh), np.ptp(mesh.vertices[:, 0])
+    poses = np.concatenate([random_poses(40, 0.5), [[1, 0, 0, 0, 0, 0, 0.9], [1, 0, 0, 0, 1, 0, 0]]])
+    poses[:, 4:] *= edge
+    expected = ist.contact_patches(cube, cube, poses, measure="exact", max_patches=6)
+    found = batch(ist.Solids([cube], device="cuda"), a=0, b=0, poses=OnDevice(poses.copy()),
+                  query=ist.contact_patches, measure="exact", max_patches=6)
+    count = found.count.numpy()
+    assert (found.status.numpy() == 0).all() and (count > 1).any()
+    for i, some in enumerate(count):
+        order = np.argsort(expected.id[i, :some], kind="stable")
+        assert np.array_equal(found.id.numpy()[i, :some], expected.id[i, order]), i
+        assert not expected.volume[i, some:].any()
+        for name, power in (("volume", 3), ("force", 2), ("torque", 3), ("centroid", 1), ("point", 1)):
+            ours, theirs = getattr(found, name).numpy()[i, :some], getattr(expected, name)[i, order]
+            assert np.abs(ours - theirs).max(initial=0) <= 1e-9 * edge**power, (i, name)
+
+
 def test_any_number_of_cards(solids, arguments):
     """docs/batch.md: rows are shared out, one Solids a card; nobody waits before all are asked."""
     expected = ask(ist.Solids(solids, device="cuda"), arguments, measure="matched")

@@ -173,6 +173,29 @@ def test_separations_are_those_of_the_cpu(solids, assets, pairs):
     assert found.normal.shape == (3000, 3) and found.node_visits is None
 
 
+def test_exact_patches_are_those_of_the_cpu(solids, assets, pairs):
+    arguments = pairs(2000)
+    arguments["poses"][10, 3] = np.nan
+    names = ("count", "id", "volume", "force", "torque", "status")
+    ours = host(ask(assets, query=ist.contact_patches, **on_card(arguments), max_patches=4,
+                    measure="exact"), names)
+    assert ours["status"][10] == 2 and ours["count"][10] == 0
+    size = 2 * max(solid.bounds().radius for solid in solids) * arguments["scales"].max()
+    for a, b, rows in kinds(arguments):
+        theirs = ist.contact_patches(
+            solids[a], solids[b], arguments["poses"][rows], poses_a=arguments["poses_a"][rows],
+            scales=arguments["scales"][rows], scales_a=arguments["scales_a"][rows], max_patches=4,
+            measure="exact")
+        last = np.where(np.arange(4) < ours["count"][rows][:, None], ours["id"][rows], 2**64 - 1)
+        order = np.argsort(np.where(np.arange(4) < ours["count"][rows][:, None], theirs.id, 2**64 - 1), 1)
+        assert (np.sort(last, 1) == last).all()
+        for name in ("id", "volume", "force", "torque"):
+            column = getattr(theirs, name)
+            column = np.take_along_axis(column, order.reshape(order.shape + (1,) * (column.ndim - 2)), 1)
+            error = np.abs(ours[name][rows].astype(float) - column.astype(float)).max(initial=0)
+            assert error <= (0 if name == "id" else 1e-9 * size**3), name
+
+
 def test_patches_are_those_of_the_cpu(solids, assets, pairs):
     arguments = pairs(2000)
     arguments["poses"][10, 3] = np.nan

@@ -135,8 +135,8 @@ def test_what_a_device_does_not_take_is_named(device, there, solids, arguments):
                  (ist.separation, dict(wanted=["distance"]), "wanted: for solids on a GPU only"),
                  (ist.contact_patches, dict(stream=1), "stream: for solids on a GPU only")]
     else:
-        wrong = [(ist.contact_patches, dict(measure="exact"),
-                  "measure: 'exact'; one of 'matched', 'inner'"),
+        wrong = [(ist.contact_patches, dict(measure="nearest"),
+                  "measure: 'nearest'; one of 'matched', 'inner', 'exact'"),
                  (ist.penetration, dict(max_visits=9), "max_visits: not on a GPU"),
                  (ist.penetration, dict(relative_error=0.1), "relative_error: not on a GPU"),
                  (ist.penetration, dict(scale_gradients=True), "scale_gradients: not on a GPU"),

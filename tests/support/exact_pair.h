@@ -56,7 +56,7 @@ class GapQuery : public ExactQuery {
     // The way from the nearer end of a pierced edge.
     for (std::uint32_t i = 0; i < out_.crossings; ++i)
       for (int e = 0; e < 2; ++e) {
-        const Crossings::End end = scratch_.crossings.end_of(i, e);
+        const CrossingEnd end = scratch_.crossings.end_of(i, e);
         const Side& own = sides_[end.of_b ? 1 : 0];
         const std::uint32_t block = end.triangle / kWidth;
         const std::uint32_t k = end.from_first ? end.edge : (end.edge + 1) % 3;

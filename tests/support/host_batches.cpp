@@ -8,7 +8,7 @@
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/detail_sums.h"
 #include "cuda/query/exact_kept.h"
-#include "cuda/query/exact_steps.h"
+#include "cuda/query/exact_patches.h"
 #include "cuda/query/field_steps.h"
 #include "cuda/query/patch_steps.h"
 #include "cuda/query/separation_steps.h"
@@ -301,12 +301,50 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                    to.torsion.data()};
   batch.rooms = room.data();
   batch.most_bins = solids_.most_bins();
+  if (measure == Measure::exact) {
+    divide_exactly(batch.pairs, batch.patches, seed);
+    return to.rows(wholes.rows());
+  }
   const auto memory = std::make_unique<gpu::PatchMemory>();
   for (std::uint32_t i = 0; i < n; ++i)
     if (gpu::sift_patches(batch, i))
       by_team(seed,
               [&](const auto& team) { gpu::patch_pair(team, batch, i, batch.room(0), *memory); });
   return to.rows(wholes.rows());
+}
+
+/// The kernels of exact_patch_kernels.cu.
+void HostPatches::divide_exactly(const gpu::SolidPairs& asked, const GpuContactPatches& patches,
+                                 unsigned seed) {
+  gpu::ExactPatchArrays batch = {};
+  static_cast<gpu::SolidPairs&>(batch) = asked;
+  batch.patches = patches;
+  exact_counters = {};
+  batch.counters = &exact_counters;
+  std::vector<std::uint32_t> lists[gpu::kExactPasses];
+  for (int k = 0; k < gpu::kExactPasses; ++k) {
+    lists[k].resize(asked.pairs.count);
+    batch.list[k] = lists[k].data();
+  }
+  for (const gpu::SolidRef& solid : solids_.refs())
+    batch.most_blocks = std::max(batch.most_blocks, solid.mesh.count);
+  for (std::uint32_t i = 0; i < asked.pairs.count; ++i)
+    if (gpu::sift_exact_patches(batch, i))
+      lists[gpu::kFirstPatchPass][exact_counters.listed[gpu::kFirstPatchPass]++] = i;
+  const auto memory = std::make_unique<gpu::ExactWholeMemory>();
+  for (int pass = gpu::kFirstPatchPass; pass < gpu::kExactPasses; ++pass) {
+    // What was there before must not matter.
+    std::vector<std::uint64_t> bytes(batch.bytes_of_team(pass) / 8, 0xA5A5A5A5A5A5A5A5u);
+    batch.memory = reinterpret_cast<std::byte*>(bytes.data());
+    const gpu::ExactRoom room = batch.room(pass, 0);
+    gpu::PartRoom parts = batch.part_room(pass, 0);
+    parts.end = parts.at + std::min(parts.end - parts.at, part_bytes[pass]);
+    gpu::clear_marks(SerialTeam(), room);
+    for (std::uint32_t k = 0; k < exact_counters.listed[pass]; ++k)
+      by_team(seed, [&](const auto& team) {
+        gpu::patch_pass(team, batch, pass, k, room, parts, *memory);
+      });
+  }
 }
 
 std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs, unsigned seed,

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
 #include <ist/query.h>
 
+#include "cuda/query/exact_arrays.h"
 #include "support/batch_pair.h"
 #include "support/host_solids.h"
 #include "support/patch_columns.h"
@@ -20,7 +23,15 @@ class HostPatches {
   std::vector<PatchedPair> run(const std::vector<BatchPair>& pairs, Measure measure,
                                std::uint32_t most, unsigned seed = 0);
 
+  // Of Measure::exact:
+  gpu::ExactCounters exact_counters;  ///< of the last run
+  /// [bytes] of a pass's room for parts, at most.
+  std::ptrdiff_t part_bytes[gpu::kExactPasses] = {0, PTRDIFF_MAX, PTRDIFF_MAX};
+
  private:
+  void divide_exactly(const gpu::SolidPairs& asked, const GpuContactPatches& patches,
+                      unsigned seed);
+
   HostSolids solids_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "query/exact/crossing_search.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/overlap_terms.h"
 
 namespace ist {
 namespace {
@@ -98,7 +99,7 @@ bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
       crossings.apex(s, k)[i] = blocks[s]->vertex[k][blocks[s]->fan[0][triangle % kWidth]];
   }
   for (int e = 0; e < 2; ++e) {
-    const Crossings::End end = crossings.end_of(i, e);
+    const CrossingEnd end = crossings.end_of(i, e);
     CrossedBlock& block = *blocks[end.of_b];
     const bool opposite = opposite_edge(block, end.triangle % kWidth) == end.edge;
     crossings.opposite(e)[i] = opposite ? (end.enters ? 1.0 : -1.0) : 0.0;
@@ -109,7 +110,7 @@ bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
 }
 
 /// An edge is pierced: how often it enters and leaves, and which comes first.
-void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const Crossings::End& end,
+void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const CrossingEnd& end,
                                double t, double t_error) noexcept {
   const std::uint32_t edge = 3 * (end.triangle % kWidth) + end.edge;
   const int sign = end.enters ? 1 : -1;

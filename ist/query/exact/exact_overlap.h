@@ -129,7 +129,7 @@ class ExactQuery {
   void sort_pairs(std::uint32_t count) noexcept;
   CrossedBlock* make_crossed_block(Side& side, std::uint32_t block) noexcept;
   bool add_crossing(std::uint32_t i) noexcept;
-  void note_piercing(Side& side, CrossedBlock& crossed, const Crossings::End& end, double t,
+  void note_piercing(Side& side, CrossedBlock& crossed, const CrossingEnd& end, double t,
                      double t_error) noexcept;
   void settle(Side& side, CrossedBlock& crossed) noexcept;
   bool is_inside(const Side& side, std::uint32_t vertex) const noexcept;

@@ -3,61 +3,126 @@
 #include <cstdint>
 
 #include "query/exact/exact_overlap.h"
+#include "query/exact/overlap_octants.h"
+#include "query/exact/overlap_terms.h"
 
 namespace ist {
 
-/// An overlap and its connected parts. Surfaces hang together by the curves where they cross and by
-/// vertices inside the other solid.
-class ExactParts : public ExactQuery {
+/// What ExactQuery::run() found, as OverlapParts asks it.
+class MeshOverlap : public ExactQuery {
  public:
   using ExactQuery::ExactQuery;
 
-  /// Divides what run() found. Returns how many parts there are, at most ExactScratch::kMostParts
-  /// (all further ones are in the last): ExactScratch::parts, by their first crossings.
-  std::uint32_t divide() noexcept;
-
-  /// Of crossing i in the order of sums, [0, ExactOverlap::crossings).
-  std::uint32_t part_of_crossing(std::uint32_t i) noexcept;
-  /// Its ends, A's unit frame.
-  void segment(std::uint32_t i, exact::Point& from, exact::Point& to) const noexcept;
-
  protected:
-  std::uint32_t part_of(std::uint32_t element) noexcept;
+  static constexpr bool leads() noexcept { return true; }
+  static constexpr std::uint32_t lane() noexcept { return 0; }
+  static constexpr std::uint32_t width() noexcept { return 1; }
+  static void meet() noexcept {}
+  static bool any(bool flag) noexcept { return flag; }
 
-  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
-  std::uint32_t vertex_element(const Side& side, const CrossedBlock& crossed,
-                               std::uint32_t vertex) const noexcept;
-  std::uint32_t block_element(const Side& side, std::uint32_t block) const noexcept;
-  /// What a triangle of a crossed block hangs together with, where it counts as a whole.
-  std::uint32_t triangle_element(const Side& side, const CrossedBlock& crossed,
-                                 std::uint32_t triangle) const noexcept;
+  const MeshTree& mesh(int side) const noexcept { return sides_[side].mesh; }
+  const PartMemory& memory() const noexcept { return memory_; }
+  PieceMemory& pieces() noexcept { return scratch_.pieces; }
+  const ExactSums& whole() const noexcept { return out_.sums; }
+  const exact::Point& origin() const noexcept { return out_.origin; }
+  const Similarity& map() const noexcept { return a_from_b_; }
+
+  std::uint32_t crossings() const noexcept { return out_.crossings; }
+  std::uint32_t triangle(int side, std::uint32_t i) const noexcept {
+    return scratch_.crossings.triangle(side, i);
+  }
+  CrossingEnd end_of(std::uint32_t i, int e) const noexcept {
+    return scratch_.crossings.end_of(i, e);
+  }
+  double way_of(std::uint32_t i, int e) const noexcept {
+    return scratch_.crossings.end(e, Crossings::kT)[i];
+  }
+  exact::Point place_of(std::uint32_t i, int e) const noexcept {
+    return scratch_.crossings.place_of(i, e, out_.origin);
+  }
+
+  std::uint32_t first_record(int side) const noexcept {
+    return side == 0 ? 0 : sides_[0].marks.count;
+  }
+  std::uint32_t end_record(int side) const noexcept {
+    return first_record(side) + sides_[side].marks.count;
+  }
+  int side_of(std::uint32_t r) const noexcept { return r < sides_[0].marks.count ? 0 : 1; }
+  std::uint32_t record_of(int side, std::uint32_t block) const noexcept {
+    return first_record(side) + sides_[side].marks.place[block];
+  }
+  const CrossedBlock& crossed(std::uint32_t r) const noexcept {
+    const int side = side_of(r);
+    return sides_[side].marks.blocks[r - first_record(side)];
+  }
+  std::uint32_t number_of(std::uint32_t r) const noexcept { return crossed(r).block; }
+  std::uint32_t inside_of(std::uint32_t r) const noexcept { return crossed(r).inside; }
+  std::uint64_t pierced_of(std::uint32_t r) const noexcept { return crossed(r).pierced; }
+  std::uint32_t opposite_edge(std::uint32_t r, std::uint32_t t) const noexcept {
+    return ExactQuery::opposite_edge(crossed(r), t);
+  }
+  exact::Point at(std::uint32_t r, std::uint32_t v) const noexcept { return crossed(r).at(v); }
+  int whole_of(std::uint32_t r, std::uint32_t t) const noexcept {
+    return middle_of(mesh(side_of(r)).blocks[number_of(r)], crossed(r),
+                     3 * t + opposite_edge(r, t));
+  }
+
+  bool is_inside(int side, std::uint32_t b) const noexcept {
+    return has(sides_[side].marks.inside, b);
+  }
+  bool is_pierced(int side, std::uint32_t b) const noexcept {
+    return has(sides_[side].marks.pierced, b);
+  }
+  template <class Visit>
+  void for_each_inside(int side, const Visit& visit) const {
+    for_each_block(sides_[side].marks.inside, mesh(side).level[0].count, visit);
+  }
+  template <class Visit>
+  void for_each_pierced(int side, const Visit& visit) const {
+    for_each_block(sides_[side].marks.pierced, mesh(side).level[0].count, visit);
+  }
+
+  exact::Point vertex(int side, std::uint32_t number) const noexcept {
+    return place(sides_[side], number) - out_.origin;
+  }
+  LaneSums lane_sums(int side, std::uint32_t b, const exact::Point& from) const noexcept {
+    return ExactQuery::lane_sums(sides_[side], 1, b / kWidth, b % kWidth, out_.origin + from);
+  }
+
+  void find_crossing_terms(std::uint32_t first) noexcept {
+    crossing_terms(scratch_.crossings, first, out_.origin, pieces().terms);
+  }
+  void count_triangles(std::uint32_t r) noexcept {
+    ExactQuery::count_triangles(mesh(side_of(r)).blocks[number_of(r)], crossed(r), pieces().whole);
+  }
+  void find_triangle_terms(std::uint32_t r, std::uint32_t h) noexcept {
+    triangle_terms(crossed(r), pieces().whole, static_cast<int>(h), pieces().terms);
+  }
+  void find_octant_pieces(std::uint32_t first) noexcept {
+    octant_pieces(scratch_.crossings, first, pieces().view, pieces().octants);
+  }
 
  private:
-  std::uint32_t root(std::uint32_t element) noexcept;
-  void unite(std::uint32_t x, std::uint32_t y) noexcept;
-  /// Of the edges of a crossed block, by its place.
-  std::uint32_t first_middle(const Side& side, std::uint32_t place) const noexcept;
+  PartMemory memory_ = scratch_.part_memory();
+};
 
-  void begin() noexcept;
-  void join_curves() noexcept;
-  void join_holes(Side& side) noexcept;
-  void join_edges() noexcept;
-  std::uint32_t join_edge(const Side& side, const CrossedBlock& crossed, std::uint32_t edge,
-                          std::uint32_t first) noexcept;
-  void join_vertices(Side& side) noexcept;
-  void join_blocks(Side& side) noexcept;
-  void join() noexcept;
+/// An overlap, its connected parts and their octants.
+class ExactParts : public OverlapOctants<MeshOverlap> {
+ public:
+  using OverlapOctants::OverlapOctants;
+
+  /// Divides what run() found: OverlapParts::divide(). Of a pair that is kept it knows whether all
+  /// is one.
+  std::uint32_t divide() noexcept;
+
+  /// The ends of crossing i, A's unit frame, from the origin.
+  void segment(std::uint32_t i, exact::Point& from, exact::Point& to) const noexcept {
+    from = place_of(i, 0);
+    to = place_of(i, 1);
+  }
+
+ private:
   std::uint64_t hash_of_names() const noexcept;
-  void name_parts() noexcept;
-  /// Whether all that counts is in one part.
-  bool are_one() noexcept;
-  void sum_parts() noexcept;
-  void join_cavities() noexcept;
-
-  std::uint32_t parts_ = 0;
-  bool one_ = false;      ///< all that counts is in one part
-  bool by_names_ = true;  ///< what hangs together follows from what hash_of_names() is of
-  std::uint32_t vertices_of_b_ = 0, blocks_of_a_ = 0, blocks_of_b_ = 0;  ///< first elements
 };
 
 }  // namespace ist

@@ -10,6 +10,7 @@
 #include "query/base/hooked_memory.h"
 #include "query/base/placed_cache.h"
 #include "query/exact/crossing.h"
+#include "query/exact/exact_sums.h"
 #include "query/exact/kept_pairs.h"
 
 namespace ist {
@@ -166,13 +167,7 @@ class Crossings {
       std::fill(at(number) + from, at(number) + to, 0.0);
   }
 
-  /// An end of one.
-  struct End {
-    std::uint32_t triangle;  ///< whose edge it is
-    std::uint32_t edge;      ///< edge k goes from corner k to the next
-    bool of_b, from_first, enters;
-  };
-  End end_of(std::uint32_t i, int e) const noexcept {
+  CrossingEnd end_of(std::uint32_t i, int e) const noexcept {
     const auto code = static_cast<std::uint32_t>(static_cast<int>(end(e, kEdge)[i]));
     const std::uint32_t of_b = (code % 8 + 1) / 4;
     return {triangle_[2 * i + of_b], code % 8 - 3 * of_b, of_b != 0, code >= 8,
@@ -217,59 +212,6 @@ struct BlockMarks {
   std::uint32_t count = 0;
 };
 
-/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
-struct ExactSums {
-  exact::CarefulSum six_volumes;
-  exact::Point moment = {};  ///< 24 ∫ x
-  exact::Point force = {};  ///< ∫ n dA over B's surface in A: the volume's gradient by translation
-  exact::Point torque = {};  ///< ∫ x × n dA, likewise
-
-  double volume() const noexcept { return six_volumes.value() / 6; }
-
-  void add(const ExactSums& other) noexcept {
-    six_volumes.add(other.six_volumes.value());
-    moment = moment + other.moment;
-    force = force + other.force;
-    torque = torque + other.torque;
-  }
-};
-
-/// A connected part of an overlap, or an octant of one.
-struct ExactPart {
-  ExactSums sums;          ///< from the whole's origin
-  std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
-  std::uint32_t kept = 0;  ///< the part that it was added to, or itself
-  std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex: it is not divided
-  exact::Point centre = {};       ///< centroid from the whole's origin, once there is need of it
-};
-
-/// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
-struct OctantSums {
-  double six_volumes = 0;
-  exact::Point moment = {};   ///< 24 ∫ x
-  exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
-  exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
-  // Of the first:
-  exact::Point centre = {};          ///< the part's centroid from the whole's origin, A's axes
-  exact::Point low = {}, high = {};  ///< its box in the axes, from the centre
-  int planes = 0;                    ///< a bit an axis: the part is cut across it
-};
-
-/// An edge where it is pierced.
-struct PiercedEnd {
-  std::uint64_t edge;
-  double t;
-  std::uint32_t crossing, other;
-  bool of_b;
-};
-
-/// A curve where surfaces cross, if it lies in one triangle of a solid.
-struct CurveExtent {
-  std::uint32_t triangle;  ///< kNoIndex: of several
-  exact::Point low, high;  ///< its box
-  exact::Point area;       ///< twice the vector of what it goes around
-};
-
 /// Scratch memory of exact queries, a part of a workspace: all of it grows with its capacity.
 struct ExactScratch {
   ExactScratch(std::size_t capacity, const MemoryHooks& hooks)
@@ -292,9 +234,9 @@ struct ExactScratch {
         parent(hooked_array<std::uint32_t>(hooks, elements())),
         part(hooked_array<std::uint32_t>(hooks, elements())),
         middles(hooked_array<std::uint32_t>(hooks, 2 * 3 * kWidth * std::size_t{most_crossed})),
-        parts(hooked_array<ExactPart>(hooks, kMostParts)),
-        octants(hooked_array<ExactPart>(hooks, kMostParts)),
-        octant_sums(hooked_array<OctantSums>(hooks, 8 * kMostSplit)) {
+        parts(hooked_array<ExactPart>(hooks, PartMemory::kMostParts)),
+        octants(hooked_array<ExactPart>(hooks, PartMemory::kMostParts)),
+        octant_sums(hooked_array<OctantSums>(hooks, 8 * PartMemory::kMostSplit)) {
     placed_a->forget();
     for (BlockMarks* marks : {&a, &b}) {
       for (HookedArray<std::uint64_t>* bits :
@@ -307,9 +249,6 @@ struct ExactScratch {
 
   /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
-
-  static constexpr std::uint32_t kMostParts = 1024;
-  static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
 
   /// What is placed is of another pose: all but A's triangles in A's own frame.
   void forget(std::uint64_t mesh_a) noexcept {
@@ -346,7 +285,15 @@ struct ExactScratch {
   HookedArray<std::uint32_t> middles;       ///< of an edge of a crossed block, A's first
   HookedArray<ExactPart> parts, octants;
   HookedArray<OctantSums> octant_sums;
+  PieceMemory pieces;
   BlockMarks a, b;
+
+  PartMemory part_memory() noexcept {
+    return {ends.get(),        curves.get(),          keys.get(),
+            other_keys.get(),  parent.get(),          part.get(),
+            middles.get(),     parts.get(),           octants.get(),
+            octant_sums.get(), PartMemory::kMostParts};
+  }
 };
 
 }  // namespace ist

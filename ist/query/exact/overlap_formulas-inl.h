@@ -111,3 +111,37 @@ IST_FORMULA OctantTerms octant_terms(Real half, Real share, const Vec3& p, const
   const Real six = constant(2.0) * dot(p, area);
   return {six, six * three, area, share * cross(three, area)};
 }
+
+/// What a crossing adds to octants: the triangles of A and of B between the segment and the apex,
+/// those between the apex and a pierced edge opposite to it, at each end, and all of them together.
+struct OctantTriangles {
+  OctantTerms of[4], all;
+  Vec3 area[2];  ///< of all, A's and B's
+};
+
+/// `corner`: the apexes of A and of B, the ends, and the nearer ends of their edges; `by_b`: whose
+/// edge an end is of; `times`: how often its triangle counts.
+IST_FORMULA void octant_triangles(const Vec3 (&corner)[6], const Mask (&by_b)[2],
+                                  const Real (&times)[2], OctantTriangles& out) {
+  const Real half = constant(0.5), third = constant(0.5 / 3), less_third = constant(-0.5 / 3);
+  out.of[0] = octant_terms(half, less_third, corner[0], corner[2], corner[3]);
+  out.of[1] = octant_terms(half, third, corner[1], corner[3], corner[2]);
+  OctantTerms& all = out.all;
+  all.six_volumes = out.of[0].six_volumes + out.of[1].six_volumes;
+  all.moment = out.of[0].moment + out.of[1].moment;
+  all.torque = out.of[0].torque + out.of[1].torque;
+  for (int s = 0; s < 2; ++s) out.area[s] = out.of[s].area;
+  for (int e = 0; e < 2; ++e) {
+    const Vec3 apex = {choose(by_b[e], corner[1].x, corner[0].x),
+                       choose(by_b[e], corner[1].y, corner[0].y),
+                       choose(by_b[e], corner[1].z, corner[0].z)};
+    const OctantTerms& terms = out.of[2 + e] = octant_terms(
+        half * times[e], choose(by_b[e], third, less_third), apex, corner[2 + e], corner[4 + e]);
+    const Real b = choose(by_b[e], constant(1.0), constant(0.0));
+    all.six_volumes = all.six_volumes + terms.six_volumes;
+    all.moment = all.moment + terms.moment;
+    all.torque = all.torque + terms.torque;
+    out.area[0] = out.area[0] + (constant(1.0) - b) * terms.area;
+    out.area[1] = out.area[1] + b * terms.area;
+  }
+}

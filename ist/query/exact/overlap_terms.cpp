@@ -67,8 +67,7 @@ void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const Oc
   };
   const Vec3 origin = all(view.origin),
              axis[3] = {all(view.axis[0]), all(view.axis[1]), all(view.axis[2])};
-  for (int t = 0; t < OctantPieces::kTriangles; ++t) out.of_b[t] = t == 1 ? 0xff : 0;
-  const V once = hn::Set(d, 1.0), half = hn::Set(d, 0.5), third = hn::Set(d, 0.5 / 3);
+  const V once = hn::Set(d, 1.0), zero = hn::Zero(d);
   for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
     const std::size_t i = first + l;
     const Vec3 centre = {hn::Load(d, view.centre[0] + l), hn::Load(d, view.centre[1] + l),
@@ -78,27 +77,20 @@ void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const Oc
               hn::LoadU(d, number(2) + i)};
     };
     Vec3 corner[6];
+    const auto bytes = [&](V numbers, std::uint8_t* to) {
+      hn::StoreU(hn::DemoteTo(hn::Rebind<std::uint8_t, D>(),
+                              hn::DemoteTo(hn::Rebind<std::int32_t, D>(), numbers)),
+                 hn::Rebind<std::uint8_t, D>(), to + l);
+    };
     const auto see = [&](int c, const Vec3& x) {
       const Vec3 from = x - centre;
       corner[c] = {dot(axis[0], from), dot(axis[1], from), dot(axis[2], from)};
       store(corner[c], out.at[c], l);
       const auto above = [&](V at, double bit) {
-        return hn::IfThenElseZero(at >= hn::Zero(d), hn::Set(d, bit));
+        return hn::IfThenElseZero(at >= zero, hn::Set(d, bit));
       };
-      const V octant =
-          (above(corner[c].x, 1.0) + above(corner[c].y, 2.0)) + above(corner[c].z, 4.0);
-      hn::StoreU(hn::DemoteTo(hn::Rebind<std::uint8_t, D>(),
-                              hn::DemoteTo(hn::Rebind<std::int32_t, D>(), octant)),
-                 hn::Rebind<std::uint8_t, D>(), out.octant[c] + l);
-    };
-    const auto add = [&](int t, V times, V share, const Vec3& p, const Vec3& q, const Vec3& r) {
-      const OctantTerms terms = octant_terms(half * times, share, p, q, r);
-      store(times, out.times[t] + l);
-      store(terms.six_volumes, out.six_volumes[t] + l);
-      store(terms.moment, out.moment[t], l);
-      store(terms.area, out.area[t], l);
-      store(terms.torque, out.torque[t], l);
-      return terms;
+      bytes((above(corner[c].x, 1.0) + above(corner[c].y, 2.0)) + above(corner[c].z, 4.0),
+            out.octant[c]);
     };
     for (int s = 0; s < 2; ++s) see(s, load([&](int k) { return crossings.apex(s, k); }));
     for (int e = 0; e < 2; ++e) {
@@ -108,30 +100,24 @@ void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const Oc
           near + load([&](int k) { return crossings.end(e, Crossings::kOffset + k); }));
       see(OctantPieces::kNear + e, near);
     }
-    const OctantTerms of_a = add(0, once, hn::Neg(third), corner[0], corner[2], corner[3]),
-                      of_b = add(1, once, third, corner[1], corner[3], corner[2]);
-    V six = of_a.six_volumes + of_b.six_volumes;
-    Vec3 moment = of_a.moment + of_b.moment, torque = of_a.torque + of_b.torque;
-    Vec3 area[2] = {of_a.area, of_b.area};
-    for (int e = 0; e < 2; ++e) {
-      const Mask by_b = ends_by_b(crossings, e, i);
-      const V times = hn::LoadU(d, crossings.opposite(e) + i), b = hn::IfThenElseZero(by_b, once);
-      out.of_b[2 + e] |= mask_bits(d, by_b) << l;
-      const Vec3 apex = {choose(by_b, corner[1].x, corner[0].x),
-                         choose(by_b, corner[1].y, corner[0].y),
-                         choose(by_b, corner[1].z, corner[0].z)};
-      const OctantTerms terms = add(2 + e, times, choose(by_b, third, hn::Neg(third)), apex,
-                                    corner[2 + e], corner[4 + e]);
-      six = six + terms.six_volumes;
-      moment = moment + terms.moment;
-      torque = torque + terms.torque;
-      area[0] = area[0] + (once - b) * terms.area;
-      area[1] = area[1] + b * terms.area;
+    const Mask by_b[2] = {ends_by_b(crossings, 0, i), ends_by_b(crossings, 1, i)};
+    const V times[4] = {once, once, hn::LoadU(d, crossings.opposite(0) + i),
+                        hn::LoadU(d, crossings.opposite(1) + i)};
+    OctantTriangles found;
+    octant_triangles(corner, by_b, {times[2], times[3]}, found);
+    for (int t = 0; t < OctantPieces::kTriangles; ++t) {
+      const OctantTerms& terms = found.of[t];
+      bytes(t < 2 ? (t == 1 ? once : zero) : hn::IfThenElseZero(by_b[t - 2], once), out.of_b[t]);
+      store(times[t], out.times[t] + l);
+      store(terms.six_volumes, out.six_volumes[t] + l);
+      store(terms.moment, out.moment[t], l);
+      store(terms.area, out.area[t], l);
+      store(terms.torque, out.torque[t], l);
     }
-    store(six, out.sum_six_volumes + l);
-    store(moment, out.sum_moment, l);
-    store(torque, out.sum_torque, l);
-    for (int s = 0; s < 2; ++s) store(area[s], out.sum_area[s], l);
+    store(found.all.six_volumes, out.sum_six_volumes + l);
+    store(found.all.moment, out.sum_moment, l);
+    store(found.all.torque, out.sum_torque, l);
+    for (int s = 0; s < 2; ++s) store(found.area[s], out.sum_area[s], l);
   }
 }
 

@@ -1,0 +1,160 @@
+#pragma once
+
+#include <cstdint>
+
+#include <ist/asset_layout.h>
+
+#include "base/bits.h"
+#include "query/exact/orientation.h"
+
+// What an overlap, its connected parts and their octants are summed in, on the host and on a GPU.
+
+namespace ist {
+
+/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
+struct ExactSums {
+  exact::CarefulSum six_volumes;
+  exact::Point moment = {};  ///< 24 ∫ x
+  exact::Point force = {};  ///< ∫ n dA over B's surface in A: the volume's gradient by translation
+  exact::Point torque = {};  ///< ∫ x × n dA, likewise
+
+  IST_HD double volume() const noexcept { return six_volumes.value() / 6; }
+
+  IST_HD void add(const ExactSums& other) noexcept {
+    six_volumes.add(other.six_volumes.value());
+    moment = moment + other.moment;
+    force = force + other.force;
+    torque = torque + other.torque;
+  }
+};
+
+/// A connected part of an overlap, or an octant of one.
+struct ExactPart {
+  ExactSums sums;          ///< from the whole's origin
+  std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
+  std::uint32_t kept = 0;  ///< the part that it was added to, or itself
+  std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex: it is not divided
+  exact::Point centre = {};       ///< centroid from the whole's origin, once there is need of it
+  // Of keep_largest():
+  double cost = 0;            ///< of its being added to another
+  std::uint32_t nearest = 0;  ///< that other
+  std::uint32_t listed = 0;   ///< in the k-th part the k-th of those that are kept
+  bool unlike = false;        ///< the other pushes against it
+};
+
+/// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
+struct OctantSums {
+  double six_volumes = 0;
+  exact::Point moment = {};   ///< 24 ∫ x
+  exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
+  exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
+  // Of the first:
+  exact::Point centre = {};          ///< the part's centroid from the whole's origin, A's axes
+  exact::Point low = {}, high = {};  ///< its box in the axes, from the centre
+  int planes = 0;                    ///< a bit an axis: the part is cut across it
+};
+
+/// An end of a segment that two triangles share: an edge of one pierces the other.
+struct CrossingEnd {
+  std::uint32_t triangle;  ///< whose edge it is
+  std::uint32_t edge;      ///< edge k goes from corner k to the next
+  bool of_b, from_first, enters;
+};
+
+/// An edge where it is pierced.
+struct PiercedEnd {
+  std::uint64_t edge;
+  double t;
+  std::uint32_t crossing, other;
+  bool of_b;
+};
+
+/// A curve where surfaces cross, if it lies in one triangle of a solid.
+struct CurveExtent {
+  std::uint32_t triangle;  ///< kNoIndex: of several
+  exact::Point low, high;  ///< its box
+  exact::Point area;       ///< twice the vector of what it goes around
+};
+
+/// Where parts and octants are worked out.
+struct PartMemory {
+  static constexpr std::uint32_t kMostParts = 1024;
+  static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
+
+  PiercedEnd* ends;                  ///< two a crossing
+  CurveExtent* curves;               ///< one a crossing
+  std::uint64_t *keys, *other_keys;  ///< a table; two a crossing
+  std::uint32_t *parent, *part;      ///< of an element
+  std::uint32_t* middles;            ///< of an edge of a crossed block
+  ExactPart *parts, *octants;
+  OctantSums* octant_sums;
+  std::uint32_t most_parts;
+};
+
+/// What eight pieces of the boundary add to the sums of an overlap, a lane each.
+struct alignas(64) ExactTerms {
+  /// Tetrahedra: those of a segment, and of an edge at each of its ends. Their sum would lose
+  /// digits where all are large and the overlap is small.
+  double six_volumes[3][8];
+  double moment[3][8], force[3][8], torque[3][8];
+  double rounding[8];  ///< six times what the volume may be off by
+};
+
+/// What eight crossings add to octants, a lane each: triangles of A and of B between the segment
+/// and the apex, and those between the apex and a pierced edge opposite to it, at each end.
+struct alignas(64) OctantPieces {
+  static constexpr int kTriangles = 4, kEnd = 2, kNear = 4;
+  /// From the centre in the octants' axes: the apexes of A and of B, from kEnd the ends, and from
+  /// kNear the nearer ends of their edges.
+  double at[6][3][8];
+  double times[4][8];  ///< how often a triangle counts
+  double six_volumes[4][8], moment[4][3][8], area[4][3][8], torque[4][3][8];
+  /// All of them together, the areas by surface.
+  double sum_six_volumes[8], sum_moment[3][8], sum_area[2][3][8], sum_torque[3][8];
+  std::uint8_t octant[6][8];  ///< a bit an axis: the corner's coordinate is not less than 0
+  std::uint8_t of_b[4][8];    ///< the triangle is of B's surface
+
+  /// Corner k of a triangle.
+  IST_HD int corner(int triangle, int k, std::uint32_t lane) const noexcept {
+    if (k == 0) return of_b[triangle][lane];
+    return triangle < 2 ? kEnd + (k == 1 ? triangle : 1 - triangle)
+                        : (k == 1 ? kEnd : kNear) + triangle - 2;
+  }
+};
+
+/// Where octants are seen from: the axes, and for each lane the centre of its part, from the origin
+/// of the sums.
+struct alignas(64) OctantView {
+  double centre[3][8];
+  exact::Point origin, axis[3];
+};
+
+/// What pieces of the boundary are worked out in.
+struct PieceMemory {
+  union {
+    ExactTerms terms;
+    OctantPieces octants;
+  };
+  OctantView view;
+  std::int8_t whole[kWidth];  ///< how often the cone over a triangle's edge counts
+  bool says;                  ///< what the lane that leads tells the others
+};
+
+/// Adds lane l of terms.
+IST_HD inline void add_triangle_term(const ExactTerms& terms, std::uint32_t l,
+                                     ExactSums& sums) noexcept {
+  sums.six_volumes.add(terms.six_volumes[0][l]);
+  sums.moment =
+      sums.moment + exact::Point{terms.moment[0][l], terms.moment[1][l], terms.moment[2][l]};
+}
+IST_HD inline void add_crossing_term(const ExactTerms& terms, std::uint32_t l,
+                                     ExactSums& sums) noexcept {
+  add_triangle_term(terms, l, sums);
+  sums.six_volumes.add(terms.six_volumes[1][l]);
+  sums.six_volumes.add(terms.six_volumes[2][l]);
+  sums.force = sums.force + exact::Point{terms.force[0][l], terms.force[1][l], terms.force[2][l]};
+  sums.torque =
+      sums.torque + exact::Point{terms.torque[0][l], terms.torque[1][l], terms.torque[2][l]};
+}
+
+}  // namespace ist

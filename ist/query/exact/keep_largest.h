@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+
+#include "query/exact/exact_sums.h"
+
+// How many parts of a contact become patches, on the host and on a GPU.
+
+namespace ist {
+
+/// The nearest part that is kept, of those that push like part p if there are any, and what it
+/// costs to join it.
+IST_HD inline void weigh_part(ExactPart* parts, std::uint32_t count, std::uint32_t p) {
+  ExactPart& part = parts[p];
+  double square = 0;
+  part.unlike = false;
+  part.nearest = p;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t q = parts[k].listed;
+    if (q == p) continue;
+    const exact::Point between = parts[q].centre - part.centre;
+    const bool against = dot(parts[q].sums.force, part.sums.force) < 0;
+    const double apart = dot(between, between);
+    if (part.nearest != p && (against != part.unlike ? against : !(apart < square))) continue;
+    part.nearest = q;
+    part.unlike = against;
+    square = apart;
+  }
+  part.cost = part.sums.volume() * (square * square);
+}
+
+/// As many parts as there is room for: the least joins the nearest of those that push like it, if
+/// there are any. Least is by volume; of octants by volume times the fourth power of the distance
+/// to the one that it joins: a crumb beside a contact goes, a small foot far from it stays.
+IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, std::uint32_t room,
+                                         bool octants) {
+  std::uint32_t count = 0;
+  for (std::uint32_t p = 0; p < size; ++p)
+    if (parts[p].kept == p) parts[count++].listed = p;
+  if (count <= room) return count;
+  for (std::uint32_t p = 0; p < size; ++p)
+    parts[p].centre = (1 / (24 * parts[p].sums.volume())) * parts[p].sums.moment;
+  for (std::uint32_t k = 0; k < count; ++k) {
+    ExactPart& part = parts[parts[k].listed];
+    part.nearest = parts[k].listed;
+    part.unlike = false;
+    part.cost = part.sums.volume();
+    if (octants) weigh_part(parts, count, parts[k].listed);
+  }
+  while (count > room) {
+    std::uint32_t least = 0;
+    for (std::uint32_t k = 1; k < count; ++k) {
+      const ExactPart &x = parts[parts[k].listed], &y = parts[parts[least].listed];
+      if (x.unlike != y.unlike ? y.unlike : x.cost < y.cost) least = k;
+    }
+    const std::uint32_t joins = parts[least].listed;
+    for (std::uint32_t k = least + 1; k < count; ++k) parts[k - 1].listed = parts[k].listed;
+    --count;
+    weigh_part(parts, count, joins);
+    parts[joins].kept = parts[joins].nearest;
+    for (std::uint32_t k = 0; k < count; ++k)
+      if (parts[parts[k].listed].nearest == joins) weigh_part(parts, count, parts[k].listed);
+  }
+  for (std::uint32_t p = 0; p < size; ++p)
+    while (parts[parts[p].kept].kept != parts[p].kept) parts[p].kept = parts[parts[p].kept].kept;
+  return count;
+}
+
+/// Adds to the kept parts what joined them.
+IST_HD inline void join_parts(ExactPart* parts, std::uint32_t size) {
+  for (std::uint32_t p = 0; p < size; ++p)
+    if (parts[p].kept != p) parts[parts[p].kept].sums.add(parts[p].sums);
+}
+
+/// [u] Depth that no patch of a contact of such a volume [u³] exceeds.
+IST_HD inline double exact_deepest(double volume) noexcept {
+  // The cube root from square roots alone: the C library's differs between processors. Each step
+  // leaves a quarter of the error of the logarithm.
+  double y = std::sqrt(volume);
+  for (int k = 0; k < 30; ++k) y = std::sqrt(std::sqrt(volume * y));
+  return y;
+}
+
+/// Of a solid's radius: octants of a contact this near to each other hold it as one does.
+inline constexpr double kNearOctants = 0.15;
+
+}  // namespace ist

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cmath>
+
+#include "query/base/smooth_step.h"
+#include "query/exact/exact_sums.h"
+#include "query/exact/overlap_formulas.h"
+
+// Which octants of a part are one, on the host and on a GPU.
+
+namespace ist::octants {
+
+/// Of a part's sums: what is less in an octant is left to the others.
+inline constexpr double kRounding = 1e-9;
+
+/// From 1 at `low` to 0 at twice that, or the other way round.
+IST_HD inline double falls(double x, double low) { return 1 - smooth_step(x / low - 1); }
+IST_HD inline double rises(double x, double low) { return smooth_step(x / low - 1); }
+
+template <class T>
+IST_HD void give(double share, T& out, T& in) {
+  const T part = share * out;
+  in = in + part;
+  out = share == 1 ? part - part : out - part;
+}
+
+/// Moves a share of what one octant has to another.
+IST_HD inline void move(OctantSums& from, double share, OctantSums& to) {
+  give(share, from.six_volumes, to.six_volumes);
+  give(share, from.moment, to.moment);
+  give(share, from.torque, to.torque);
+  for (int s = 0; s < 2; ++s) give(share, from.area[s], to.area[s]);
+}
+
+IST_HD inline void add(OctantSums& sums, bool of_b, const exact::OctantTerms& terms) {
+  sums.six_volumes += terms.six_volumes;
+  sums.moment = sums.moment + terms.moment;
+  sums.area[of_b] = sums.area[of_b] + terms.area;
+  sums.torque = sums.torque + terms.torque;
+}
+
+IST_HD inline double both_areas(const OctantSums& sums) {
+  return norm(sums.area[0]) + norm(sums.area[1]);
+}
+
+/// How far two octants are one: where one is a sliver of the other, or where they are near to each
+/// other, as those above and below the middle of a contact that is thin aslant are.
+IST_HD inline double oneness(const OctantSums& x, const OctantSums& y, double near) {
+  const double less = exact::lesser(x.six_volumes, y.six_volumes),
+               more = exact::greater(x.six_volumes, y.six_volumes);
+  if (!(less > 0)) return 1;
+  const double apart =
+      norm((1 / (4 * x.six_volumes)) * x.moment - (1 / (4 * y.six_volumes)) * y.moment);
+  return exact::greater(falls(less / more, 1.0 / 64), falls(apart, near));
+}
+
+/// Of what is near: a part that is no thicker along an axis is not cut across it.
+inline constexpr double kThin = 1.0 / 8;
+
+/// How far a part is no longer than `length` along an axis.
+IST_HD inline double shortness(const OctantSums& box, int axis, double length) {
+  return falls(box.high[axis] - box.low[axis], length);
+}
+/// And along all.
+IST_HD inline double smallness(const OctantSums& box, double length) {
+  return exact::lesser(exact::lesser(shortness(box, 0, length), shortness(box, 1, length)),
+                       shortness(box, 2, length));
+}
+
+/// Whether it is longer than that along all.
+IST_HD inline bool is_large(const OctantSums& box, double near) {
+  return shortness(box, 0, near) == 0 && shortness(box, 1, near) == 0 &&
+         shortness(box, 2, near) == 0;
+}
+
+/// The planes across which octants are not one anyway, a bit an axis.
+IST_HD inline int planes_of(const OctantSums& box, double near) {
+  int planes = 0;
+  for (int k = 0; k < 3 && smallness(box, near) < 1; ++k)
+    planes |= (shortness(box, k, kThin * near) < 1 ? 1 : 0) << k;
+  return planes;
+}
+
+/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one as
+/// it is small, or for lack of room.
+IST_HD inline void join(OctantSums* octants, double near, double small) {
+  for (const bool by_axis : {true, false})
+    for (int k = 0; k < 3; ++k) {
+      const double thin = by_axis ? shortness(octants[0], k, kThin * near) : 0;
+      for (int i = 0; i < 8; ++i) {
+        if ((i >> k & 1) != 0) continue;
+        OctantSums &to = octants[i], &from = octants[i | 1 << k];
+        move(from, by_axis ? thin : oneness(to, from, near), to);
+      }
+    }
+  double different = 0, areas = 0;
+  for (int i = 0; i < 8; ++i) {
+    different += norm(octants[i].area[0] + octants[i].area[1]);
+    areas += both_areas(octants[i]);
+  }
+  const double apart = areas > 0 ? rises(different / areas, 0.2) : 0;
+  const double share = areas > 0 ? (small < apart ? apart : small) : 1;
+  for (int i = 1; i < 8; ++i) move(octants[i], share, octants[0]);
+}
+
+}  // namespace ist::octants
