@@ -181,10 +181,12 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
 /// answers[i] and its patches = contact_patches(pairs[i]) of two assets, without limits: the contact
 /// condensed into at most `patches.most`.
 ///
-/// By lenses (PenetrationSettings::spheres_only) patches are the same regions of the same tree as there, with the same ids, unless two divisions
-/// are equally good to a float's digits. Answers equal those of penetration_batch() to its
-/// precision, not bit for bit; copies of one asset at nearly the same pose are not treated
-/// specially. Volumes, forces and torques of a pair's patches sum to its answer's to about 1e-15.
+/// By lenses (PenetrationSettings::spheres_only) patches are the same regions of the same tree as
+/// there, with the same ids, unless two divisions are equally good to a float's digits. Answers
+/// equal those of penetration_batch() to its precision, not bit for bit; copies of one asset at
+/// nearly the same pose are not treated specially. Volumes, forces and torques of a pair's patches
+/// sum to its answer's to about 1e-15.
+///
 /// Measure::exact, of two assets that keep their meshes: the connected parts of the overlap and
 /// their octants, as contact_patches() has them of a pair without an id, within 1e-12 of the pair's
 /// size and mostly the same doubles, flush, coaxial and copied ones too. answers[i] has the bits of
