@@ -310,7 +310,7 @@ bool measure(Report& report) {
                 wanted.contains(name) ? wanted.at(name) : 0) &&
             right;
   for (const char* name : {"0.1 to 1 %", "1 to 10 %", "deep"})
-    ask_patches(report, name, two, classes.at(name), many / 10);
+    ask_patches(report, name, two, classes.at(name), many / 50);
   for (const char* name : {"apart", "0.1 to 1 %", "deep"})
     ask_few(report, name, two, classes.at(name));
   ask_cards(report, two, classes.at("1 to 10 %"), many);
@@ -319,7 +319,7 @@ bool measure(Report& report) {
   for (BatchPair& pair : engaged) pair.b = 1;
   const Solids thread = {{&bolt, &nut}};
   right = ask(report, "Nut on bolt", "engaged", thread, engaged, many / 2, 0.5) && right;
-  ask_patches(report, "nut on bolt, engaged", thread, engaged, many / 10);
+  ask_patches(report, "nut on bolt, engaged", thread, engaged, many / 200);
   right = ask(report, "Nut on bolt", "in clearance", thread, clear_nut_poses(400), many / 2, 2) &&
           right;
   for (const double by : {1e-4, 3e-4, 1e-3}) {
@@ -336,7 +336,7 @@ bool measure(Report& report) {
   for (const char* name : {"bolt_in_plate, in place", "plate_on_plate, in place"})
     ask_few(report, name, mated.solids, mated.mates.at(name));
   ask_patches(report, "plate_on_plate, in place", mated.solids,
-              mated.mates.at("plate_on_plate, in place"), many / 50);
+              mated.mates.at("plate_on_plate, in place"), many / 500);
   for (const auto& [name, poses] : mated.mates)
     right = ask(report, "Mated parts", name, mated.solids, poses, many / 50, 0) && right;
   for (const std::size_t triangles : {8u, 24u, 80u, 200u}) {

@@ -29,27 +29,34 @@ struct PartRoom {
   }
 };
 
-/// They are asked in the later passes of a batch of penetrations, from this on: teams search too.
-constexpr int kFirstPatchPass = 1;
-/// [bytes] of a team's room for crossings and parts.
+/// Teams search too, as in the later passes of a batch of penetrations.
+constexpr int kFirstPatchPass = 0;
+/// [bytes] of a team's room for crossings and parts: 350 crossings, 2,000, and 15,000 fit.
 IST_HD constexpr std::size_t patch_room(int pass) {
-  return pass == kFirstPatchPass ? 256u << 10 : 16u << 20;
+  return pass == 0 ? 384u << 10 : pass == 1 ? 2u << 20 : 16u << 20;
 }
 
 struct ExactPatchArrays : ExactArrays {
   GpuContactPatches patches;
 
   IST_HD std::size_t bytes_of_team(int pass) const {
-    return ExactArrays::bytes_of_team(pass) + patch_room(pass) + 16 * std::size_t{most_blocks};
+    return searching(pass) + patch_room(pass) + 16 * std::size_t{most_blocks};
   }
   IST_HD std::byte* team(int pass, std::uint32_t n) const {
     return memory + n * bytes_of_team(pass);
   }
   IST_HD ExactRoom room(int pass, std::uint32_t n) const {
-    return ExactRoom::at(team(pass, n), most_blocks, pass);
+    return ExactRoom::at(team(pass, n), most_blocks, search_pass(pass));
   }
   IST_HD PartRoom part_room(int pass, std::uint32_t n) const {
-    return {team(pass, n) + ExactArrays::bytes_of_team(pass), team(pass, n + 1)};
+    return {team(pass, n) + searching(pass), team(pass, n + 1)};
+  }
+
+ private:
+  /// The first two search in as much memory as each other.
+  IST_HD static int search_pass(int pass) { return pass == 0 ? 1 : pass; }
+  IST_HD std::size_t searching(int pass) const {
+    return ExactArrays::bytes_of_team(search_pass(pass));
   }
 };
 

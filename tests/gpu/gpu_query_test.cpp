@@ -287,8 +287,8 @@ TEST_F(GpuQueryTest, WhatDoesNotFitIsAnError) {
   const GpuSolid none = AssetView{};
   constexpr auto kNameless = static_cast<Measure>(3);
   EXPECT_THROW(penetration_batch(solids, GpuPairs{}, {kNameless}, workspace, {}, nullptr), Error);
-  EXPECT_THROW(
-      contact_patches_batch(solids, GpuPairs{}, Measure::exact, workspace, {}, {}, nullptr), Error);
+  EXPECT_THROW(contact_patches_batch(solids, GpuPairs{}, kNameless, workspace, {}, {}, nullptr),
+               Error);
   EXPECT_THROW(GpuSolids({&none, 1}), Error);
   EXPECT_THROW(GpuWorkspace(std::size_t{1} << 40), Error);
   const GpuSolid function = Shape(FunctionShape{});
