@@ -238,14 +238,13 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     Contact contact;
     state_->meeting.find(at_first, at_second, settings, contact);
     result->setPersistentManifold(state_->points.first_manifold(first, second, *m_dispatcher));
-    const PushPlaces places(contact);
     for (std::size_t i = 0; i < contact.count; ++i) {
       const ContactPatch& patch = contact.patches[i];
       if (!(patch.area > 0)) continue;
       const Eigen::Vector3d normal = -patch.normal;
       result->addContactPoint(
           to_bullet(normal),
-          to_bullet(Eigen::Vector3d(places.of(patch) + 0.5 * patch.depth * normal)),
+          to_bullet(Eigen::Vector3d(place_of(patch) + 0.5 * patch.depth * normal)),
           static_cast<btScalar>(-patch.depth));
     }
     result->setPersistentManifold(nullptr);

@@ -94,21 +94,10 @@ struct OldPoints {
 
 }  // namespace
 
-PushPlaces::PushPlaces(const Contact& contact) {
-  constexpr double kAlike = 0.99, kUnlike = 0.95;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double all = 0;
-  for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
-    sum += patch.area * patch.normal;
-    all += patch.area;
-  }
-  if (all > 0) on_axes_ = std::clamp((kAlike - sum.norm() / all) / (kAlike - kUnlike), 0.0, 1.0);
-}
-
-Eigen::Vector3d PushPlaces::of(const ContactPatch& patch) const {
+Eigen::Vector3d place_of(const ContactPatch& patch) {
   const Eigen::Vector3d aside = patch.point - patch.centroid;
   const double far = aside.norm(), width = std::sqrt(patch.area);
-  return patch.centroid + on_axes_ * (far > width ? width / far : 1) * aside;
+  return patch.centroid + (far > width ? width / far : 1) * aside;
 }
 
 std::size_t Points::count() const {
@@ -161,13 +150,12 @@ Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisi
   Eigen::Vector3d together = Eigen::Vector3d::Zero();
   double apart = 0;
   closing_ *= 1 - spring.step / (8 * (spring.step + spring.relaxation));
-  const PushPlaces places(contact);
   for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
     const double force = spring.at(patch.depth) * patch.area * patch.depth;
     if (!(force > 0)) continue;
     together += force * patch.normal;
     apart += force;
-    const btVector3 middle = to_bullet(places.of(patch));
+    const btVector3 middle = to_bullet(place_of(patch));
     const btVector3 motion =
         velocity_of(first, middle) - velocity_of(second, middle) + unsaid_at(middle);
     closing_ = std::max(closing_, to_eigen(motion).dot(patch.normal));
@@ -178,7 +166,7 @@ Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisi
 }
 
 void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
-                        const Eigen::Vector3d& middle, const Eigen::Vector3d& together) const {
+                        const Eigen::Vector3d& together) const {
   // Bullet takes spring and damper, and makes of them the speed at which they part bodies,
   // depth · spring / (step · spring + damper), and the impulse of a unit of speed that is missing.
   // At rest, against what is placed, the force is the spring's.
@@ -186,7 +174,7 @@ void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const
   if (patch.depth > 0) {
     const double parting = spring.parting(patch.depth, together.dot(patch.normal));
     // A point that moves along grows faster the deeper it is: a slight speed is no measure.
-    const double placed = to_eigen(unsaid_at(to_bullet(middle))).dot(patch.normal);
+    const double placed = to_eigen(unsaid_at(to_bullet(place_of(patch)))).dot(patch.normal);
     const double speed =
         parting +
         std::max(0.0, placed) * std::min(1.0, patch.depth / std::max(0.2 * spring.rest, 1e-300));
@@ -204,7 +192,6 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
   OldPoints old(manifolds);
   const bool touched = old.count > 0;
   const Eigen::Vector3d pushed = together(first, second, contact, spring);
-  const PushPlaces places(contact);
 
   // Bullet's normal pushes the manifold's first body.
   const btTransform to_first = first.getWorldTransform().inverse();
@@ -215,7 +202,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
   for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
     if (!(patch.area > 0)) continue;
     const btVector3 normal = to_bullet(Eigen::Vector3d(-patch.normal));
-    const btVector3 middle = to_bullet(places.of(patch));
+    const btVector3 middle = to_bullet(place_of(patch));
     const btScalar depth = static_cast<btScalar>(patch.depth);
     const btVector3 on_first = middle - normal * (depth / 2);
     const btVector3 on_second = middle + normal * (depth / 2);
@@ -234,7 +221,7 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
       point.m_contactPointFlags |=
           BT_CONTACT_FLAG_HAS_CONTACT_CFM | BT_CONTACT_FLAG_HAS_CONTACT_ERP;
     } else {
-      set_spring(point, patch, spring, to_eigen(middle), pushed);
+      set_spring(point, patch, spring, pushed);
     }
     set_name(point, patch.id);
     named[used] = old.give_to(point, spring.step);

@@ -10,20 +10,10 @@
 
 namespace ist::bullet {
 
-/// Where the patches of a contact push. Those that all push alike do so at their centroids, as a
-/// bed of springs whose pressure grows with depth: on the axes of their wrenches, which are those
-/// of a constant pressure, a body that rocks or rolls would gain energy. Those that push in many
-/// directions, as on a thread, do so on the axes, where a force leaves no torque but that about the
-/// axis. If a patch pushes in both directions its axis may lie far away: the point stays within the
-/// patch's width of its middle.
-class PushPlaces {
- public:
-  explicit PushPlaces(const Contact& contact);
-  Eigen::Vector3d of(const ContactPatch& patch) const;
-
- private:
-  double on_axes_ = 0;  ///< [0, 1]
-};
+/// The point at which a patch pushes. A force on the wrench's axis leaves no torque but that about
+/// the axis. If a patch pushes in both directions the axis may lie far away: the point stays within
+/// the patch's width of its middle.
+Eigen::Vector3d place_of(const ContactPatch& patch);
 
 /// The points of a pair in Bullet's manifolds.
 class Points {
@@ -47,7 +37,7 @@ class Points {
   Eigen::Vector3d together(const btCollisionObject& first, const btCollisionObject& second,
                            const Contact& contact, const Spring& spring);
   void set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
-                  const Eigen::Vector3d& middle, const Eigen::Vector3d& together) const;
+                  const Eigen::Vector3d& together) const;
   btVector3 unsaid_at(const btVector3& x) const { return unsaid[0].at(x) - unsaid[1].at(x); }
 
   std::array<btVector3, Settings::kPatches> normals_;  // of all points, in the first's frame
