@@ -245,7 +245,7 @@ ist_status_t ist_asset_get_mesh(const ist_asset_t* asset, ist_mesh_t* surface);
 
 /* x_world = R(q) x + t */
 typedef struct ist_pose {
-  double q[4]; /* w, x, y, z; of any length but 0: it is normalised */
+  double q[4]; /* w, x, y, z; of length 1e-150 to 1e150: it is normalised */
   double t[3]; /* [u] */
 } ist_pose_t;
 
