@@ -62,9 +62,8 @@ using ProgressCallback = std::function<bool(const Progress&)>;
 ///
 /// Plain data of 56 bytes under every compiler flag. `pose_eigen.h` converts from and to Eigen.
 struct Pose {
-  double q[4] = {1, 0, 0,
-                 0};        ///< quaternion w, x, y, z; of length 1e-150 to 1e150: it is normalised
-  double t[3] = {0, 0, 0};  ///< [u] translation
+  double q[4] = {1, 0, 0, 0};  ///< quaternion w, x, y, z, normalised: of length 1e-150 to 1e150
+  double t[3] = {0, 0, 0};     ///< [u] translation
 };
 
 }  // namespace ist
