@@ -31,7 +31,7 @@ struct PartRoom {
 
 /// Teams search too, as in the later passes of a batch of penetrations.
 constexpr int kFirstPatchPass = 0;
-/// [bytes] of a team's room for crossings and parts: 350 crossings, 2,000, and 15,000 fit.
+/// [bytes] of a team's memory for crossings and parts: a crossing takes about 1 KB.
 IST_HD constexpr std::size_t patch_room(int pass) {
   return pass == 0 ? 384u << 10 : pass == 1 ? 2u << 20 : 16u << 20;
 }

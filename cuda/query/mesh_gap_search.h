@@ -189,7 +189,7 @@ class MeshGapSearch {
     const Real gap = unit * (Real(1 - 2 * kGapRounding<Real>) * squared);
     const Real before = m_.stack_squared[pair];
     child.squared = gap > before ? gap : before;
-    // Of solids that are far apart for their size all is as far but for the last digits.
+    // The distances of solids that are far apart for their size differ in the last digits only.
     child.key = gap <= 0            ? apart
                 : sizeof(Real) == 4 ? coarse(child.squared)
                                     : coarse(Real(1 - kGapsAlike) * child.squared - before);

@@ -249,9 +249,10 @@ class CollisionManager:
                 found = self._scene.step(self._bodies.poses[rows], numbers=numbers)
                 self._found = margin, _Pairs(self._bodies, self._bodies, *self._row[found.pairs].T)
             except ist.Error:  # more pairs than there is room for, or, with room for all, something else
+                self._scene = None
                 if self._pairs >= self._room:
                     raise
-                self._scene, self._pairs = None, 8 * self._pairs
+                self._pairs *= 8
         return self._found[1]
 
     def _near(self, others, margin=0):

@@ -28,7 +28,7 @@ class MeshGapSearch {
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
   static constexpr std::uint32_t kFew = 4;
-  /// So much larger is a block whose triangles are asked how far nodes are.
+  /// A block this many times as large as a node is bounded by its triangles, not by its box.
   static constexpr double kMuchLarger = 3;
 
  public:
@@ -244,7 +244,7 @@ class MeshGapSearch {
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
-      // Of solids that are far apart for their size all is as far but for the last digits.
+      // The distances of solids that are far apart for their size differ in the last digits only.
       child.order = gap <= 0 ? static_cast<float>(apart[l])
                     : single_
                         ? coarse(child.squared)
@@ -255,8 +255,8 @@ class MeshGapSearch {
     }
   }
 
-  /// The triangles of the other's block, where that is much larger than what is opened: they say
-  /// more than their box.
+  /// The triangles of the node that is not opened, if it is a block and much larger than the other;
+  /// else null.
   const BlockFaces* triangles_beside(const GapPair& pair, bool open_a) {
     if ((open_a ? pair.level_b : pair.level_a) != 0) return nullptr;
     const double of_a = size_of(a_, pair.level_a, pair.a),
@@ -270,7 +270,8 @@ class MeshGapSearch {
     }
     return &*faces_;
   }
-  /// Of two blocks: where one is much larger, its nearest triangle tells the way to the other.
+  /// Along these two blocks' triangles are compared: if one block is much larger, along the
+  /// direction from its nearest triangle to the other block.
   WayAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
     const GapPair blocks{0, 0, number_a, number_b, 0, 0};
     for (const bool of_a : {false, true}) {
