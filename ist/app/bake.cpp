@@ -3,11 +3,10 @@
 #include <ist/bake.h>
 #include <ist/types.h>
 #include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
-
 #include <chrono>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <system_error>

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <ist/types.h>
 #include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
-
 #include <unistd.h>
 #include <algorithm>
 #include <chrono>
@@ -15,6 +13,7 @@
 #include <deque>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <string_view>
 #include <system_error>

@@ -1,12 +1,11 @@
 #pragma once
 
+#include <ist/asset.h>
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
-
-#include <ist/asset.h>
 
 #include "library/summary.h"
 

@@ -1,7 +1,6 @@
 #include "library/cache.h"
 
 #include <fmt/format.h>
-
 #include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -1,14 +1,12 @@
 #include <fmt/format.h>
-
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include <ist/bake.h>
-#include <ist/types.h>
-
-#include <ist/asset_layout.h>
 #include "app/commands.h"
 #include "app/options.h"
 #include "library/input_mesh.h"

@@ -4,7 +4,6 @@
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
 #include <ist/types.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-
 #include <string_view>
 
 #include "app/reference.h"

@@ -4,7 +4,6 @@
 #include <ist/bake.h>
 #include <ist/query.h>
 #include <ist/types.h>
-
 #include <array>
 #include <cmath>
 #include <cstdint>

@@ -1,14 +1,12 @@
 #include "app/field_spec.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <array>
 #include <cmath>
 #include <optional>
 #include <string_view>
 #include <vector>
-
-#include <ist/types.h>
 
 #include "library/settings/numbers.h"
 

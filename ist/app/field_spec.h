@@ -1,8 +1,7 @@
 #pragma once
 
-#include <string>
-
 #include <ist/shapes.h>
+#include <string>
 
 // Fields on the command line, lengths in [u], in the field's own frame:
 //   plane:nx,ny,nz,d   the solid n · x ≤ d, n of any length above 0

@@ -2,7 +2,6 @@
 
 #include <sys/time.h>
 #include <unistd.h>
-
 #include <csignal>
 
 #include "app/commands.h"

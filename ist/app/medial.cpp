@@ -1,12 +1,9 @@
-#include <ist/bake.h>
-
 #include <fmt/format.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <memory>
-
-#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/mesh_notes.h"

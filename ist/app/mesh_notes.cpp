@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cctype>
 #include <utility>

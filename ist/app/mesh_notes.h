@@ -1,10 +1,9 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <nlohmann/json.hpp>
-
 #include <functional>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>

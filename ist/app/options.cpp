@@ -4,7 +4,6 @@
 #include <ist/gpu.h>
 #include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <unistd.h>
 #include <cerrno>
 #include <cstdio>

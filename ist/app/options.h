@@ -2,7 +2,6 @@
 
 #include <ist/bake.h>
 #include <CLI/CLI.hpp>
-
 #include <functional>
 #include <limits>
 #include <optional>

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <unistd.h>
-
 #include <cstdio>
 #include <string>
 #include <string_view>

@@ -1,16 +1,13 @@
-#include <ist/shapes.h>
-
 #include <fmt/format.h>
+#include <ist/bake.h>
+#include <ist/mass_properties.h>
+#include <ist/shapes.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <chrono>
 #include <limits>
 #include <memory>
-
-#include <ist/bake.h>
-#include <ist/mass_properties.h>
-#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/field_spec.h"

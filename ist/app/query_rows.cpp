@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 #include <ist/types.h>
-#include <istream>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -12,6 +10,7 @@
 #include <cstddef>
 #include <fstream>
 #include <iostream>
+#include <istream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>

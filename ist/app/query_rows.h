@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/query.h>
 #include <span>
 #include <string>
 #include <vector>
-
-#include <ist/query.h>
 
 // The rows of `ist query`: poses that are read, and answers that are written.
 

@@ -1,7 +1,6 @@
 #include "app/refine_covers.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/cover_spheres.h>
+#include <ist/types.h>
 #include <cstddef>
 #include <map>
 #include <string>
-
-#include <ist/cover_spheres.h>
-#include <ist/types.h>
 
 #include "app/sphere_output.h"
 #include "library/link_solids.h"

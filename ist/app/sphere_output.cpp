@@ -1,14 +1,12 @@
 #include "app/sphere_output.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
-
-#include <ist/types.h>
 
 #include "app/glb_scene.h"
 #include "app/mesh_notes.h"

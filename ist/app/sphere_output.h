@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/cover_spheres.h>
 #include <algorithm>
 #include <string>
 #include <vector>
-
-#include <ist/cover_spheres.h>
 
 #include "robots/description/self_collision.h"
 

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
+#include <ist/bake.h>
+#include <ist/cover_spheres.h>
+#include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -8,10 +10,6 @@
 #include <limits>
 #include <map>
 #include <memory>
-
-#include <ist/bake.h>
-#include <ist/cover_spheres.h>
-#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"

@@ -5,7 +5,6 @@
 #include <ist/mass_properties.h>
 #include <ist/raycast.h>
 #include <ist/types.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>

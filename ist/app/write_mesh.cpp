@@ -1,12 +1,10 @@
 #include "app/write_mesh.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <iterator>
 #include <string_view>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "app/options.h"
 #include "bake/asset/atomic_file.h"

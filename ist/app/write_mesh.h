@@ -1,8 +1,7 @@
 #pragma once
 
-#include <string>
-
 #include <ist/mesh.h>
+#include <string>
 
 namespace ist::app {
 

@@ -1,7 +1,5 @@
-#include "bake/bake_solid.h"
-
+#include <ist/types.h>
 #include <tbb/task_group.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -13,10 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include <ist/types.h>
-
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
+#include "bake/bake_solid.h"
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/tree_builder.h"
 #include "base/aside.h"

@@ -1,7 +1,6 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

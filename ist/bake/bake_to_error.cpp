@@ -1,6 +1,5 @@
 #include <ist/shapes.h>
 #include <ist/types.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>

@@ -1,6 +1,5 @@
 #include <ist/bake.h>
 #include <ist/types.h>
-
 #include <string>
 
 #include "bake/backend/make_backend.h"

@@ -1,8 +1,7 @@
-#include <cmath>
-#include <cstring>
-
 #include <ist/contact_law.h>
 #include <ist/mass_properties.h>
+#include <cmath>
+#include <cstring>
 
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"

@@ -1,11 +1,10 @@
 #pragma once
 
-#include <cstdint>
-#include <cstring>
-
 #include <ist/c.h>
 #include <ist/deadline.h>
 #include <ist/query.h>
+#include <cstdint>
+#include <cstring>
 
 // The contents of the caller's handles.
 

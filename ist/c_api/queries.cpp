@@ -1,7 +1,6 @@
+#include <ist/query.h>
 #include <algorithm>
 #include <span>
-
-#include <ist/query.h>
 
 #include "c_api/ask.h"
 #include "c_api/structs.h"

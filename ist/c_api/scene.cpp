@@ -1,7 +1,6 @@
 #include <ist/c_scene.h>
 #include <ist/scene.h>
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <new>

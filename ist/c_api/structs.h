@@ -1,15 +1,14 @@
 #pragma once
 
-#include <algorithm>
-#include <cstddef>
-#include <cstring>
-#include <type_traits>
-
 #include <ist/c.h>
 #include <ist/query.h>
 #include <ist/raycast.h>
 #include <ist/shapes.h>
 #include <ist/time_of_impact.h>
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
 
 #include "c_api/handles.h"
 #include "query/base/members.h"

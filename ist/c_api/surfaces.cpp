@@ -1,5 +1,4 @@
 #include <ist/raycast.h>
-
 #include <algorithm>
 
 #include "c_api/ask.h"

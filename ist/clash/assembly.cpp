@@ -1,15 +1,13 @@
 #include "clash/assembly.h"
 
 #include <fmt/format.h>
-
 #include <fnmatch.h>
+#include <ist/bake.h>
+#include <ist/types.h>
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <string_view>
-
-#include <ist/bake.h>
-#include <ist/types.h>
 
 #include "base/thread_arena.h"
 #include "clash/sources.h"

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/asset.h>
 #include <memory>
 #include <string>
 #include <vector>
-
-#include <ist/asset.h>
 
 #include "clash/clash.h"
 #include "library/robot_assets.h"

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <minizip/zip.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

@@ -1,8 +1,12 @@
 #include "clash/clash.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <fmt/format.h>
+#include <ist/mass_properties.h>
+#include <ist/pose_eigen.h>
+#include <ist/raycast.h>
+#include <ist/scene.h>
+#include <ist/types.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -12,12 +16,6 @@
 #include <optional>
 #include <tuple>
 #include <utility>
-
-#include <ist/mass_properties.h>
-#include <ist/pose_eigen.h>
-#include <ist/raycast.h>
-#include <ist/scene.h>
-#include <ist/types.h>
 
 #include "base/thread_arena.h"
 #include "clash/world_mesh.h"

@@ -1,13 +1,12 @@
 #pragma once
 
+#include <ist/query.h>
 #include <Eigen/Core>
 #include <cstddef>
 #include <functional>
 #include <span>
 #include <string>
 #include <vector>
-
-#include <ist/query.h>
 
 namespace ist {
 

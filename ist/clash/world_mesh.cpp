@@ -1,7 +1,6 @@
 #include "clash/world_mesh.h"
 
 #include <ist/pose_eigen.h>
-
 #include <algorithm>
 #include <cmath>
 

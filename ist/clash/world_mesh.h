@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ist/query.h>
 #include <Eigen/Core>
 #include <vector>
-
-#include <ist/query.h>
 
 namespace ist {
 

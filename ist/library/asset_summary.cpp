@@ -1,14 +1,13 @@
 #include "library/asset_summary.h"
 
 #include <fmt/format.h>
-
+#include <ist/asset_layout.h>
+#include <ist/mass_properties.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include <ist/asset_layout.h>
-#include <ist/mass_properties.h>
 #include "bake/predict/trial_poses.h"
 #include "library/settings/spelling.h"
 #include "library/text.h"

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/asset.h>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
-
-#include <ist/asset.h>
 
 namespace ist {
 

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/asset.h>
 #include <Eigen/Core>
 #include <span>
 #include <string>
 #include <vector>
-
-#include <ist/asset.h>
 
 namespace ist {
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <fnmatch.h>
-
 #include <ist/types.h>
 #include <algorithm>
 #include <functional>

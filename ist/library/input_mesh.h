@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <string>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "library/settings/bake_settings.h"
 

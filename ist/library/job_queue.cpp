@@ -1,7 +1,6 @@
 #include "library/job_queue.h"
 
 #include <ist/types.h>
-
 #include <unistd.h>
 #include <algorithm>
 #include <filesystem>

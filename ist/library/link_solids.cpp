@@ -5,7 +5,6 @@
 #include <ist/raycast.h>
 #include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
-
 #include <algorithm>
 #include <utility>
 

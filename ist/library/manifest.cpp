@@ -1,7 +1,7 @@
 #include "library/manifest.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <toml++/toml.h>
 #include <algorithm>
 #include <filesystem>
@@ -12,8 +12,6 @@
 #include <sstream>
 #include <string_view>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "library/glob.h"
 #include "library/settings/numbers.h"

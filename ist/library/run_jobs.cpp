@@ -4,8 +4,6 @@
 #include <ist/asset_layout.h>
 #include <ist/gpu.h>
 #include <ist/types.h>
-#include <nlohmann/json.hpp>
-
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <algorithm>
@@ -14,6 +12,7 @@
 #include <condition_variable>
 #include <fstream>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <string_view>
 #include <system_error>
 #include <thread>

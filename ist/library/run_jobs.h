@@ -2,7 +2,6 @@
 
 #include <ist/asset.h>
 #include <ist/bake.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <functional>

@@ -1,12 +1,11 @@
 #pragma once
 
+#include <ist/bake.h>
+#include <ist/query.h>
 #include <Eigen/Core>
 #include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
-
-#include <ist/bake.h>
-#include <ist/query.h>
 
 #include "library/settings/bake_settings.h"
 

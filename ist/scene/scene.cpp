@@ -1,7 +1,6 @@
 #include <ist/scene.h>
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>

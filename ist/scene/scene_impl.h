@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/scene.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>

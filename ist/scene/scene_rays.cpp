@@ -1,5 +1,4 @@
 #include <ist/scene.h>
-
 #include <algorithm>
 
 #include "scene/scene_impl.h"

@@ -1,6 +1,7 @@
+#include <ist/mesh.h>
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -8,9 +9,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <ist/mesh.h>
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"

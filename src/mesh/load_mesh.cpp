@@ -1,6 +1,8 @@
+#include <ist/mesh.h>
+#include <ist/solid.h>
+#include <ist/types.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>
@@ -9,10 +11,6 @@
 #include <span>
 #include <string>
 #include <utility>
-
-#include <ist/mesh.h>
-#include <ist/solid.h>
-#include <ist/types.h>
 
 #include "mesh/connectivity/weld.h"
 #include "mesh/import/gltf_document.h"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,15 +1,13 @@
 #pragma once
 
+#include <ist/solid.h>
 #include <oneapi/tbb/collaborative_call_once.h>
-
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <vector>
-
-#include <ist/solid.h>
 
 #include "base/raw_array.h"
 #include "mesh/hierarchy/bvh.h"

@@ -2,7 +2,6 @@
 
 #include <ist/solid.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-
 #include <cstdint>
 #include <memory>
 #include <optional>

@@ -1,7 +1,6 @@
 #include "mesh/repair.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <cstdint>
 #include <string>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "mesh/connectivity/edge_table.h"
 

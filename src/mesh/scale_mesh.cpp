@@ -1,6 +1,5 @@
 #include <ist/mesh.h>
 #include <ist/types.h>
-
 #include <utility>
 
 #include "base/message_text.h"

@@ -1,15 +1,13 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/weld.h"

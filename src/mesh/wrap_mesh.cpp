@@ -1,5 +1,5 @@
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,8 +9,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "mesh/connectivity/edge_table.h"

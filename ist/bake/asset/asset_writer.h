@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/asset_layout.h>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <vector>
-
-#include <ist/asset_layout.h>
 
 namespace ist {
 

@@ -1,16 +1,14 @@
 #include "bake/asset/atomic_file.h"
 
 #include <fcntl.h>
+#include <ist/types.h>
 #include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
 #include <string>
 #include <system_error>
 #include <utility>
-
-#include <ist/types.h>
 
 namespace ist {
 namespace {

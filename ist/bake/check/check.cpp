@@ -2,7 +2,6 @@
 #include <ist/bake.h>
 #include <ist/solid.h>
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <random>

@@ -1,10 +1,9 @@
+#include <ist/asset.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
 #include <utility>
-
-#include <ist/asset.h>
 
 #include "bake/check/check_spheres.h"
 #include "bake/check/check_tally.h"

@@ -2,7 +2,6 @@
 
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-
 #include <string>
 #include <vector>
 

@@ -1,14 +1,12 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <tbb/parallel_for.h>
-
 #include <cstddef>
 #include <limits>
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <ist/bake.h>
 
 namespace ist {
 

@@ -1,14 +1,12 @@
 #pragma once
 
+#include <ist/mesh.h>
+#include <ist/solid.h>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <vector>
-
-#include <ist/mesh.h>
-#include <ist/solid.h>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 
 namespace ist {
 

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <ist/asset_layout.h>
 #include <array>
 #include <cstddef>
 
-#include <ist/asset_layout.h>
 #include "bake/cluster/bounding_ball.h"
 
 namespace ist {

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <ist/asset_layout.h>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
-#include <ist/asset_layout.h>
 #include "bake/cluster/bounding_ball.h"
 
 namespace ist {

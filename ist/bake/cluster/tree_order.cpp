@@ -2,7 +2,6 @@
 
 #include <ist/asset_layout.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <numeric>

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <memory>
-
 #include <ist/asset.h>
+#include <memory>
 
 #include "bake/asset/asset_writer.h"
 #include "base/aside.h"

@@ -1,14 +1,13 @@
 #include "bake/mesh/patches.h"
 
+#include <ist/asset_layout.h>
+#include <tbb/parallel_invoke.h>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
-#include <ist/asset_layout.h>
-
-#include <tbb/parallel_invoke.h>
 #include "mesh/connectivity/item_groups.h"
 
 namespace ist {

@@ -1,7 +1,6 @@
 #include "bake/predict/partner_trials.h"
 
 #include <ist/bake.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

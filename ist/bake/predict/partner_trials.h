@@ -2,7 +2,6 @@
 
 #include <ist/asset.h>
 #include <ist/query.h>
-
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>

@@ -1,10 +1,9 @@
 #include "bake/predict/trial_poses.h"
 
+#include <ist/query.h>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
-
-#include <ist/query.h>
 
 #include "bake/predict/trial_random.h"
 

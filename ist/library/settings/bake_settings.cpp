@@ -1,7 +1,6 @@
 #include "library/settings/bake_settings.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <type_traits>

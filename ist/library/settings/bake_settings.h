@@ -1,13 +1,12 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <functional>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <utility>
-
-#include <ist/bake.h>
 
 // All that may be asked of a bake, by name: the options of the command line and the keys of a
 // manifest are the same ones, read and checked here.

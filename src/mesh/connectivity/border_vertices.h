@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -7,8 +8,6 @@
 #include <cstdint>
 #include <utility>
 #include <vector>
-
-#include <ist/mesh.h>
 
 namespace ist {
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
-
 #include <atomic>
 #include <cstddef>
 #include <cstdint>

@@ -1,12 +1,10 @@
 #include "mesh/connectivity/edge_table.h"
 
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <numeric>
-
-#include <ist/types.h>
 
 #include "mesh/connectivity/item_groups.h"
 

@@ -1,9 +1,5 @@
-#include "mesh/connectivity/fan_slabs.h"
-#include "mesh/connectivity/self_intersections.h"
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -11,7 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "mesh/connectivity/fan_slabs.h"
 #include "mesh/connectivity/item_groups.h"
+#include "mesh/connectivity/self_intersections.h"
 #include "mesh/geometry/exact_sign.h"
 
 namespace ist {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cstddef>

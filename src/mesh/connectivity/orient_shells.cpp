@@ -1,6 +1,5 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -3,7 +3,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>

@@ -1,12 +1,11 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/edge_table.h"

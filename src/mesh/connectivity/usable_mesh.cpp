@@ -1,14 +1,12 @@
 #include "mesh/connectivity/usable_mesh.h"
 
+#include <ist/types.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <atomic>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "mesh/connectivity/weld.h"

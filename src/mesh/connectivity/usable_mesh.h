@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <string>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "mesh/connectivity/edge_table.h"
 

@@ -1,7 +1,6 @@
 #include "mesh/connectivity/weld.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>

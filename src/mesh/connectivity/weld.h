@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Core>
 #include <bit>
 #include <cstdint>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "base/hashing.h"
 

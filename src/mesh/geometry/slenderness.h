@@ -2,7 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

@@ -1,7 +1,6 @@
 #include "mesh/hierarchy/line_lattice.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "mesh/geometry/exact_triangle.h"

@@ -1,5 +1,4 @@
 #include <tbb/parallel_for.h>
-
 #include <vector>
 
 #include "mesh/geometry/exact_triangle.h"

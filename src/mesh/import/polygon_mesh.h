@@ -1,5 +1,6 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
@@ -8,8 +9,6 @@
 #include <map>
 #include <string>
 #include <vector>
-
-#include <ist/mesh.h>
 
 #include "mesh/import/source_file.h"
 

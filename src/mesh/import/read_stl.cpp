@@ -1,5 +1,4 @@
 #include <tbb/parallel_for.h>
-
 #include <bit>
 #include <cctype>
 #include <cstring>

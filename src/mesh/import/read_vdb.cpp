@@ -1,13 +1,11 @@
+#include <ist/solid.h>
+#include <ist/types.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-
-#include <ist/solid.h>
-#include <ist/types.h>
 
 namespace ist {
 namespace {

@@ -1,6 +1,5 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
-
 #include <algorithm>
 #include <array>
 #include <assimp/Importer.hpp>

@@ -1,12 +1,11 @@
 #include "mesh/import/source_file.h"
 
+#include <ist/types.h>
 #include <array>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
-
-#include <ist/types.h>
 
 namespace ist {
 namespace {

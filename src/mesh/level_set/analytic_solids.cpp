@@ -1,6 +1,5 @@
 #include <ist/solid.h>
 #include <ist/types.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -2,7 +2,6 @@
 
 #include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>

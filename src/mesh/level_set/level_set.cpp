@@ -1,12 +1,9 @@
 #include <ist/solid.h>
-
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "mesh/level_set/dual_mesh.h"
 #include "mesh/level_set/level_set_surface.h"

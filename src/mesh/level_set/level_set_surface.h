@@ -1,8 +1,7 @@
 #pragma once
 
-#include <string>
-
 #include <ist/solid.h>
+#include <string>
 
 namespace ist {
 

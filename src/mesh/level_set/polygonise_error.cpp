@@ -1,7 +1,4 @@
-#include "mesh/level_set/dual_mesh.h"
-
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +7,7 @@
 
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/exact_triangle.h"
+#include "mesh/level_set/dual_mesh.h"
 
 namespace ist {
 namespace {

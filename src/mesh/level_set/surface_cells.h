@@ -1,12 +1,11 @@
 #pragma once
 
+#include <ist/solid.h>
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
-
-#include <ist/solid.h>
 
 namespace ist {
 

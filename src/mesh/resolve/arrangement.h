@@ -2,7 +2,6 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
 #include <array>
 #include <atomic>
 #include <cstddef>

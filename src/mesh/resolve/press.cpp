@@ -1,7 +1,6 @@
 #include "mesh/resolve/press.h"
 
 #include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>

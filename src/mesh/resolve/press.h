@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <Eigen/Core>
 #include <vector>
-
-#include <ist/mesh.h>
 
 namespace ist {
 

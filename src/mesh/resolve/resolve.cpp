@@ -1,7 +1,6 @@
 #include "mesh/resolve/resolve.h"
 
 #include <tbb/task_arena.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>

@@ -1,9 +1,8 @@
 #pragma once
 
-#include <string>
-
 #include <ist/mesh.h>
 #include <ist/types.h>
+#include <string>
 
 namespace ist {
 

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
 #include <vector>
-
-#include <ist/mesh.h>
 
 namespace ist {
 

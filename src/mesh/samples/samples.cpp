@@ -1,9 +1,8 @@
 #include "mesh/samples/samples.h"
 
+#include <ist/types.h>
 #include <array>
 #include <string>
-
-#include <ist/types.h>
 
 #include "mesh/samples/shapes.h"
 

@@ -1,11 +1,10 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <functional>
 #include <memory>
 #include <span>
 #include <vector>
-
-#include <ist/bake.h>
 
 #include "packing/backend/tasks.h"
 

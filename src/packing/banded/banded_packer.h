@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <algorithm>
 #include <vector>
-
-#include <ist/bake.h>
 
 #include "base/stage.h"
 #include "base/thread_arena.h"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-
 #include <cstdint>
 
 #include "base/float3.h"

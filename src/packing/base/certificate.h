@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-
 #include <cmath>
 
 #include "base/float3.h"

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <cstdint>
-
 #include <ist/types.h>
+#include <cstdint>
 
 #include "base/float3.h"
 

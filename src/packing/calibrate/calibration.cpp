@@ -1,7 +1,6 @@
 #include "packing/calibrate/calibration.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>

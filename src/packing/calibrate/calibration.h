@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/types.h>
 #include <functional>
 #include <span>
 #include <vector>
-
-#include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-
 #include <functional>
 #include <span>
 #include <vector>

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <cstdint>
-
 #include <ist/types.h>
+#include <cstdint>
 
 #include "mesh/geometry/triangle_frame.h"
 #include "packing/grids/grid_layout.h"

@@ -1,7 +1,6 @@
 #include "packing/grids/grid_schedule.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <string>

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <cstddef>
-
 #include <ist/bake.h>
+#include <cstddef>
 
 #include "packing/grids/grid_layout.h"
 

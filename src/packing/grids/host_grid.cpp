@@ -1,7 +1,6 @@
 #include "packing/grids/host_grid.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <atomic>
 

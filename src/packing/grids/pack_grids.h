@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/bake.h>
-
 #include <algorithm>
 
 #include "base/stage.h"
