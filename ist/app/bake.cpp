@@ -18,7 +18,6 @@
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "app/progress_line.h"
-#include "app/write_mesh.h"
 #include "library/asset_summary.h"
 #include "library/settings/bake_settings.h"
 #include "library/text.h"

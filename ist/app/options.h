@@ -1,6 +1,7 @@
 #pragma once
 
 #include <ist/bake.h>
+#include <ist/mesh.h>
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <limits>
@@ -104,5 +105,11 @@ CLI::Option* add_number(CLI::App* command, const std::string& name, double& valu
 /// Bytes: 4096, 512M, 10G.
 CLI::Option* add_bytes(CLI::App* command, const std::string& name,
                        std::optional<std::uint64_t>& value, const std::string& help);
+
+bool has_mesh_ending(const std::string& path);  ///< one that write_mesh() takes
+
+/// Writes a mesh as .obj, .ply (ASCII) or .off with every digit of its doubles, or as .stl (binary;
+/// the format itself keeps single precision): its ending decides. Throws Error.
+void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace ist::app

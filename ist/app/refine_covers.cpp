@@ -1,4 +1,4 @@
-#include "app/refine_covers.h"
+#include "app/sphere_output.h"
 
 #include <tbb/parallel_for.h>
 #include <algorithm>

@@ -4,7 +4,6 @@
 
 #include "app/commands.h"
 #include "app/options.h"
-#include "app/write_mesh.h"
 #include "mesh/samples/samples.h"
 
 namespace ist::app {

@@ -16,7 +16,6 @@
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "app/progress_line.h"
-#include "app/refine_covers.h"
 #include "app/sphere_output.h"
 #include "library/exported_spheres.h"
 #include "library/link_solids.h"

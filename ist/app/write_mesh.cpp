@@ -1,4 +1,3 @@
-#include "app/write_mesh.h"
 
 #include <fmt/format.h>
 #include <ist/types.h>

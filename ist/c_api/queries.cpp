@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <span>
 
-#include "c_api/ask.h"
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"
 

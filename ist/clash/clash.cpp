@@ -18,8 +18,8 @@
 #include <utility>
 
 #include "base/thread_arena.h"
-#include "clash/world_mesh.h"
 #include "mesh/import/source_file.h"
+#include "query/exact/kept_mesh.h"
 
 namespace ist {
 namespace {
@@ -36,6 +36,72 @@ struct Scratch {
 
 double reach(const Bounds& box) {
   return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+}
+
+/// A part's kept mesh where it stands.
+struct WorldMesh {
+  /// A triangle's plane, seen from either side: n · x = offset.
+  struct Plane {
+    double key;  ///< the same for equal planes, and else for hardly any two
+    Vector3d normal;
+    double offset;
+  };
+
+  /// `origin`, `size`: of the whole assembly.
+  WorldMesh(const PlacedAsset& solid, const Vector3d& origin, double size) {
+    const AssetHeader& asset = solid.asset.header();
+    const MeshTree mesh = mesh_of(solid);
+    const Eigen::Isometry3d place = to_isometry(solid.pose);
+    const double unit = std::ldexp(1.0, asset.exponent);
+    for (std::uint32_t v = 0; v < mesh.header->vertex_count; ++v) {
+      const Vector3d own = unit * vector(mesh.vertex(v)) + Vector3d(asset.centre);
+      vertices.emplace_back(place * Vector3d(solid.scale * own));
+    }
+    // No direction of a part is like it.
+    const Vector3d across(0.267, 0.534, 0.802);
+    for (std::uint32_t b = 0; b < mesh.count; ++b) {
+      const MeshBlock& block = mesh.blocks[b];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        const auto corner = [&](int c) -> const Vector3d& {
+          return vertices[block.vertex[block.corner[c][t]]];
+        };
+        Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+        const double length = normal.norm();
+        if (!(length > 0)) continue;
+        normal /= length;
+        for (const double side : {1.0, -1.0}) {
+          const Vector3d n = side * normal;
+          const double offset = n.dot(corner(0) - origin);
+          planes.push_back({size * n.dot(across) + offset, n, offset});
+        }
+      }
+    }
+    std::sort(planes.begin(), planes.end(),
+              [](const Plane& x, const Plane& y) { return x.key < y.key; });
+    const auto same = [&](const Plane& x, const Plane& y) {
+      return y.key - x.key <= 1e-12 * size && (x.normal - y.normal).norm() <= 1e-12;
+    };
+    planes.erase(std::unique(planes.begin(), planes.end(), same), planes.end());
+  }
+
+  std::vector<Vector3d> vertices;
+  std::vector<Plane> planes;  ///< by key
+};
+
+constexpr double kParallel = 1e-7;  ///< of normals
+
+/// Whether a plane of one lies within this [u] of one of the other: of one assembly of this size.
+bool have_common_plane(const WorldMesh& a, const WorldMesh& b, double size, double within) {
+  const double room = within + kParallel * size;  // of keys
+  std::size_t first = 0;
+  for (const WorldMesh::Plane& plane : a.planes) {
+    while (first < b.planes.size() && b.planes[first].key < plane.key - room) ++first;
+    for (std::size_t i = first; i < b.planes.size() && b.planes[i].key <= plane.key + room; ++i)
+      if (std::abs(b.planes[i].offset - plane.offset) <= within &&
+          (b.planes[i].normal - plane.normal).norm() <= kParallel)
+        return true;
+  }
+  return false;
 }
 
 /// A part as pairs see it.

@@ -18,7 +18,6 @@
 #include <utility>
 
 #include "bake/asset/atomic_file.h"
-#include "library/bake_revision.h"
 #include "library/text.h"
 #include "mesh/mesh_files.h"
 

@@ -14,7 +14,6 @@
 
 #include "library/cache.h"
 #include "library/job.h"
-#include "library/result.h"
 
 namespace ist {
 

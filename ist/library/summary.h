@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "library/job.h"
-#include "library/result.h"
 
 namespace ist {
 

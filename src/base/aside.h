@@ -1,13 +1,29 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <utility>
 
 #include "base/thread_arena.h"
-#include "base/work_stop.h"
 
 namespace ist {
+
+/// Ends work on other threads: loops look at it, and are left by a WorkStop::Stopped.
+class WorkStop {
+ public:
+  struct Stopped {};
+
+  void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
+  bool stopped() const noexcept { return stopped_.load(std::memory_order_relaxed); }
+  /// Throws Stopped once stop() was called.
+  void look() const {
+    if (stopped()) throw Stopped();
+  }
+
+ private:
+  std::atomic<bool> stopped_ = false;
+};
 
 /// A part of a bake that is done once, on threads of its own. Where the scope is left before its
 /// end, it is stopped and waited for.

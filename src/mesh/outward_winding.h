@@ -9,7 +9,7 @@
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/geometry/mesh_view.h"
-#include "mesh/hierarchy/winding_kernel.h"
+#include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 
 namespace ist {

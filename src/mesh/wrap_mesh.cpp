@@ -14,7 +14,7 @@
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/usable_mesh.h"
 #include "mesh/judge.h"
-#include "mesh/level_set/level_set_surface.h"
+#include "mesh/level_set/polygonise.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
 

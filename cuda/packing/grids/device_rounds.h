@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "cuda/packing/grids/device_grid.h"
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 
 namespace ist::gpu {
 

@@ -1,6 +1,7 @@
 #include "bake/asset/atomic_file.h"
 
 #include <fcntl.h>
+#include <ist/asset.h>
 #include <ist/types.h>
 #include <unistd.h>
 #include <atomic>
@@ -11,6 +12,7 @@
 #include <utility>
 
 namespace ist {
+
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* what) {
@@ -129,6 +131,11 @@ void write_atomically(const std::filesystem::path& path, std::span<const std::by
 
 void write_atomically(const std::filesystem::path& path, std::string_view text) {
   write_atomically(path, std::as_bytes(std::span(text)));
+}
+
+void Asset::save(const std::filesystem::path& path) const {
+  if (view_.empty()) throw Error(path.string() + ": nothing to save: the asset was moved from");
+  write_atomically(path, bytes());
 }
 
 }  // namespace ist

@@ -14,7 +14,6 @@
 #include <span>
 
 #include "bake/cluster/ball_lanes.h"
-#include "bake/cluster/support_step.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {

@@ -1,4 +1,4 @@
-#include "bake/cluster/overlap_bound.h"
+#include "bake/cluster/bounding_ball.h"
 
 #include <ist/asset_layout.h>
 #include <tbb/blocked_range.h>

@@ -1,4 +1,4 @@
-#include "bake/cluster/support_step.h"
+#include "bake/cluster/ball_lanes.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "bake/cluster/swap_kernel.h"
+#include "bake/cluster/gas_kernel.h"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "bake/cluster/tree_order.h"
+#include "bake/cluster/tree_builder.h"
 
 #include <ist/asset_layout.h>
 #include <tbb/parallel_for.h>
@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "bake/cluster/gas_kernel.h"
-#include "bake/cluster/swap_kernel.h"
 
 namespace ist {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/hierarchy/winding_kernel.h"
+#include "mesh/hierarchy/winding.h"
 
 #include <cstdint>
 #include <numbers>

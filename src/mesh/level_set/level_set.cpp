@@ -5,8 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "mesh/level_set/dual_mesh.h"
-#include "mesh/level_set/level_set_surface.h"
+#include "mesh/level_set/polygonise.h"
 #include "mesh/level_set/surface_cells.h"
 
 namespace ist {

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/stage.h"
-#include "mesh/level_set/dual_mesh.h"
 #include "mesh/level_set/surface_cells.h"
 
 namespace ist {

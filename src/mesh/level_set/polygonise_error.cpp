@@ -7,7 +7,7 @@
 
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/exact_triangle.h"
-#include "mesh/level_set/dual_mesh.h"
+#include "mesh/level_set/polygonise.h"
 
 namespace ist {
 namespace {

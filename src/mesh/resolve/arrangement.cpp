@@ -7,8 +7,8 @@
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/surface_reduction.h"
+#include "mesh/resolve/exact_points.h"
 #include "mesh/resolve/planar_triangulation.h"
-#include "mesh/resolve/unresolvable.h"
 
 namespace ist {
 namespace {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "base/work_stop.h"
+#include "base/aside.h"
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/resolve/exact_points.h"
 

@@ -4,12 +4,18 @@
 #include <array>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cstdint>
+#include <string>
 #include <unordered_map>
 #include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 
 namespace ist {
+
+/// Why a mesh is not resolved. Thrown and caught within the unit.
+struct Unresolvable {
+  std::string reason;
+};
 
 /// Whole numbers of any size; up to 1,024 bits without an allocation.
 using Whole = boost::multiprecision::number<

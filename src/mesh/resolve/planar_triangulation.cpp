@@ -4,7 +4,7 @@
 #include <cmath>
 #include <deque>
 
-#include "mesh/resolve/unresolvable.h"
+#include "mesh/resolve/exact_points.h"
 
 namespace ist {
 namespace {

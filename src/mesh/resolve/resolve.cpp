@@ -20,8 +20,8 @@
 #include "mesh/connectivity/usable_mesh.h"
 #include "mesh/connectivity/weld.h"
 #include "mesh/resolve/arrangement.h"
+#include "mesh/resolve/exact_points.h"
 #include "mesh/resolve/press.h"
-#include "mesh/resolve/unresolvable.h"
 
 namespace ist {
 namespace {

@@ -3,8 +3,8 @@
 #include <ist/types.h>
 #include <cmath>
 
-#include "base/float3.h"
 #include "base/rounding.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

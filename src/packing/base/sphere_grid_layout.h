@@ -3,7 +3,7 @@
 #include <ist/types.h>
 #include <cstdint>
 
-#include "base/float3.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

@@ -2,9 +2,9 @@
 
 #include <cstdint>
 
-#include "base/float3.h"
 #include "base/hashing.h"
 #include "base/host_device.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

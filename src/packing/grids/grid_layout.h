@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "base/float3.h"
 #include "base/host_device.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 #include "packing/grids/host_grid.h"
 
 namespace ist::packing {

@@ -7,7 +7,7 @@
 #include "mesh/mesh_solid.h"
 #include "packing/base/certificate.h"
 #include "packing/base/packing_settings.h"
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 #include "packing/grids/grid_schedule.h"
 
 namespace ist::packing {
