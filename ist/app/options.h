@@ -40,6 +40,9 @@ void add_robot_options(CLI::App* command, RobotOptions& options);
 /// Throws (exit code 2) where options of a robot are given with what is none.
 void refuse_idle_options(const RobotOptions& options, const std::string& input);
 
+/// The same where `option` was given.
+void refuse_without_robot(const std::string& option, const std::string& input);
+
 /// It ends in .urdf or .sdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which
 /// is to be expanded.
 bool is_robot_file(const std::string& path);
@@ -81,6 +84,12 @@ void announce_device(Device device);
 CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::string& meaning,
                         const std::function<bool(const std::string&)>& take,
                         const std::string& help);
+
+/// The same for an option that may be given many times; `type`: of its value, for help.
+CLI::Option* add_repeated(CLI::App* command, const std::string& name, const std::string& type,
+                          const std::string& meaning,
+                          const std::function<bool(const std::string&)>& take,
+                          const std::string& help);
 
 /// A whole number in [least, most]; `value` holds the default.
 template <class T>
