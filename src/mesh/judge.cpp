@@ -72,13 +72,13 @@ std::optional<TriangleMesh> difference(const TriangleMesh& outward, const Triang
 /// Blocks of samples until there are enough of them in either. The winding number is that of
 /// `rest`, and of the solid where `add_solid` says so.
 std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
-                                       const TriangleWinding& rest, const bool add_solid,
+                                       const TriangleWinding& rest, bool add_solid,
                                        const MeshSolid& made) {
   const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
   const Eigen::Vector3d low = box.min(), size = box.sizes();
   const Eigen::Vector3d& centre = made.frame().centre;
   const double scale = made.frame().scale();
-  const auto start_of = [&](const std::size_t line) -> Eigen::Vector3d {
+  const auto start_of = [&](std::size_t line) -> Eigen::Vector3d {
     return low + size.cwiseProduct(cube_point(line));
   };
   std::vector<VolumeSums> blocks;

@@ -31,10 +31,10 @@ class TwoMeshes {
 
   /// The triangles of one of them by numbers of their corners that are the same where the
   /// coordinates are, the smallest first.
-  std::vector<Triangle> sorted(const std::vector<Triangle>& triangles, const bool of_b) const {
+  std::vector<Triangle> sorted(const std::vector<Triangle>& triangles, bool of_b) const {
     std::vector<Triangle> all(triangles.size());
     tbb::parallel_for(std::size_t{0}, all.size(),
-                      [&](const std::size_t t) { all[t] = named(triangles[t], of_b); });
+                      [&](std::size_t t) { all[t] = named(triangles[t], of_b); });
     tbb::parallel_sort(all.begin(), all.end());
     return all;
   }
@@ -51,8 +51,8 @@ class TwoMeshes {
 
  private:
   /// For the vertices [first, last): whether the triangles of the other mesh use them.
-  std::vector<std::uint8_t> corners(const std::vector<Triangle>& others, const std::size_t first,
-                                    const std::size_t last) const {
+  std::vector<std::uint8_t> corners(const std::vector<Triangle>& others, std::size_t first,
+                                    std::size_t last) const {
     std::vector<std::uint8_t> used(number_.size(), 0), result(last - first);
     for (const Triangle& t : others)
       for (const std::uint32_t v : t) used[v] = 1;
@@ -60,20 +60,20 @@ class TwoMeshes {
     return result;
   }
 
-  Triangle named(const Triangle& t, const bool of_b) const {
+  Triangle named(const Triangle& t, bool of_b) const {
     Triangle numbers;
     for (std::size_t k = 0; k < 3; ++k) numbers[k] = number_[t[k] + (of_b ? first_of_b_ : 0)];
     std::rotate(numbers.begin(), std::min_element(numbers.begin(), numbers.end()), numbers.end());
     return numbers;
   }
 
-  std::vector<std::uint8_t> shared(const std::vector<Triangle>& triangles, const bool of_b,
+  std::vector<std::uint8_t> shared(const std::vector<Triangle>& triangles, bool of_b,
                                    const std::vector<Triangle>& sorted_others) const {
     std::vector<std::uint32_t> first(number_.size() + 1, 0);  // of the others at their first corner
     for (const Triangle& other : sorted_others) ++first[other[0] + 1];
     std::partial_sum(first.begin(), first.end(), first.begin());
     std::vector<std::uint8_t> has(triangles.size());
-    tbb::parallel_for(std::size_t{0}, has.size(), [&](const std::size_t t) {
+    tbb::parallel_for(std::size_t{0}, has.size(), [&](std::size_t t) {
       const Triangle same = named(triangles[t], of_b), turned = {same[0], same[2], same[1]};
       const auto begin = sorted_others.begin() + first[same[0]];
       const auto end = sorted_others.begin() + first[same[0] + 1];

@@ -101,7 +101,7 @@ class ExcessIntegral {
     const bool flat = !(lattice_.step_y > 0 && lattice_.step_z > 0);
     if (flat) return;
     at_line_.resize(lattice_.lines());
-    cross_lattice(arrays, lattice_, [&](const std::uint32_t row, const LatticeCrossings& lines) {
+    cross_lattice(arrays, lattice_, [&](std::uint32_t row, const LatticeCrossings& lines) {
       tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t line) {
         at_line_[std::size_t{row} * lattice_.ny + line] = line_excess(lines[line]);
       });
@@ -185,7 +185,7 @@ double longest_triangle(const MeshView& mesh) {
         }
         return longest;
       },
-      [](const double a, const double b) { return std::max(a, b); });
+      [](double a, double b) { return std::max(a, b); });
 }
 
 using Eigen::Vector3d;

@@ -19,7 +19,7 @@ namespace ist {
 namespace {
 
 /// How far to_unit() moves a point by rounding, at most; 0 only where it does not round.
-double rounding_at(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
+double rounding_at(const UnitFrame& frame, double scale, const Eigen::Vector3d& x) {
   double off[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     const double difference = x[k] - frame.centre[k];

@@ -59,8 +59,8 @@ struct Votes {
 /// Adds what is seen of each patch along one axis; corners are `points`, unit frame, with that axis
 /// first.
 void look_along(const std::vector<std::array<double, 3>>& points,
-                const std::vector<Triangle>& triangles, const std::uint32_t lines,
-                DisjointSets& patches, std::vector<Votes>& votes) {
+                const std::vector<Triangle>& triangles, std::uint32_t lines, DisjointSets& patches,
+                std::vector<Votes>& votes) {
   LineLattice lattice;
   lattice.y0 = lattice.z0 = -1;
   lattice.ny = lattice.nz = lines;
@@ -99,7 +99,7 @@ std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
                         const std::vector<Eigen::Vector3d>& unit) {
   const std::uint32_t lines = lines_to_see(soup, patches);
   std::array<std::vector<Votes>, 3> along;
-  tbb::parallel_for(0, 3, [&](const int axis) {
+  tbb::parallel_for(0, 3, [&](int axis) {
     std::vector<std::array<double, 3>> points(soup.vertices.size());
     for (std::size_t v = 0; v < points.size(); ++v) {
       const Eigen::Vector3d& x = unit[v];

@@ -14,10 +14,10 @@ namespace ist {
 /// made.
 class DisjointSets {
  public:
-  explicit DisjointSets(const std::size_t size)
+  explicit DisjointSets(std::size_t size)
       : parent_(std::make_unique_for_overwrite<std::uint32_t[]>(size)) {
     tbb::parallel_for(std::size_t{0}, size,
-                      [&](const std::size_t i) { parent_[i] = static_cast<std::uint32_t>(i); });
+                      [&](std::size_t i) { parent_[i] = static_cast<std::uint32_t>(i); });
   }
 
   std::uint32_t find(std::uint32_t i) {
@@ -43,7 +43,7 @@ class DisjointSets {
   }
 
  private:
-  std::atomic_ref<std::uint32_t> parent(const std::uint32_t i) {
+  std::atomic_ref<std::uint32_t> parent(std::uint32_t i) {
     return std::atomic_ref<std::uint32_t>(parent_[i]);
   }
 

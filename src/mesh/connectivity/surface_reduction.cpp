@@ -64,7 +64,7 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
   for (const std::uint32_t t : degenerate)
     (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
   std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
-  const auto edge_of = [&](const std::uint32_t t, const std::size_t k) {
+  const auto edge_of = [&](std::uint32_t t, std::size_t k) {
     return edges.edge_of(3 * std::size_t{t} + k);
   };
   for (const std::uint32_t t : open)
@@ -72,7 +72,7 @@ std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& v
       sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
   for (bool more = true; more;) {
     const std::size_t before = dropped.size();
-    std::erase_if(open, [&](const std::uint32_t t) {
+    std::erase_if(open, [&](std::uint32_t t) {
       std::size_t odd = 0;
       for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
       if (odd < 2) return false;
@@ -102,7 +102,7 @@ bool same_direction(const Triangle& a, const Triangle& b) {
   return false;
 }
 
-std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, const std::uint32_t side) {
+std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, std::uint32_t side) {
   return triangles[side / 3][(side + 2) % 3];
 }
 
@@ -159,7 +159,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
   // Stacks that share an edge decide together.
   DisjointSets groups(stacks.size());
   std::vector<std::uint32_t> stack_at(edges.size(), kNoIndex);
-  const auto edge_of = [&](const Stack& stack, const std::size_t k) {
+  const auto edge_of = [&](const Stack& stack, std::size_t k) {
     return edges.edge_of(3 * std::size_t{stack.members[0]} + k);
   };
   for (std::uint32_t s = 0; s < stacks.size(); ++s)
@@ -171,7 +171,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
 
   // Two possible reductions of a group: how many copies of a stack stay, and how many edges are
   // odd.
-  const auto copies_left = [&](const Stack& stack, const bool one_copy) {
+  const auto copies_left = [&](const Stack& stack, bool one_copy) {
     return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
   };
   std::vector<std::array<std::size_t, 2>> odd(stacks.size(), {0, 0});

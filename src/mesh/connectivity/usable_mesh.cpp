@@ -16,13 +16,13 @@ namespace {
 
 void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty()) throw Error(name + ": no triangles, so it does not bound a solid");
-  const auto unsound = [&](const std::size_t t) {
+  const auto unsound = [&](std::size_t t) {
     return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
       return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
     });
   };
   std::atomic<bool> sound = true;
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     if (unsound(t)) sound = false;
   });
   if (sound) return;

@@ -116,7 +116,7 @@ class LinesInCells {
 
  private:
   /// Never falls as the coordinate grows.
-  std::size_t cell_of(const double x) const {
+  std::size_t cell_of(double x) const {
     const auto n = static_cast<double>(cells_);
     return static_cast<std::size_t>(std::clamp((x + 1) / 2 * n, 0.0, n - 1));
   }
@@ -131,10 +131,10 @@ ItemGroups<std::uint32_t, Crossing> line_crossings(
     const MeshView& mesh, const std::vector<std::array<double, 2>>& lines) {
   const LinesInCells in_cells(lines);
   tbb::enumerable_thread_specific<std::vector<std::pair<std::uint32_t, Crossing>>> of_threads;
-  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](const std::uint32_t triangle) {
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t triangle) {
     const Corners t = corners_of(mesh, triangle);
     const Extent y(t, 1), z(t, 2);
-    in_cells.for_each(y, z, [&](const std::uint32_t line) {
+    in_cells.for_each(y, z, [&](std::uint32_t line) {
       const double* const yz = lines[line].data();
       if (yz[0] < y.low || yz[0] > y.high || yz[1] < z.low || yz[1] > z.high) return;
       const int facing = pierced(t, yz);

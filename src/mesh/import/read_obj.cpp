@@ -9,12 +9,12 @@ namespace ist {
 namespace {
 
 /// The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn": counted from 1, or back from −1.
-std::int64_t vertex_of_corner(const TextScanner& scanner, const std::string_view corner) {
+std::int64_t vertex_of_corner(const TextScanner& scanner, std::string_view corner) {
   return scanner.integer(corner.substr(0, corner.find('/')));
 }
 
 /// Statements other than `f` that make or fetch a surface.
-bool is_surface(const std::string_view keyword) {
+bool is_surface(std::string_view keyword) {
   return keyword == "surf" || keyword == "bsp" || keyword == "bzp" || keyword == "cdp" ||
          keyword == "call";
 }

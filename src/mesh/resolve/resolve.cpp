@@ -35,7 +35,7 @@ class Rays {
 
   /// The winding number in front of a piece, by a line along an axis through a point of it that
   /// meets no edge.
-  int in_front(const std::uint32_t piece) {
+  int in_front(std::uint32_t piece) {
     const Triangle& corners = arrangement_.pieces[piece];
     const Eigen::Vector3d a = points_.rounded(corners[0]);
     int axis = 0;
@@ -75,8 +75,7 @@ class Rays {
   }
 
   /// Nothing where the line meets an edge.
-  std::optional<int> count(const PointView& from, const std::uint32_t piece, const int axis,
-                           const int facing) {
+  std::optional<int> count(const PointView& from, std::uint32_t piece, int axis, int facing) {
     const std::uint32_t own = arrangement_.plane[arrangement_.source[piece]];
     int winding = 0;
     for (const std::uint32_t t : columns(axis).about(from.rounded->at)) {
@@ -101,11 +100,10 @@ class Rays {
     return winding;
   }
 
-  const TriangleColumns& columns(const int axis) {
+  const TriangleColumns& columns(int axis) {
     const auto k = static_cast<std::size_t>(axis);
     std::call_once(made_[k], [&] {
-      columns_[k].emplace(triangles_, axis,
-                          [&](const std::uint32_t v) { return points_.rounded(v); });
+      columns_[k].emplace(triangles_, axis, [&](std::uint32_t v) { return points_.rounded(v); });
     });
     return *columns_[k];
   }
@@ -161,7 +159,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
   }
   patches.in_front.resize(largest.size());
   Rays rays(triangles, arrangement);
-  work.for_each(largest.size(), kPatches, [&](const std::size_t patch) {
+  work.for_each(largest.size(), kPatches, [&](std::size_t patch) {
     patches.in_front[patch] = rays.in_front(largest[patch]);
   });
   return patches;
@@ -213,13 +211,13 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
 }
 
 /// To the nearest multiples of a power of two.
-Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
+Eigen::Vector3d snapped(const Eigen::Vector3d& p, double step) {
   return (p / step).array().rint() * step;
 }
 
 /// Drops pieces of a closed surface that are thinner than rounding: gaps between faces that have
 /// their corners in common, and what pressing left.
-void drop_flat_pieces(TriangleMesh& mesh, const double thinnest, const Eigen::Vector3d& from) {
+void drop_flat_pieces(TriangleMesh& mesh, double thinnest, const Eigen::Vector3d& from) {
   const SidePartners partners =
       nearest_partners(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
   DisjointSets pieces(mesh.triangles.size());
@@ -227,7 +225,7 @@ void drop_flat_pieces(TriangleMesh& mesh, const double thinnest, const Eigen::Ve
     if (partners[side] != kNoIndex) pieces.unite(side / 3, partners[side] / 3);
   std::vector<double> volume(mesh.triangles.size(), 0), area(mesh.triangles.size(), 0);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto corner = [&](const std::size_t k) { return mesh.vertices[mesh.triangles[t][k]]; };
+    const auto corner = [&](std::size_t k) { return mesh.vertices[mesh.triangles[t][k]]; };
     volume[pieces.find(t)] += volume_of(corner(0), corner(1), corner(2), from) / 6;
     area[pieces.find(t)] += (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm() / 2;
   }
@@ -259,7 +257,7 @@ class Resolver {
   std::optional<TriangleMesh> surface(Resolution& resolution) const {
     std::vector<bool> changed(triangles_.size(), false);  // by group
     const std::vector<std::uint32_t> groups = groups_of(triangles_, pairs_);
-    const auto group_of_piece = [&](const std::size_t p) { return groups[arrangement_.source[p]]; };
+    const auto group_of_piece = [&](std::size_t p) { return groups[arrangement_.source[p]]; };
     bool any = false;
     for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
       const int front = in_front(p), back = behind(p);
@@ -331,13 +329,9 @@ class Resolver {
   }
 
  private:
-  int in_front(const std::size_t piece) const {
-    return patches_.in_front[patches_.of_piece[piece]];
-  }
-  int behind(const std::size_t piece) const {
-    return in_front(piece) + arrangement_.winding_step[piece];
-  }
-  double volume_of(const std::size_t piece) const {
+  int in_front(std::size_t piece) const { return patches_.in_front[patches_.of_piece[piece]]; }
+  int behind(std::size_t piece) const { return in_front(piece) + arrangement_.winding_step[piece]; }
+  double volume_of(std::size_t piece) const {
     const Triangle& t = arrangement_.pieces[piece];
     const ExactPoints& points = arrangement_.points;
     return ist::volume_of(points.rounded(t[0]), points.rounded(t[1]), points.rounded(t[2]), from_);
@@ -353,11 +347,11 @@ class Resolver {
   Eigen::Vector3d from_;
 };
 
-std::string percent(const double part, const double of) {
+std::string percent(double part, double of) {
   return shortest(std::round(part / of * 1e6) / 1e4) + " %";
 }
 
-std::string describe(const Resolution& resolution, const double volume) {
+std::string describe(const Resolution& resolution, double volume) {
   if (resolution.counted_twice == 0 && resolution.counted_against == 0)
     return "parts of the mesh touch: the walls between them are no boundary and were removed";
   std::string text = "parts of the mesh overlap: " + percent(resolution.counted_twice, volume) +
