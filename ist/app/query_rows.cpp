@@ -181,6 +181,31 @@ PoseTable read(std::istream& text, const std::string& name) {
   return table;
 }
 
+/// The numeric columns between `id` and `status`, in order.
+std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparation& r) {
+  const Penetration& p = r.penetration;
+  const Separation& s = r.separation;
+  std::vector<std::pair<std::string, double>> out = {
+      {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
+  for (const auto& [name, v] :
+       {std::pair{"c", p.centroid}, {"force_", p.force}, {"torque_", p.torque}})
+    for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
+  out.insert(out.end(), {{"distance", s.distance},
+                         {"distance_min", s.distance_min},
+                         {"distance_max", s.distance_max}});
+  return out;
+}
+
+/// Those behind `time_us`: how the solids touch, which spheres cannot know.
+std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
+  const Penetration& p = answer.result.penetration;
+  const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };
+  std::vector<std::pair<std::string, double>> out = {{"contact_area", known(p.contact_area)}};
+  for (int k = 0; k < 3; ++k)
+    out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
+  return out;
+}
+
 }  // namespace
 
 Pose parse_pose(const std::string& text) {
@@ -228,35 +253,6 @@ std::string pose_fault(const PoseRow& row) {
       "{} is {:g}, out of range: sizes and distances may differ by a factor of at most 1e60", name,
       worst);
 }
-
-namespace {
-
-/// The numeric columns between `id` and `status`, in order.
-std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparation& r) {
-  const Penetration& p = r.penetration;
-  const Separation& s = r.separation;
-  std::vector<std::pair<std::string, double>> out = {
-      {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
-  for (const auto& [name, v] :
-       {std::pair{"c", p.centroid}, {"force_", p.force}, {"torque_", p.torque}})
-    for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
-  out.insert(out.end(), {{"distance", s.distance},
-                         {"distance_min", s.distance_min},
-                         {"distance_max", s.distance_max}});
-  return out;
-}
-
-/// Those behind `time_us`: how the solids touch, which spheres cannot know.
-std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
-  const Penetration& p = answer.result.penetration;
-  const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };
-  std::vector<std::pair<std::string, double>> out = {{"contact_area", known(p.contact_area)}};
-  for (int k = 0; k < 3; ++k)
-    out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
-  return out;
-}
-
-}  // namespace
 
 std::uint64_t Answer::node_visits() const {
   return std::uint64_t{result.penetration.node_visits} + result.separation.node_visits;

@@ -66,17 +66,6 @@ void print_table(const Summary& summary, bool failed) {
              counts_in_words(summary));
 }
 
-}  // namespace
-
-void print_summary(const Summary& summary, bool json, bool quiet, bool failed) {
-  if (json)
-    fmt::print("{}\n", json_text(to_json(summary, failed)));
-  else if (!quiet)
-    print_table(summary, failed);
-}
-
-namespace {
-
 using Eigen::Vector3d;
 
 constexpr int kSide = 96;  ///< [pixels] of a picture, a multiple of 4
@@ -253,6 +242,13 @@ void run_summary(const SummaryOptions& options) {
 }
 
 }  // namespace
+
+void print_summary(const Summary& summary, bool json, bool quiet, bool failed) {
+  if (json)
+    fmt::print("{}\n", json_text(to_json(summary, failed)));
+  else if (!quiet)
+    print_table(summary, failed);
+}
 
 void add_summary(CLI::App& app) {
   const auto options = std::make_shared<SummaryOptions>();

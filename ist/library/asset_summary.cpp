@@ -27,38 +27,6 @@ std::uint64_t round_count(double count) {
   return static_cast<std::uint64_t>(std::ceil(count / unit) * unit);
 }
 
-}  // namespace
-
-std::optional<std::uint64_t> enough_spheres(const AssetView& tree) {
-  const AssetHeader& h = tree.header();
-  if (!(h.coverage < kCoarse) || !(h.volume > 0)) return std::nullopt;
-  // The last quarter: what one of its spheres covers of the solid.
-  const Sphere* const spheres = at<Sphere>(h, h.inner_spheres);
-  const std::uint64_t from = h.sphere_count - (h.sphere_count + 3) / 4;
-  double covered = 0;
-  for (std::uint64_t i = from; i < h.sphere_count; ++i) {
-    const double r = spheres[i].r;
-    covered += 4 * std::numbers::pi / 3 * r * r * r / h.volume;
-  }
-  const double each = covered / static_cast<double>(h.sphere_count - from);
-  if (!(each > 0)) return std::nullopt;
-  const double count = static_cast<double>(h.sphere_count) + kRoom * (kEnough - h.coverage) / each;
-  if (!(count <= static_cast<double>(kMaxSpheres))) return std::nullopt;
-  return round_count(count);
-}
-
-std::string describe_coarseness(const AssetView& tree) {
-  if (tree.header().sphere_count == 0 || !(tree.header().coverage < kCoarse)) return "";
-  const std::string coarse =
-      fmt::format("the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; ",
-                  100 * tree.header().coverage);
-  if (const auto enough = enough_spheres(tree))
-    return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
-  return coarse + "no number of spheres is enough. Bake the mesh alone (--mesh-only)";
-}
-
-namespace {
-
 /// Whether the mode knows the largest sphere that would fit; the header of others says 1.
 bool keeps_bound(GridMode mode) { return mode == GridMode::banded; }
 
@@ -173,6 +141,34 @@ nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
 }
 
 }  // namespace
+
+std::optional<std::uint64_t> enough_spheres(const AssetView& tree) {
+  const AssetHeader& h = tree.header();
+  if (!(h.coverage < kCoarse) || !(h.volume > 0)) return std::nullopt;
+  // The last quarter: what one of its spheres covers of the solid.
+  const Sphere* const spheres = at<Sphere>(h, h.inner_spheres);
+  const std::uint64_t from = h.sphere_count - (h.sphere_count + 3) / 4;
+  double covered = 0;
+  for (std::uint64_t i = from; i < h.sphere_count; ++i) {
+    const double r = spheres[i].r;
+    covered += 4 * std::numbers::pi / 3 * r * r * r / h.volume;
+  }
+  const double each = covered / static_cast<double>(h.sphere_count - from);
+  if (!(each > 0)) return std::nullopt;
+  const double count = static_cast<double>(h.sphere_count) + kRoom * (kEnough - h.coverage) / each;
+  if (!(count <= static_cast<double>(kMaxSpheres))) return std::nullopt;
+  return round_count(count);
+}
+
+std::string describe_coarseness(const AssetView& tree) {
+  if (tree.header().sphere_count == 0 || !(tree.header().coverage < kCoarse)) return "";
+  const std::string coarse =
+      fmt::format("the spheres are too coarse for thin parts: they fill {:.2g} % of the solid; ",
+                  100 * tree.header().coverage);
+  if (const auto enough = enough_spheres(tree))
+    return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
+  return coarse + "no number of spheres is enough. Bake the mesh alone (--mesh-only)";
+}
 
 std::string describe_asset(const AssetView& tree) {
   const AssetHeader& h = tree.header();

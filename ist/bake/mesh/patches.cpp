@@ -60,30 +60,6 @@ void settle(std::span<std::uint32_t> order) {
                   static_cast<std::ptrdiff_t>(std::min<std::size_t>(begin + kWidth, order.size())));
 }
 
-}  // namespace
-
-FloatMesh in_floats(const MeshView& mesh) {
-  FloatMesh out;
-  out.vertices.resize(mesh.vertex_count);
-  out.triangles.resize(mesh.triangle_count);
-  for (std::size_t v = 0; v < out.vertices.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      out.vertices[v][k] = static_cast<float>(mesh.vertices[3 * v + k]);
-  for (std::size_t t = 0; t < out.triangles.size(); ++t)
-    std::copy_n(mesh.triangles + 3 * t, 3, out.triangles[t].begin());
-  return out;
-}
-
-std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0u);
-  halve(points, order);
-  settle(order);
-  return order;
-}
-
-namespace {
-
 constexpr std::uint32_t kNone = ~0u;
 /// Patches are joined where the result is not larger than this, in radii of the larger.
 constexpr double kJoinedRadius = 1.5;
@@ -277,6 +253,26 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
 }
 
 }  // namespace
+
+FloatMesh in_floats(const MeshView& mesh) {
+  FloatMesh out;
+  out.vertices.resize(mesh.vertex_count);
+  out.triangles.resize(mesh.triangle_count);
+  for (std::size_t v = 0; v < out.vertices.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      out.vertices[v][k] = static_cast<float>(mesh.vertices[3 * v + k]);
+  for (std::size_t t = 0; t < out.triangles.size(); ++t)
+    std::copy_n(mesh.triangles + 3 * t, 3, out.triangles[t].begin());
+  return out;
+}
+
+std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  halve(points, order);
+  settle(order);
+  return order;
+}
 
 std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh) {
   return joined(mesh, Growth(mesh).all());

@@ -75,6 +75,35 @@ bool is_spread(std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fa
   return true;
 }
 
+constexpr double kFullCone = 4;  ///< [rad] no angle is larger
+
+/// A cone from the owner around what else the group has: less than half of all directions, or all.
+void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
+              std::span<const std::uint32_t> group, Slab& slab) {
+  const auto for_each_direction = [&](const auto& visit) {
+    const FloatPoint& o = points[slab.owner];
+    for (const std::uint32_t i : group)
+      for (const std::uint32_t v : triangles[i]) {
+        if (v == slab.owner) continue;
+        const FloatPoint& p = points[v];
+        const Eigen::Vector3d off(double{p[0]} - double{o[0]}, double{p[1]} - double{o[1]},
+                                  double{p[2]} - double{o[2]});
+        const double length = off.norm();
+        constexpr double kShort = 1e-3;  // else rounding to float turns it too far
+        visit(length > kShort ? Eigen::Vector3d(off / length) : Eigen::Vector3d::Zero());
+      }
+  };
+  slab.direction.setZero();
+  for_each_direction([&](const Eigen::Vector3d& to) { slab.direction += to; });
+  const double length = slab.direction.norm();
+  if (length > 0) slab.direction /= length;
+  for_each_direction([&](const Eigen::Vector3d& to) {
+    const double along = slab.direction.dot(to);
+    slab.angle = along > 0 ? std::max(slab.angle, angle_of(slab.direction.cross(to).norm(), along))
+                           : kFullCone;
+  });
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
@@ -112,39 +141,6 @@ std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std
   });
   return owners;
 }
-
-namespace {
-
-constexpr double kFullCone = 4;  ///< [rad] no angle is larger
-
-/// A cone from the owner around what else the group has: less than half of all directions, or all.
-void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-              std::span<const std::uint32_t> group, Slab& slab) {
-  const auto for_each_direction = [&](const auto& visit) {
-    const FloatPoint& o = points[slab.owner];
-    for (const std::uint32_t i : group)
-      for (const std::uint32_t v : triangles[i]) {
-        if (v == slab.owner) continue;
-        const FloatPoint& p = points[v];
-        const Eigen::Vector3d off(double{p[0]} - double{o[0]}, double{p[1]} - double{o[1]},
-                                  double{p[2]} - double{o[2]});
-        const double length = off.norm();
-        constexpr double kShort = 1e-3;  // else rounding to float turns it too far
-        visit(length > kShort ? Eigen::Vector3d(off / length) : Eigen::Vector3d::Zero());
-      }
-  };
-  slab.direction.setZero();
-  for_each_direction([&](const Eigen::Vector3d& to) { slab.direction += to; });
-  const double length = slab.direction.norm();
-  if (length > 0) slab.direction /= length;
-  for_each_direction([&](const Eigen::Vector3d& to) {
-    const double along = slab.direction.dot(to);
-    slab.angle = along > 0 ? std::max(slab.angle, angle_of(slab.direction.cross(to).norm(), along))
-                           : kFullCone;
-  });
-}
-
-}  // namespace
 
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
              std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,

@@ -65,6 +65,12 @@ std::vector<std::pair<double, std::uint32_t>> around_edge(
   return order;
 }
 
+int balance(const std::vector<Triangle>& triangles, std::span<const std::uint32_t> sides) {
+  int sum = 0;
+  for (const std::uint32_t side : sides) sum += runs_up(triangles, side) ? 1 : -1;
+  return sum;
+}
+
 }  // namespace
 
 SidePartners all_partners(const std::vector<Eigen::Vector3d>& vertices,
@@ -156,16 +162,6 @@ std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
     if (turned[t]) std::swap(triangles[t][1], triangles[t][2]);
   return std::nullopt;
 }
-
-namespace {
-
-int balance(const std::vector<Triangle>& triangles, std::span<const std::uint32_t> sides) {
-  int sum = 0;
-  for (const std::uint32_t side : sides) sum += runs_up(triangles, side) ? 1 : -1;
-  return sum;
-}
-
-}  // namespace
 
 std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& triangles,
                                                   const EdgeTable& edges) {

@@ -53,42 +53,6 @@ void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& tr
   triangles.erase(kept, triangles.end());
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
-                                           std::vector<Triangle>& triangles,
-                                           const EdgeTable& edges) {
-  const std::vector<std::uint32_t> degenerate = indices_where(
-      triangles.size(), [&](std::size_t t) { return is_degenerate(vertices, triangles[t]); });
-  std::vector<std::uint32_t> dropped, open;
-  for (const std::uint32_t t : degenerate)
-    (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
-  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
-  const auto edge_of = [&](std::uint32_t t, std::size_t k) {
-    return edges.edge_of(3 * std::size_t{t} + k);
-  };
-  for (const std::uint32_t t : open)
-    for (std::size_t k = 0; k < 3; ++k)
-      sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
-  for (bool more = true; more;) {
-    const std::size_t before = dropped.size();
-    std::erase_if(open, [&](std::uint32_t t) {
-      std::size_t odd = 0;
-      for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
-      if (odd < 2) return false;
-      for (std::size_t k = 0; k < 3; ++k) --sides[edge_of(t, k)];
-      dropped.push_back(t);
-      return true;
-    });
-    more = dropped.size() != before;
-  }
-  std::sort(dropped.begin(), dropped.end());
-  remove(dropped, triangles);
-  return dropped;
-}
-
-namespace {
-
 /// Triangles with the same corners.
 struct Stack {
   std::vector<std::uint32_t> members;
@@ -150,6 +114,38 @@ std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const Edg
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
+                                           std::vector<Triangle>& triangles,
+                                           const EdgeTable& edges) {
+  const std::vector<std::uint32_t> degenerate = indices_where(
+      triangles.size(), [&](std::size_t t) { return is_degenerate(vertices, triangles[t]); });
+  std::vector<std::uint32_t> dropped, open;
+  for (const std::uint32_t t : degenerate)
+    (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
+  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
+  const auto edge_of = [&](std::uint32_t t, std::size_t k) {
+    return edges.edge_of(3 * std::size_t{t} + k);
+  };
+  for (const std::uint32_t t : open)
+    for (std::size_t k = 0; k < 3; ++k)
+      sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
+  for (bool more = true; more;) {
+    const std::size_t before = dropped.size();
+    std::erase_if(open, [&](std::uint32_t t) {
+      std::size_t odd = 0;
+      for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
+      if (odd < 2) return false;
+      for (std::size_t k = 0; k < 3; ++k) --sides[edge_of(t, k)];
+      dropped.push_back(t);
+      return true;
+    });
+    more = dropped.size() != before;
+  }
+  std::sort(dropped.begin(), dropped.end());
+  remove(dropped, triangles);
+  return dropped;
+}
 
 std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable& edges) {
   if (!may_have_stacks(triangles, edges)) return 0;

@@ -35,6 +35,43 @@ void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* ent
   }
 }
 
+/// [vertex] 1 where a triangle has it as a corner.
+std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
+  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
+    for (const std::uint32_t v : mesh.triangles[t])
+      std::atomic_ref<std::uint8_t>(used[v]).store(1, std::memory_order_relaxed);
+  });
+  return used;
+}
+
+void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
+    for (std::uint32_t& v : mesh.triangles[t]) v = names[v];
+  });
+}
+
+/// Keeps the vertices that are used and named by themselves; `name` becomes the new one of each.
+void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
+                std::vector<std::uint32_t>& name) {
+  std::atomic<bool> all{true};
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(name.size()),
+                    [&](std::uint32_t v) {
+                      mesh.vertices[v] += Eigen::Vector3d::Zero();  // one zero only
+                      if (used[v] == 0 || name[v] != v) all.store(false, std::memory_order_relaxed);
+                    });
+  if (all) return;
+  std::uint32_t kept = 0;
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
+    if (used[v] == 0) continue;
+    const bool is_first = name[v] == v;
+    if (is_first) mesh.vertices[kept] = mesh.vertices[v];
+    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
+  }
+  mesh.vertices.resize(kept);
+  rename_corners(mesh, name);
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
@@ -76,47 +113,6 @@ std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& point
   });
   return first;
 }
-
-namespace {
-
-/// [vertex] 1 where a triangle has it as a corner.
-std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
-  std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
-    for (const std::uint32_t v : mesh.triangles[t])
-      std::atomic_ref<std::uint8_t>(used[v]).store(1, std::memory_order_relaxed);
-  });
-  return used;
-}
-
-void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names) {
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
-    for (std::uint32_t& v : mesh.triangles[t]) v = names[v];
-  });
-}
-
-/// Keeps the vertices that are used and named by themselves; `name` becomes the new one of each.
-void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
-                std::vector<std::uint32_t>& name) {
-  std::atomic<bool> all{true};
-  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(name.size()),
-                    [&](std::uint32_t v) {
-                      mesh.vertices[v] += Eigen::Vector3d::Zero();  // one zero only
-                      if (used[v] == 0 || name[v] != v) all.store(false, std::memory_order_relaxed);
-                    });
-  if (all) return;
-  std::uint32_t kept = 0;
-  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
-    if (used[v] == 0) continue;
-    const bool is_first = name[v] == v;
-    if (is_first) mesh.vertices[kept] = mesh.vertices[v];
-    name[v] = is_first ? kept++ : name[name[v]];  // the first's is known by now
-  }
-  mesh.vertices.resize(kept);
-  rename_corners(mesh, name);
-}
-
-}  // namespace
 
 TriangleMesh weld(TriangleMesh mesh, double tolerance) {
   if (tolerance > 0)

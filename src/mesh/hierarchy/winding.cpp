@@ -70,29 +70,6 @@ void visit_about_box(const MeshView& mesh, const float low[3], const float high[
   }
 }
 
-}  // namespace
-
-int winding_number(const MeshView& mesh, const double p[3]) {
-  int winding = 0;
-  const RayBox box = RayBox::ray(p);
-  visit_about_box(mesh, box.lower, box.upper,
-                  [&](const Corners& t) { winding += ray_winding(t, p); });
-  return winding;
-}
-
-void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out) {
-  out.clear();
-  const double yz[2] = {y, z};
-  const RayBox box = RayBox::line(y, z);
-  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
-    const int facing = pierced(t, yz);
-    if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
-  });
-  std::sort(out.begin(), out.end(), comes_before);
-}
-
-namespace {
-
 /// Lines (y, z) by the square cells that they lie in, as many cells as lines.
 class LinesInCells {
  public:
@@ -126,6 +103,25 @@ class LinesInCells {
 };
 
 }  // namespace
+
+int winding_number(const MeshView& mesh, const double p[3]) {
+  int winding = 0;
+  const RayBox box = RayBox::ray(p);
+  visit_about_box(mesh, box.lower, box.upper,
+                  [&](const Corners& t) { winding += ray_winding(t, p); });
+  return winding;
+}
+
+void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out) {
+  out.clear();
+  const double yz[2] = {y, z};
+  const RayBox box = RayBox::line(y, z);
+  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
+    const int facing = pierced(t, yz);
+    if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
+  });
+  std::sort(out.begin(), out.end(), comes_before);
+}
 
 ItemGroups<std::uint32_t, Crossing> line_crossings(
     const MeshView& mesh, const std::vector<std::array<double, 2>>& lines) {

@@ -68,6 +68,14 @@ double error_of(const PointView& p, int k) {
   return p.exact == nullptr ? 0 : std::abs(p.at(k)) * kHalfUlp;
 }
 
+ExactPoint with_positive_w(WholeVector x, Whole w) {
+  if (w.sign() < 0) {
+    w = -w;
+    for (Whole& c : x) c = -c;
+  }
+  return {std::move(x), std::move(w)};
+}
+
 }  // namespace
 
 WholeVector minus(const WholeVector& a, const WholeVector& b) {
@@ -85,18 +93,6 @@ WholeVector cross(const WholeVector& a, const WholeVector& b) {
 Whole dot(const WholeVector& a, const WholeVector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-
-namespace {
-
-ExactPoint with_positive_w(WholeVector x, Whole w) {
-  if (w.sign() < 0) {
-    w = -w;
-    for (Whole& c : x) c = -c;
-  }
-  return {std::move(x), std::move(w)};
-}
-
-}  // namespace
 
 ExactPoint common_point(const ExactPlane& a, const ExactPlane& b, const ExactPlane& c) {
   const WholeVector bc = cross(b.normal, c.normal), ca = cross(c.normal, a.normal),
