@@ -20,8 +20,7 @@
 namespace ist::app {
 namespace {
 
-/// Colours of the spheres, their groups, the groups' groups …; all but the spheres let light
-/// through.
+/// Colours of the spheres, their groups, the groups' groups …; all but the spheres are transparent.
 std::array<double, 4> colour_of(std::size_t level) {
   constexpr std::array<std::array<double, 3>, 5> kColours = {{{0.90, 0.62, 0.28},
                                                               {0.25, 0.55, 0.85},

@@ -70,8 +70,7 @@ std::string wrapped(const std::string& text, std::size_t indent, std::size_t wid
   return out;
 }
 
-/// CLI11's help, with lines that end at the terminal's right edge (at column 80 without a terminal,
-/// at 100 at most).
+/// CLI11's help in lines of the terminal's width: 80 columns without a terminal, 100 at most.
 class HelpFormat : public CLI::Formatter {
  public:
   HelpFormat() : width_(terminal_width() - kGroupIndent) {}

@@ -24,9 +24,8 @@ class LinkMeshes {
   /// Returns a substitute for a mesh that cannot be closed, given the reason; nothing: an error.
   using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
 
-  /// The mesh of these links that `make` returns, closed; by repair or by a wrap, whichever has the
-  /// higher confidence, if both are asked for. Nothing where that or closing it throws Error, which
-  /// is a fault of each link.
+  /// The mesh that `make` returns, closed; if both are asked for, by the better of repair and wrap.
+  /// Nothing where either throws Error, which is a fault of each of these links.
   std::optional<ClosedMesh> close(const std::vector<std::string>& links,
                                   const std::function<TriangleMesh()>& make,
                                   const Otherwise& otherwise = {});

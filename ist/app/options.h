@@ -43,12 +43,10 @@ void refuse_idle_options(const RobotOptions& options, const std::string& input);
 /// The same where `option` was given.
 void refuse_without_robot(const std::string& option, const std::string& input);
 
-/// It ends in .urdf or .sdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which
-/// is to be expanded.
+/// Whether it ends in .urdf, .sdf, or MuJoCo's .xml or .mjcf. Throws Error for .xacro.
 bool is_robot_file(const std::string& path);
 
-/// An argument or option that names a file to read, required unless the caller says otherwise; ""
-/// and "-" are refused.
+/// A required argument or option that names a file to read; "" and "-" are refused.
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,
                        const std::string& help);
 

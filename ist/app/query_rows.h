@@ -54,8 +54,7 @@ struct Answer {
   std::uint64_t sphere_pairs() const;
 };
 
-// The columns of docs/user_guide.md (*Query*), 17 digits; other tools read them: new ones only at
-// the end.
+// The columns of docs/user_guide.md (*Query*), 17 digits. Other tools read them: append only.
 std::string answers_csv(std::span<const Answer> answers);
 std::string answers_json(std::span<const Answer> answers);
 

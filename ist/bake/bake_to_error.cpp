@@ -253,8 +253,7 @@ class TargetBake {
     }
   }
 
-  /// If both meet the target, the one of fewer spheres is better, else the one with the smaller
-  /// error.
+  /// If both meet the target, fewer spheres are better, else a smaller error.
   bool is_better(const Candidate& candidate, const Candidate& than) const {
     if (does(candidate) && does(than)) return candidate.spheres() < than.spheres();
     return candidate.error() < than.error();

@@ -26,8 +26,7 @@ std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
   return {reinterpret_cast<ContactPatch*>(given.patches), given.capacity};
 }
 
-/// `ask(a, b, settings, workspace, patches)` answers ContactPatches. `status`: of the other
-/// arguments.
+/// `ask(a, b, settings, workspace, patches)` answers ContactPatches. `status`: of other arguments.
 template <class Solid, class Ask>
 ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,

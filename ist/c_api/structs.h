@@ -73,8 +73,7 @@ inline AssetStatus asset_status_of(ist_status_t status) noexcept {
   return static_cast<AssetStatus>(IST_TOO_SHORT + 1 - status);
 }
 
-/// Copies an answer from C++ to C or back. What lies between a struct's numbers is 0, so that its
-/// bytes can be compared.
+/// Copies an answer from C++ to C or back. Padding is 0, so that the bytes can be compared.
 template <class From, class To>
 requires requires(From from, To to) { from.status, to.status; }
 void write(const From& from, To& to) noexcept {

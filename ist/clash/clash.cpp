@@ -178,8 +178,7 @@ struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// Faces that face one direction have more than a quarter of their area along it; those of a pin
-  /// in its hole cancel.
+  /// Faces of one direction have more than a quarter of their area along it; a pin's cancel.
   bool has_way_out() const { return force.norm() > area / 4; }
   double depth() const { return volume / (has_way_out() ? force.norm() : area); }
 };

@@ -27,8 +27,8 @@ struct CacheKey {
   bool operator==(const CacheKey&) const = default;
 };
 
-/// Hashes the mesh's bytes, those of the files that it refers to, the settings, the asset's format
-/// and the revision of the bake; name, path, device and threads do not count. Throws Error if a
+/// Hashes the bytes of the mesh and of the files that it refers to, the settings, the asset's
+/// format and the revision of the bake, but not name, path, device and threads. Throws Error if a
 /// file cannot be read.
 CacheKey cache_key(const Job& job);
 
@@ -38,8 +38,8 @@ struct CacheEntry {
   std::optional<double> confidence = {};  ///< RepairQuality's, of a mesh that was not closed
 };
 
-/// An entry but for its asset as a line of JSON: the key, what was found about the mesh, and a hash
-/// of these and of the asset.
+/// An entry without its asset as a line of JSON: key, notes, confidence; a hash of these and the
+/// asset.
 std::string line_of(const CacheKey& key, const CacheEntry& entry);
 /// The entry of such a line. Throws an exception that says what is wrong where the line is damaged,
 /// or is another key's or another asset's.
@@ -51,8 +51,8 @@ class AssetCache {
   /// none are. Makes the folder; throws Error where that cannot be.
   explicit AssetCache(std::filesystem::path folder, std::uint64_t limit = 0);
 
-  /// Nothing where there is no such entry, or it is damaged: `damage` then says how. Marks it as
-  /// used. From any thread.
+  /// Nothing where there is no such entry or it is damaged, as `damage` says. Marks it used.
+  /// Thread-safe.
   std::optional<CacheEntry> find(const CacheKey& key, std::string& damage) const;
 
   /// In place of an entry that may be there. Throws Error. From any thread.

@@ -218,8 +218,7 @@ class Run {
     queue_.close();
   }
 
-  /// Collects the jobs that ended since the last call, after a short wait; false: those were the
-  /// last.
+  /// Waits a little and collects the jobs that ended since the last call; false: no more follow.
   bool wait(std::vector<std::pair<std::size_t, JobResult>>& ended) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::milliseconds(100),

@@ -23,8 +23,7 @@ class OutputRecord {
  public:
   explicit OutputRecord(const std::filesystem::path& folder);
 
-  /// The asset NAME.ist, if it is the one that was written from what the key stands for. From any
-  /// thread.
+  /// The asset NAME.ist, if it was written from what the key stands for. Thread-safe.
   std::optional<CacheEntry> find(const std::string& name, const CacheKey& key) const;
 
   /// From any thread. Throws Error.

@@ -400,8 +400,7 @@ struct Scene::Impl {
     return out;
   }
 
-  /// Of those of before that stay and those that were asked: all, the pairs that meet, and those
-  /// that no longer do.
+  /// Merges the pairs that stay with those that were asked: all, those that meet, those that ended.
   void merge() noexcept {
     std::swap(now, before);
     now.clear();

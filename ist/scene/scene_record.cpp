@@ -12,8 +12,7 @@
 
 #include "scene/scene_impl.h"
 
-// A scene before a step, in bytes and back. What is written and what is read is said once, in
-// pass().
+// A scene before a step, in bytes and back: pass() says once what is written and read.
 
 namespace ist {
 namespace {

@@ -41,8 +41,7 @@ class Aside {
     if (!made_.valid()) made_ = do_aside(threads_, [this] { return work_(stop_); }).share();
   }
 
-  /// Starts it if nobody has, and asks `meanwhile` twenty times a second until it is there. Throws
-  /// what the work throws.
+  /// Starts it if nobody has; calls `meanwhile` twenty times a second. Throws what the work throws.
   Result wait(const std::function<void()>& meanwhile) {
     start();
     wait_for(made_, meanwhile);

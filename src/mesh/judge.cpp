@@ -155,8 +155,7 @@ std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
   return triangles_as_solid(std::move(part));
 }
 
-/// `shared`: [triangle of `from`] 1 where `to` has it too. `corners`: [vertex of `from`] 1 where a
-/// triangle of `to` has it.
+/// `shared`, `corners`: [triangle, vertex of `from`] 1 where `to`'s triangles have it too.
 Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
                     const std::vector<std::uint8_t>& corners, const TriangleMesh& to,
                     double limit) {

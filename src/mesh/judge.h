@@ -15,8 +15,7 @@
 
 namespace ist {
 
-/// Which triangles two meshes have in common: those whose corners have the same coordinates. On the
-/// caller's TBB threads.
+/// The triangles that two meshes share: with equal corners. On the caller's TBB threads.
 class TwoMeshes {
  public:
   TwoMeshes(const TriangleMesh& a, const TriangleMesh& b) : first_of_b_(a.vertices.size()) {

@@ -56,8 +56,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   double moved() const { return moved_; }
   /// Triangles of the mesh intersect, or may: they were not looked for. Not by rounding alone.
   bool meets_itself() const { return meets_itself_; }
-  /// ClosedMesh::meeting_pairs if they are valid in the unit frame too (the frame rounded no
-  /// coordinate), else null.
+  /// ClosedMesh::meeting_pairs if the unit frame rounded no coordinate, else null.
   const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const {
     return meeting_pairs_ ? &*meeting_pairs_ : nullptr;
   }

@@ -56,8 +56,7 @@ struct Votes {
   std::int64_t fronts = 0, backs = 0;
 };
 
-/// Adds what is seen of each patch along one axis; corners are `points`, unit frame, with that axis
-/// first.
+/// Adds what is seen of each patch along one axis, which comes first in `points` (unit frame).
 void look_along(const std::vector<std::array<double, 3>>& points,
                 const std::vector<Triangle>& triangles, std::uint32_t lines, DisjointSets& patches,
                 std::vector<Votes>& votes) {

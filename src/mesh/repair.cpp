@@ -195,8 +195,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
   return counts;
 }
 
-/// Patches that hang together by edges of two faces, named by their first triangles, and what they
-/// do to others.
+/// Patches connected by edges of two faces, named by their first triangles.
 struct HangingPatches {
   DisjointSets sets;
   std::vector<int> gain;  ///< odd edges fewer without this patch

@@ -39,8 +39,7 @@ struct BorderLoop {
   std::uint32_t edge = kNoIndex;        ///< one of its edges
 };
 
-/// Loops that together run along every odd edge once. (There are always such: the border of a
-/// surface has no end.)
+/// Loops that together run along every odd edge once. They exist: a surface's border has no end.
 std::vector<BorderLoop> border_loops(const EdgeTable& edges);
 
 /// Triangles that span a loop, in its own plane where it has one.

@@ -75,8 +75,8 @@ class Wrap {
 
   /// Away from holes this is the distance from the surface, negative inside; across a hole it
   /// passes 0 where the winding number is ½. Near thin walls it is at least what is left of one
-  /// step to them. The solid ends one step beyond the bounds: triangles that face either side may
-  /// wind about points outside.
+  /// step to them. The solid ends one step beyond the bounds: unoriented triangles may wind about
+  /// points outside.
   double value(const Eigen::Vector3d& x) const {
     const double side = std::clamp(4 * (0.5 - winding_.at(x)), -1.0, 1.0);
     const double most = kFarthest * step_;

@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-/// The work of a grid packing's rounds on the GPU (packing/grids/grid_rounds.h says what the calls
+/// The work of a grid packing's rounds on the GPU (packing/grids/ascent.h says what the calls
 /// do), a warp a prototype. Must not outlive the queue.
 class DeviceRounds {
  public:

@@ -141,8 +141,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
   return out;
 }
 
-/// Box and ball contain the surface, and the surroundings in which the surface of the solid may
-/// lie.
+/// Box and ball contain the surface, and all places where the solid's surface may lie.
 std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = vector(asset.centre);
@@ -188,9 +187,8 @@ class DistanceSolid final : public CheckedSolid {
   Eigen::AlignedBox3d bounds_;
 };
 
-/// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
-/// certified against; `checked`: what matched spheres are calibrated by; of a mesh's asset they are
-/// the same.
+/// `mesh`: what was baked, or made in the solid's place. `solid`: certifies spheres and covers;
+/// `checked`: calibrates matched spheres; of a mesh's asset they are the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
                                  const CheckedSolid& solid, const CheckedMesh& checked,
                                  const UnitFrame& frame, const MeshMoments& moments) {

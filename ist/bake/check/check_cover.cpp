@@ -21,8 +21,7 @@ struct Cell {
 using BallList = std::vector<std::uint32_t>;
 
 /// Proves a cell covered: one cover ball contains it, or it lies outside the solid, or its eighths
-/// are proven. A point in the solid that no ball contains, or a cell too small to divide, is a
-/// violation.
+/// are proven. An uncovered point of the solid, or a cell too small to divide, is a violation.
 class CoverProof {
  public:
   CoverProof(const AssetHeader& asset, const CheckedSolid& checked)

@@ -40,8 +40,8 @@ struct Support {
 };
 
 /// The step from one smallest ball to the next: `ball` becomes the smallest one of the support and
-/// `added`, which `ball` does not contain, and `support` what that touches. False, and nothing is
-/// changed, if there is none.
+/// `added`, which it does not contain, and `support` what that touches. False, and no change, if
+/// there is none.
 bool grow(Support& support, const Ball& added, Ball& ball);
 
 }  // namespace ist

@@ -61,9 +61,8 @@ struct MemberSwap {
 
 inline constexpr std::size_t kNoMember = kWidth;
 
-/// Finds the swap of members between two groups that reduces Σ (R + reach)³ most, the first of
-/// equals, if it reduces it by more than a share `least_gain`. `pinned`: members that stay, or
-/// kNoMember.
+/// The swap of members between two groups that reduces Σ (R + reach)³ most, the first of equals, if
+/// by more than a share `least_gain`. `pinned`: members that stay, or kNoMember.
 MemberSwap best_swap(const SwapGroup& a, const SwapGroup& b, double reach, double least_gain,
                      std::size_t pinned_a, std::size_t pinned_b);
 

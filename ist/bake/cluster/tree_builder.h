@@ -12,8 +12,7 @@ namespace ist {
 /// Clusters spheres into an implicit 16-wide tree (asset_layout.h, docs/design.md 6). `covers` are
 /// the cover radii of disjoint inner spheres; it is empty for matched spheres, which may overlap,
 /// and κ is bounded for them. Every ball of the tree contains the spheres below it for certain:
-/// radii are rounded up. Same input, same tree, for any number of threads. The set must not be
-/// empty.
+/// radii are rounded up. Deterministic. The set must not be empty.
 TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> covers,
                       bool swaps = true);
 
@@ -29,10 +28,8 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
                            std::vector<std::uint32_t> order);
 
 /// The order in which spheres lie in a tree: every 16^(k+1) consecutive ones from the start are a
-/// node of level k. Groups of 16 are formed first, then groups of their balls, and so on up, by
-/// neural gas.
-/// With `swaps`, near groups of a level then trade members. Deterministic for any
-/// number of threads.
+/// node of level k. Neural gas forms groups of 16, then groups of their balls, and so on up. With
+/// `swaps`, near groups of a level then trade members. Deterministic.
 std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps);
 
 /// An order for spheres that lie much as others do, one for one, from tree_order() of those: its

@@ -186,8 +186,7 @@ class EvenShares {
       leads_[p] = least_leads(distances2_.data(), group(p), p);
     std::array<int, kWidth> changed{};  // the sweep that last moved a ball of the group
     for (int sweep = 1; sweep <= kSweeps; ++sweep) {
-      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
-      // and the others go round.
+      // Round robin: every two groups meet once a sweep, one partner a turn.
       const std::size_t seats = groups_ + groups_ % 2;
       for (std::size_t turn = 0; turn + 1 < seats; ++turn)
         for (std::size_t k = 0; k < seats / 2; ++k) {
@@ -330,8 +329,8 @@ class NeuralGas {
     return at;
   }
 
-  /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
-  /// `pinned`.
+  /// Sorts `range` into groups of `unit` and a last one of the rest; `pinned`: the last ball stays
+  /// last.
   void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
               bool pinned) const {
     Prototypes at = prototypes;
@@ -356,8 +355,7 @@ class NeuralGas {
 /// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
 /// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
 /// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
-/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres, so that it stays
-/// last.
+/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres and stays last.
 std::vector<std::uint32_t> neural_gas_order(std::span<const Ball> balls, bool last_stays) {
   return NeuralGas(balls, last_stays).take();
 }
@@ -382,8 +380,7 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
 
 std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps);
 
-/// The order of balls whose groups of 16 follow one another in `order`: groups of their balls, and
-/// so on up.
+/// Orders the groups of 16 that follow one another in `order`: groups of their balls, and so on.
 std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
                                         bool swaps) {

@@ -281,8 +281,7 @@ void find_slabs(MeshArrays& arrays) {
 /// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
 ///
 /// `mesh`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
-/// `header.rounding` are the caller's to set. Same bytes for any number of threads and on any
-/// machine.
+/// `header.rounding` are the caller's to set. Deterministic on any machine.
 MeshArrays lay_out_mesh(const MeshView& mesh) {
   MeshArrays arrays;
   lay_out_blocks(mesh, patches_in_order(mesh), arrays);

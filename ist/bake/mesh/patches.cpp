@@ -132,9 +132,8 @@ class Growth {
   /// In the one that grows.
   bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
-  /// Among the triangles that touch the patch and fit, takes the one that adds fewest vertices,
-  /// with a bonus for triangles that would be left alone; then the one nearest to the patch's
-  /// middle.
+  /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, with a bonus
+  /// for those that would be left alone; then the one nearest to the patch's middle.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
     FloatPoint middle = {};
@@ -159,8 +158,8 @@ class Growth {
     return std::get<2>(best);
   }
 
-  /// A triangle that touches the patch: of those with the fewest others left around them the
-  /// nearest to where it started.
+  /// Of the triangles at the patch with the fewest others left around them the nearest to its
+  /// first.
   std::uint32_t beside(const BlockPatch& patch) const {
     using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
     Score best{kNone, 0, kNone};

@@ -67,9 +67,9 @@ struct SettingFault {
 /// To be called once all settings were taken. What was not given and follows from others is set;
 /// settings that contradict each other or have no effect are told.
 ///
-/// `given`: names of all that were given. `own`: those of them that were given for this bake alone,
-/// not as a default of many, whose having no effect is a mistake. Names in a fault's text begin
-/// with `prefix`: "--" or "".
+/// `given`: names of all that were given. `own`: those given for this bake alone, not as a default
+/// of many: to have no effect is then a mistake. Names in a fault's text begin with `prefix`: "--"
+/// or "".
 std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std::string>& given,
                                      const std::set<std::string>& own, const std::string& prefix);
 

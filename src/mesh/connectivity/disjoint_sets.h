@@ -10,8 +10,7 @@
 namespace ist {
 
 /// Union–find whose representatives are the smallest members. unite() and find() may be called from
-/// many threads at once: once all have united, the representatives are what one thread would have
-/// made.
+/// many threads at once and end with the representatives of one thread.
 class DisjointSets {
  public:
   explicit DisjointSets(std::size_t size)

@@ -23,8 +23,7 @@ struct Fan {
   std::vector<exact_sign::BoundedCross> faces;
 };
 
-/// The sides opposite to a vertex, in the order in which they follow one another. False: they are
-/// no closed ring.
+/// The sides opposite to a vertex, one after the other. False: they are no closed ring.
 bool find_ring(std::uint32_t v, std::span<const std::uint32_t> triangles_at,
                const std::vector<Triangle>& triangles, Fan& fan) {
   fan.sides.clear();

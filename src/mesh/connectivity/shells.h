@@ -41,8 +41,8 @@ SidePartners nearest_partners(const std::vector<Eigen::Vector3d>& vertices,
                               const std::vector<Triangle>& triangles, const EdgeTable& edges);
 
 /// Turns triangles so that partners agree about the outside; the smaller part of each connected
-/// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and
-/// then turns none.
+/// piece turns. Returns a side at which that is impossible (a Möbius strip), if any, and then turns
+/// none.
 std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
                                              const SidePartners& partners);
 

@@ -165,8 +165,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
       groups.unite(other, s);
     }
 
-  // Two possible reductions of a group: how many copies of a stack stay, and how many edges are
-  // odd.
+  // Two possible reductions of a group: copies of a stack that stay, and edges that are odd.
   const auto copies_left = [&](const Stack& stack, bool one_copy) {
     return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
   };

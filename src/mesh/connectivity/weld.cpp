@@ -138,8 +138,7 @@ TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance,
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
-  // Kept vertices by the hash of their cell. Cells are so wide that what is near enough lies in one
-  // or two along each axis.
+  // Kept vertices by their cell's hash. What is near enough lies in one or two cells along an axis.
   const double width = 4 * tolerance;
   const auto count = static_cast<std::size_t>(std::count(among.begin(), among.end(), true));
   const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;

@@ -18,8 +18,7 @@ namespace {
 using Transform = Eigen::Affine3d;
 using Index = ColladaDocument::Index;
 
-/// Sine and cosine of an angle in degrees from + − × ÷ alone, the same on every machine; exact at
-/// multiples of 90°.
+/// Sine and cosine of degrees by + − × ÷ alone: alike on every machine; exact at multiples of 90°.
 std::pair<double, double> sine_and_cosine(double degrees) {
   const double turned = std::fmod(degrees, 360.0);  // exact
   const double quarter = std::round(turned / 90);

@@ -153,8 +153,7 @@ Primitive read_primitive(const GltfDocument& document, const Json& json, const s
   return primitive;
 }
 
-/// Moves vertices by the morph targets: Σ weight · target. The node's weights come before its
-/// mesh's.
+/// Moves vertices by Σ weight · morph target. The node's weights come before its mesh's.
 void morph(const GltfDocument& document, const Json& json, const std::vector<double>& weights,
            const std::string& name, Primitive& primitive) {
   if (!json.contains("targets") || weights.empty()) return;

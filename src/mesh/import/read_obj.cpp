@@ -21,8 +21,7 @@ bool is_surface(std::string_view keyword) {
 
 }  // namespace
 
-/// Wavefront OBJ: `v` and `f`, lines continued by a backslash. Other surfaces are noted; all else
-/// is passed over.
+/// Wavefront OBJ: `v` and `f`, with backslashes at line ends. Notes other surfaces, skips all else.
 PolygonMesh read_obj(const SourceFile& file) {
   if (file.bytes.find('\0') != std::string::npos)
     fail(file, "holds binary data, so it is not an OBJ file. Give it the ending of its format");

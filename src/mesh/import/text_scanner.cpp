@@ -83,8 +83,7 @@ std::optional<double> parse_real(std::string_view word) {
   if (end != last) return std::nullopt;
   if (error == std::errc()) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // from_chars does not say whether a number is too large or too small. The exponent does, for the
-  // mantissas that people write.
+  // from_chars does not tell too large from too small. The exponent does, for usual mantissas.
   const std::size_t exponent = digits.find_first_of("eE");
   const bool tiny = exponent != std::string_view::npos && digits.substr(exponent + 1, 1) == "-";
   if (tiny) return 0.0;

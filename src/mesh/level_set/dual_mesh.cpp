@@ -160,8 +160,8 @@ Vector3d vertex_of(const CellField& field, const SurfaceCell& cell, int loop) {
 }
 
 /// The vertices of all cells' loops, [u]: each within its cell, off its walls, where the surface's
-/// tangent planes at the loop's edges meet, or on the surface where these are about one plane. Sets
-/// SurfaceCell::first_vertex.
+/// tangent planes at the loop's edges meet, or on the surface if these are nearly one plane. Sets
+/// first_vertex.
 std::vector<Vector3d> place_vertices(const Solid& solid, const CellGrid& grid,
                                      std::vector<SurfaceCell>& cells) {
   std::uint32_t count = 0;

@@ -46,8 +46,8 @@ Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallbac
 ClosedMesh level_set_surface(const DistanceGrid& distances, const std::string& name);
 
 /// The mesh of a solid from the cells that its surface crosses, all of them listed by Morton code
-/// with their loops, and its error. Tells `stage` of the second 60 % of the work. Throws Error as
-/// polygonise() does.
+/// with their loops, and its error. Reports the second 60 % of the work. Throws Error as
+/// polygonise().
 Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
                       Stage& stage);
 

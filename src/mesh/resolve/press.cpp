@@ -20,8 +20,7 @@ namespace {
 using Point = Eigen::Vector3d;
 using Polygon = std::vector<Point>;  ///< convex
 
-/// In units of the near distance: a face that touches another, and the part that does, is at least
-/// this large.
+/// In near distances: least size of a face that touches another, and of the part that does.
 constexpr double kNarrowest = 16;
 
 class Faces {
@@ -112,8 +111,7 @@ Point displacement_along(const std::vector<Point>& normals) {
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// [vertex] those of faces that touch others, where some of the faces that hang together do so
-/// inexactly.
+/// [vertex] those of touching faces, where some of the connected faces touch inexactly.
 std::vector<bool> touching_vertices(const TriangleMesh& mesh, const Faces& faces,
                                     const Pairs& touching) {
   DisjointSets together(mesh.vertices.size());

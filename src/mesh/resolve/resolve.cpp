@@ -33,8 +33,7 @@ class Rays {
   Rays(const std::vector<Triangle>& triangles, const Arrangement& arrangement)
       : triangles_(triangles), arrangement_(arrangement), points_(arrangement.points) {}
 
-  /// The winding number in front of a piece, by a line along an axis through a point of it that
-  /// meets no edge.
+  /// The winding number in front of a piece, by an axis-parallel line that meets no edge.
   int in_front(std::uint32_t piece) {
     const Triangle& corners = arrangement_.pieces[piece];
     const Eigen::Vector3d a = points_.rounded(corners[0]);

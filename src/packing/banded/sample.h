@@ -8,8 +8,7 @@
 #include "base/vec3.h"
 
 // Samples of the surroundings of a point. Written for a team (base/team.h) whose lanes share a
-// SampleMemory. Every result is a function of the *set* of features, in whatever order a team finds
-// them.
+// SampleMemory. Every result is a function of the *set* of features, not of their order.
 
 namespace ist::packing {
 

@@ -20,8 +20,7 @@ class PowerOctree {
   explicit PowerOctree(const ColumnLattice& solid);
   const PowerGrid& grid() const { return grid_; }
 
-  /// The sums of every site's power cell within the solid. Integers: the same bits for any number
-  /// of threads.
+  /// The sums of every site's power cell within the solid. Integers: deterministic.
   std::vector<PowerSums> cell_sums(std::span<const PowerSite> sites) const;
 
  private:

@@ -110,8 +110,7 @@ void HostGrid::update(const std::vector<Sphere>& spheres, std::size_t first_new)
   measure_distances();
 }
 
-/// How many triangles meet each cell, and what they add to the winding number along its row's
-/// centre line.
+/// Triangles that meet each cell, and their terms of the winding number along its row's centre.
 void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
                                std::vector<std::int32_t>& crossings) const {
   const GridScene mesh = scene({});

@@ -8,8 +8,7 @@
 
 namespace ist::packing {
 
-/// The work of a grid packing's rounds on the threads of the current arena (grid_rounds.h says what
-/// the calls do).
+/// The rounds of a grid packing on the threads of the current arena (ascent.h says which).
 class HostRounds {
  public:
   /// Keeps `mesh`.

@@ -8,8 +8,7 @@
 
 namespace ist::packing {
 
-/// The grids of prototypes and distances of a medial axis. Automatic: as fine as takes milliseconds
-/// on a GPU.
+/// Grids of prototypes and distances of a medial axis. Automatic: for milliseconds on a GPU.
 struct MedialGrids {
   GridLayout prototypes, distances;
 };
@@ -19,7 +18,7 @@ MedialGrids medial_grids(const MeshSolid& mesh, unsigned resolution);
 std::vector<MedialNode> medial_nodes_of(std::vector<GridCandidate> converged,
                                         const UnitFrame& frame);
 
-/// medial_nodes() with the rounds of a host or a device (grid_rounds.h).
+/// medial_nodes() with the rounds of a host or a device (ascent.h).
 template <class Rounds>
 std::vector<MedialNode> medial_nodes_by(Rounds&& rounds, const MeshSolid& mesh,
                                         const MedialSettings& settings) {

@@ -18,7 +18,7 @@ constexpr float kSmallestGridRadius = 0x1p-21f;
 constexpr int kIdleRounds = 3;  ///< without a sphere at the finest grids: nothing fits any more
 
 /// The paper's algorithm (§3, §4; docs/design.md 4.1), the same for all four schedules, on the host
-/// or a device: `Rounds` as grid_rounds.h says.
+/// or a device: `Rounds` as ascent.h says.
 template <class Rounds>
 class GridPacker {
  public:
@@ -135,8 +135,7 @@ class GridPacker {
 /// The data from which grid sizes are derived; `memory` [bytes] for the grids.
 GridFigures grid_figures(const MeshSolid& solid, std::size_t memory);
 
-/// Packs a mesh on the paper's grids (settings.grid, not banded) by the rounds of a host or a
-/// device (grid_rounds.h).
+/// Packs a mesh on the paper's grids (settings.grid, not banded) by a host's or a device's rounds.
 template <class Rounds>
 SpherePacking pack_grids_by(Rounds&& rounds, const MeshSolid& solid,
                             const PackingSettings& settings, std::size_t memory, Stage& stage) {
