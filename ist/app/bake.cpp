@@ -62,7 +62,6 @@ Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, b
       [&](const ProgressCallback& progress) { return bake_as_asked(mesh, settings, progress); });
 }
 
-/// The folder, made if it is not there. Throws Error.
 void require_folder(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))

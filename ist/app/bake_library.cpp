@@ -90,7 +90,6 @@ class LibraryProgress final : public RunObserver {
 
   bool stop() override { return interrupted(); }
 
-  /// wipes the line
   void end() {
     if (line_) fmt::print(stderr, "{}", kWipe);
   }
@@ -196,7 +195,6 @@ std::string cache_folder(const LibraryOptions& options) {
   return from_environment != nullptr ? from_environment : "";
 }
 
-/// Prints the jobs of a dry run.
 void print_jobs(const std::vector<Job>& jobs, bool json) {
   if (json) {
     auto assets = nlohmann::ordered_json::array();

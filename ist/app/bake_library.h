@@ -19,7 +19,6 @@ struct LibraryOptions {
   bool remove_stale = false, list = false, lines = false;
 };
 
-/// Adds --manifest and the options that need it.
 void add_library_options(CLI::App* command, LibraryOptions& options);
 
 struct LibraryRun {

@@ -51,7 +51,6 @@ void print_table(const CheckOptions& options, const std::vector<Invariant>& inva
   fmt::print("{}\n", sound ? "sound: no violations" : "NOT SOUND");
 }
 
-/// The mesh as it was baked.
 ClosedMesh baked_mesh(std::uint32_t flags, const CheckOptions& options) {
   MeshSettings settings = options.placed.settings.mesh;
   settings.repair = (flags & kFlagRepaired) != 0;

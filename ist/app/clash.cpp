@@ -34,7 +34,6 @@ struct ClashOptions {
 
 using Triangle = std::array<Vector3d, 3>;
 
-/// The triangles of a part in its place.
 std::vector<Triangle> triangles_of(const PlacedAsset& solid) {
   const AssetHeader& asset = solid.asset.header();
   const auto& mesh = *at<MeshHeader>(asset, asset.mesh);

@@ -33,7 +33,6 @@ std::size_t terminal_width() {
   return std::clamp<std::size_t>(size.ws_col, kNarrowest, kWidest);
 }
 
-/// Columns of UTF-8 text.
 std::size_t columns(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
@@ -87,7 +86,6 @@ class HelpFormat : public CLI::Formatter {
     return wrapped(Formatter::make_description(app), 0, width_);
   }
 
-  /// Examples and lists stay as they are.
   std::string make_footer(const CLI::App* app) const override {
     std::istringstream lines(Formatter::make_footer(app));
     std::string out;

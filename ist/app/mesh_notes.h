@@ -30,7 +30,6 @@ class LinkMeshes {
                                   const std::function<TriangleMesh()>& make,
                                   const Otherwise& otherwise = {});
 
-  /// Whether one of these links is to be repaired.
   bool repairs(const std::vector<std::string>& links) const;
 
   /// A finding about a link, which finish() says.
@@ -39,7 +38,6 @@ class LinkMeshes {
   /// Says what was found since it was last called. Throws Error if any link failed.
   void finish();
 
-  /// All that finish() said.
   const std::vector<std::string>& said() const { return said_; }
 
  private:

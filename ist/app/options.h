@@ -21,7 +21,6 @@
 
 namespace ist::app {
 
-/// Settings as options, and the names of those that were given.
 struct SettingOptions {
   BakeSettings settings;
   std::set<std::string> given;
@@ -34,7 +33,6 @@ void add_setting_options(CLI::App* command, SettingOptions& options,
 /// To be called once all are parsed. Throws (exit code 2) if they do not go together.
 void complete_settings(SettingOptions& options);
 
-/// Adds --package, --visual, --skip and --repair-link.
 void add_robot_options(CLI::App* command, RobotOptions& options);
 
 /// Throws (exit code 2) where options of a robot are given with what is none.
@@ -69,7 +67,6 @@ void require_output(const std::string& path, const std::string& input, const std
 /// The whole file, or not at all; "-" is standard output. Throws Error.
 void write_text(const std::string& path, std::string_view text);
 
-/// Adds --device: auto, cpu or cuda.
 void add_device_option(CLI::App* command, std::string& name, const std::string& help);
 
 /// The device of that name. Throws Error if it is a GPU and there is none to be used.
@@ -109,7 +106,6 @@ CLI::Option* add_whole(CLI::App* command, const std::string& name, T& value,
 CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
                         const Range& range, const std::string& help, bool is_share = false);
 
-/// Bytes: 4096, 512M, 10G.
 CLI::Option* add_bytes(CLI::App* command, const std::string& name,
                        std::optional<std::uint64_t>& value, const std::string& help);
 

@@ -20,7 +20,6 @@ class ProgressLine {
   /// `rounds`: see WholeProgress.
   explicit ProgressLine(bool quiet, bool rounds = false)
       : active_(!quiet && isatty(STDERR_FILENO) == 1), whole_(rounds) {}
-  /// wipes the line
   ~ProgressLine() {
     if (active_) fmt::print(stderr, "{}", kWipe);
   }

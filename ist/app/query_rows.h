@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-// The rows of `ist query`: poses that are read, and answers that are written.
-
 namespace ist::app {
 
 /// One question to ask: x_A = R (scale_b · x_B) + t.
@@ -58,7 +56,6 @@ struct Answer {
 std::string answers_csv(std::span<const Answer> answers);
 std::string answers_json(std::span<const Answer> answers);
 
-/// One answer for a person.
 std::string answer_text(const Answer& answer, const PenetrationSettings& settings);
 
 }  // namespace ist::app

@@ -108,14 +108,12 @@ struct LinkRoom {
   std::vector<Near> near = {};
 };
 
-/// The state of a link.
 struct Refined {
   const ClosedMesh* mesh;  ///< null: its spheres stay as they are
   std::size_t own;         ///< spheres that cover the mesh
   double first;            ///< [u] protrusion before
 };
 
-/// Two links, by index.
 using Two = std::pair<std::size_t, std::size_t>;
 
 /// By link; of those that stay as they are none is near. `narrow`: pairs that need a margin.

@@ -69,7 +69,6 @@ std::string stl(const TriangleMesh& mesh) {
 
 using Writer = std::string (*)(const TriangleMesh&);
 
-/// Null for another ending.
 Writer writer_of(const std::string& path) {
   constexpr std::pair<std::string_view, Writer> kWriters[] = {
       {".obj", obj}, {".off", off}, {".ply", ply}, {".stl", stl}};

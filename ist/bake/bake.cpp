@@ -95,7 +95,6 @@ class HostStages {
   HostStages(const HostStages&) = delete;
   HostStages& operator=(const HostStages&) = delete;
 
-  /// Work that waits for nothing.
   void add(std::function<void()> work) {
     if (at_once_)
       group_.run(std::move(work));

@@ -76,13 +76,11 @@ class Watch {
   bool cancelled_ = false, late_ = false;
 };
 
-/// A trial of a partner other than the copy.
 struct OtherTrial {
   TrialPartner partner;
   PartnerTrial trial;
 };
 
-/// An asset and how it answers.
 struct Candidate {
   Asset asset;
   std::vector<double> errors = {};        ///< relative, of the volumes at the first poses of copies
@@ -177,7 +175,6 @@ class TargetBake {
                               [&](double part) { return go_on(stage, part); });
   }
 
-  /// Trials of partners other than the copy.
   void find_other_trials() {
     Stage stage("predict", watch_.strict());
     const PartnerTrials trials(solid_, own_mesh());

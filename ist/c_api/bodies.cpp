@@ -6,8 +6,6 @@
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"
 
-// Rigid bodies: mass, bounds, wrenches.
-
 namespace ist::c_api {
 namespace {
 

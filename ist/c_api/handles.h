@@ -6,15 +6,12 @@
 #include <cstdint>
 #include <cstring>
 
-// The contents of the caller's handles.
-
 namespace ist::c_api {
 
 /// Memory of a C caller's; null is the heap.
 struct Allocator {
   MemoryHooks hooks;
 
-  /// Checks what the caller gave.
   static ist_status_t from(const ist_allocator_t* given, Allocator& out) noexcept;
 };
 
@@ -43,7 +40,6 @@ struct AssetHandle {
 };
 static_assert(sizeof(AssetHandle) <= sizeof(ist_asset_t) && sizeof(AssetView) == sizeof(void*));
 
-/// A workspace's handle.
 struct WorkspaceHandle {
   std::uint64_t mark;
   Workspace workspace;
@@ -66,7 +62,6 @@ inline const Deadline& deadline_in(const ist_deadline_t& deadline) noexcept {
   return *reinterpret_cast<const Deadline*>(&deadline);
 }
 
-/// The checked view behind a handle.
 inline ist_status_t view_of(const ist_asset_t* tree, AssetView& view) noexcept {
   if (tree == nullptr) return IST_NULL_POINTER;
   const AssetHandle& handle = AssetHandle::in(*tree);

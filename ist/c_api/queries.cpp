@@ -10,7 +10,6 @@ namespace {
 
 using c_api::read;
 
-/// The worse of two.
 ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
   return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
 }
@@ -68,7 +67,6 @@ ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_work
   });
 }
 
-/// Empties the outline.
 ist_status_t check_room(ist_outline_t* given) noexcept {
   const ist_status_t status = check_size(given);
   if (status != IST_OK) return status;

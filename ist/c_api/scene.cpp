@@ -7,12 +7,9 @@
 
 #include "c_api/structs.h"
 
-// Scenes in C.
-
 namespace ist::c_api {
 namespace {
 
-/// The object behind a handle.
 struct OwnedScene {
   explicit OwnedScene(const SceneSettings& settings) : scene(settings) {}
 

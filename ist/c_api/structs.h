@@ -146,8 +146,6 @@ static_assert(offsetof(ist_outline_segment_t, from) == offsetof(OutlineSegment, 
 static_assert(offsetof(ist_outline_segment_t, to) == offsetof(OutlineSegment, to));
 static_assert(offsetof(ist_outline_segment_t, patch) == offsetof(OutlineSegment, patch));
 
-// Shared by all queries of the C functions.
-
 /// Reads what every query has, then runs `ask(a, b, workspace)`, which returns its status. `Solid`:
 /// PlacedSolid, or PlacedAsset where only assets have an answer.
 template <class Solid, class Ask>

@@ -139,11 +139,7 @@ struct Placed {
 };
 using PlacedParts = std::deque<Placed>;
 
-PenetrationSettings exactly() {
-  PenetrationSettings exact;
-  exact.measure = Measure::exact;
-  return exact;
-}
+constexpr PenetrationSettings kExactly = {.measure = Measure::exact};
 
 /// Pairs whose boxes meet, sorted.
 std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& parts,
@@ -151,12 +147,11 @@ std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& p
   double margin = 0;
   for (const Placed& part : parts) margin = std::max(margin, part.margin);
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  SceneSettings settings;
-  settings.max_bodies = std::max<std::size_t>(parts.size(), 1);
-  settings.workspace_capacity = 1;
+  SceneSettings settings = {.max_bodies = std::max<std::size_t>(parts.size(), 1),
+                            .workspace_capacity = 1};
   for (bool complete = false; !complete; settings.max_pairs *= 8) {
     Scene scene(settings);
-    scene.set_rule(0, 0, {SceneAnswer::boxes, exactly(), 2 * margin});
+    scene.set_rule(0, 0, {SceneAnswer::boxes, kExactly, 2 * margin});
     for (std::uint32_t i = 0; i < parts.size(); ++i)
       scene.add({.number = i, .solid = parts[i].part.solid});
     const SceneStep step = scene.step();
@@ -173,7 +168,6 @@ Vector3d unit(const Vector3d& v) {
   return length > 0 ? Vector3d(v / length) : Vector3d::Zero();
 }
 
-/// Sums over patches.
 struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
@@ -227,7 +221,7 @@ class PairQuery {
   /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
   Sums patches(const PlacedAsset& solid_b, Penetration& found, double* depth = nullptr) {
     const ContactPatches all =
-        contact_patches(a_.part.solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
+        contact_patches(a_.part.solid, solid_b, kExactly, scratch_.workspace, scratch_.patches);
     found = all.penetration;
     std::map<std::uint64_t, Sums> parts;
     Sums whole;
@@ -249,7 +243,7 @@ class PairQuery {
 
   /// The overlap once B has moved.
   Penetration aside(const Vector3d& by) {
-    return penetration(a_.part.solid, moved(by), exactly(), scratch_.workspace);
+    return penetration(a_.part.solid, moved(by), kExactly, scratch_.workspace);
   }
 
   bool may_be_flush() const {
@@ -291,12 +285,9 @@ class PairQuery {
   }
 
   Separation distance(double limit) {
-    SeparationSettings settings;
-    settings.max_distance = limit;
-    return separation(a_.part.solid, b_.part.solid, settings, scratch_.workspace);
+    return separation(a_.part.solid, b_.part.solid, {.max_distance = limit}, scratch_.workspace);
   }
 
-  /// The solids touch exactly.
   bool touches(const Penetration& found, Clash& out) {
     out.kind = ClashKind::touching;
     out.direction = found.contact_normal;

@@ -66,7 +66,6 @@ class AssetCache {
   std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last looked after
 };
 
-/// The size of a cache.
 struct CacheUse {
   std::uint64_t entries = 0, bytes = 0;
   std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files that a killed program left

@@ -17,7 +17,6 @@ struct Demands {
   double confidence = 0;  ///< at least; of a mesh that had to be closed
 };
 
-/// One asset to bake.
 struct Job {
   std::string name;                           ///< of the asset: NAME.ist
   std::string mesh;                           ///< path
@@ -35,7 +34,6 @@ enum class JobStatus {
 };
 const char* name_of(JobStatus status) noexcept;
 
-/// The result of a job.
 struct JobResult {
   std::string name, mesh;
   JobStatus status = JobStatus::not_baked;

@@ -25,7 +25,6 @@ std::optional<std::uint64_t> number_in(const fs::path& path) {
   return file >> value ? std::optional(value) : std::nullopt;  // "max" is none
 }
 
-/// MemAvailable of the machine.
 std::uint64_t machine_memory() {
   std::ifstream file("/proc/meminfo");
   std::string name;

@@ -41,11 +41,9 @@ std::string LinkSolids::add(const ClosedMesh* mesh, std::span<const CoverSphere>
 
 bool LinkSolids::overlap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const {
   if (!assets_[a] || !assets_[b]) return true;
-  PenetrationSettings exact;
-  exact.measure = Measure::exact;
   const Penetration found = penetration(PlacedSolid(assets_[a]->view(), Pose{}),
-                                        PlacedSolid(assets_[b]->view(), to_pose(b_in_a)), exact,
-                                        workspaces_->each.local());
+                                        PlacedSolid(assets_[b]->view(), to_pose(b_in_a)),
+                                        {.measure = Measure::exact}, workspaces_->each.local());
   return found.status != QueryStatus::ok || found.volume_min > 0;
 }
 

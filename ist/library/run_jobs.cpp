@@ -199,7 +199,6 @@ class Run {
 
   std::size_t at_once() const { return at_once_; }
 
-  /// The loop of each thread.
   void work() {
     while (const std::optional<std::size_t> job = queue_.take()) {
       JobResult result = result_of(*job);

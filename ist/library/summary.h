@@ -30,7 +30,6 @@ struct Summary {
   bool complete() const;  ///< every asset was baked or cached
 };
 
-/// The hash of all names and settings.
 std::uint64_t hash_of_library(const std::vector<Job>& jobs);
 
 /// An entry of `assets` of the next.

@@ -26,7 +26,6 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-/// Boxes of several bodies, side by side.
 struct BodyBlock {
   static constexpr std::size_t kCount = 8;
 

@@ -308,9 +308,7 @@ struct Scene::Impl {
     }
     two.meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
     if (rule.margin > 0 && (std::isnan(p.volume) || p.volume == 0)) {
-      SeparationSettings limits;
-      limits.max_distance = rule.margin;
-      s = ist::separation(solid_a, solid_b, limits, workspace);
+      s = ist::separation(solid_a, solid_b, {.max_distance = rule.margin}, workspace);
       two.meet = two.meet || s.status != QueryStatus::ok || s.distance_min < rule.margin;
     }
   }

@@ -99,7 +99,6 @@ constexpr double kKept = 1e-4;
 RepairQuality judge(const TriangleMesh& soup, const ClosedMesh& made, const TwoMeshes& both,
                     double kept);
 
-/// The same in a sentence.
 std::string describe(const RepairQuality& judged);
 
 }  // namespace ist

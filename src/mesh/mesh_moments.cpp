@@ -263,7 +263,6 @@ Sum<N> over_triangles(const MeshView& mesh, const Vector3d& apex, const Visit& v
   return all;
 }
 
-/// Volume and first moments.
 Sum<4> first_moments(const MeshView& mesh) {
   return over_triangles<4>(mesh, Vector3d::Zero(), [](const Tetrahedron& t, double& magnitude) {
     magnitude += t.magnitude;

@@ -45,7 +45,6 @@ struct MeshArrays {
   std::vector<std::vector<BoxSums>> sums;    ///< of each level of boxes
 };
 
-/// The parts of an asset.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
   std::vector<Sphere> inner_spheres;

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 #include "bake/check/checked_mesh.h"
 #include "base/thread_arena.h"
 #include "mesh/level_set/polygonise.h"
@@ -72,7 +71,6 @@ class SampledMoments {
   std::vector<char> inside_;
 };
 
-/// Volume, first and second moments by sampling.
 std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& solid) {
   const SampledMoments points(solid);
   const char* const kAbove =
@@ -106,7 +104,6 @@ std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& sol
                  std::string("difference of a first (0) or second (1) moment of points") + kAbove)};
 }
 
-/// The header's frame is the mesh's.
 Invariant check_frame(const AssetHeader& asset, const UnitFrame& frame) {
   Tally same;
   same.add(std::abs(asset.exponent - frame.exponent), 0);
@@ -240,15 +237,13 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
 }  // namespace
 
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads) {
-  tbb::task_arena arena = thread_arena(threads);
-  return arena.execute([&] { return check_mesh(asset.view().header(), mesh); });
+  return thread_arena(threads).execute([&] { return check_mesh(asset.view().header(), mesh); });
 }
 
 std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads) {
   if (solid.mesh() != nullptr)
     throw Error("solid: this solid is a mesh; check the asset against its ClosedMesh");
-  tbb::task_arena arena = thread_arena(threads);
-  return arena.execute([&] { return check_solid(asset.view().header(), solid); });
+  return thread_arena(threads).execute([&] { return check_solid(asset.view().header(), solid); });
 }
 
 }  // namespace ist

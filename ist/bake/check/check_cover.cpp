@@ -2,7 +2,6 @@
 #include <numeric>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 
 namespace ist {
 namespace {

@@ -22,7 +22,6 @@ inline double square_of(double x) { return x * x; }
 /// A little more than the radius: errs on the side of meeting, by more than rounding.
 inline double enlarged(double radius) { return radius * (1 + 1e-9) + 1e-12; }
 
-/// Balls that may cover a point together.
 struct CoveringBalls {
   std::vector<double> x, y, z;
   std::vector<double> reach2;   ///< a little more than the radius, squared
@@ -185,7 +184,6 @@ class OverlapBounds {
   OverlapBounds(std::span<const Ball> spheres, const std::vector<std::vector<Ball>>& balls)
       : spheres_(spheres), balls_(balls) {}
 
-  /// Scratch memory of a thread.
   struct Scratch {
     std::vector<std::size_t> larger;
     CoveringBalls others;

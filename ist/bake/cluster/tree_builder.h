@@ -30,7 +30,8 @@ TreeArrays tree_from_order(std::span<const Sphere> spheres, std::span<const floa
 /// The order in which spheres lie in a tree: every 16^(k+1) consecutive ones from the start are a
 /// node of level k. Neural gas forms groups of 16, then groups of their balls, and so on up. With
 /// `swaps`, near groups of a level then trade members. Deterministic.
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps,
+                                      bool last_stays = false);
 
 /// An order for spheres that lie much as others do, one for one, from tree_order() of those: its
 /// groups of 16 trade members, and groups of their balls are formed anew. Sooner than an order of

@@ -271,6 +271,12 @@ class EvenShares {
   std::vector<Entry> pool_;
 };
 
+/// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
+/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
+/// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
+/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
+/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
+/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres and stays last.
 class NeuralGas {
  public:
   NeuralGas(std::span<const Ball> balls, bool last_stays) : balls_(balls), last_stays_(last_stays) {
@@ -350,22 +356,6 @@ class NeuralGas {
   std::vector<std::uint32_t> order_;
 };
 
-/// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
-/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
-/// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
-/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
-/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
-/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres and stays last.
-std::vector<std::uint32_t> neural_gas_order(std::span<const Ball> balls, bool last_stays) {
-  return NeuralGas(balls, last_stays).take();
-}
-
-std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays, bool swaps) {
-  std::vector<std::uint32_t> order = neural_gas_order(balls, last_stays);
-  if (swaps) improve_groups(balls, last_stays, order);
-  return order;
-}
-
 /// Balls around each 16 consecutive entries of `order`.
 std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::uint32_t> order) {
   std::vector<Ball> groups((order.size() + kWidth - 1) / kWidth);
@@ -378,8 +368,6 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
   return groups;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps);
-
 /// Orders the groups of 16 that follow one another in `order`: groups of their balls, and so on.
 std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
@@ -387,7 +375,7 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that contains one that is not.
   const std::vector<std::uint32_t> groups =
-      order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
+      tree_order(group_balls(balls, order), swaps, last_stays || order.size() % kWidth != 0);
   std::vector<std::uint32_t> sorted;
   sorted.reserve(order.size());
   for (const std::uint32_t g : groups)
@@ -397,14 +385,12 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
   return sorted;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps) {
-  return order_groups(balls, group_order(balls, last_stays, swaps), last_stays, swaps);
-}
-
 }  // namespace
 
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps) {
-  return order_of(spheres, false, swaps);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps, bool last_stays) {
+  std::vector<std::uint32_t> order = NeuralGas(spheres, last_stays).take();
+  if (swaps) improve_groups(spheres, last_stays, order);
+  return order_groups(spheres, std::move(order), last_stays, swaps);
 }
 
 std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,

@@ -77,7 +77,6 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
 /// and looking at all of them for each patch would take the square of their number.
 constexpr std::size_t kLargestStar = 1024;
 
-/// Grows patches one after the other.
 class Growth {
  public:
   explicit Growth(const FloatMesh& mesh)

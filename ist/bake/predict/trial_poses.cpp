@@ -103,10 +103,8 @@ class Trials {
  private:
   /// NaN where it is not known.
   double shared_volume(const Pose& b_in_a, double scale_b) {
-    PenetrationSettings exact;
-    exact.measure = Measure::exact;
-    const Penetration found =
-        penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b}, exact, workspace_);
+    const Penetration found = penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b},
+                                          {.measure = Measure::exact}, workspace_);
     return found.status == QueryStatus::ok ? found.volume
                                            : std::numeric_limits<double>::quiet_NaN();
   }

@@ -29,7 +29,6 @@ struct BakeSettings {
   bool mesh_only = false;                              ///< bake_mesh_only()
 };
 
-/// The form in which a setting is written.
 enum class SettingKind {
   whole,    ///< 4000
   real,     ///< 0.5
@@ -58,7 +57,6 @@ std::span<const Setting> placing_settings();   ///< scale, up-axis and world-up 
 std::span<const Setting> checking_settings();  ///< wrap and those
 std::span<const Setting> closing_settings();   ///< repair and wrap alone
 
-/// A setting's name and its fault.
 struct SettingFault {
   std::string name;
   std::string what;

@@ -64,7 +64,6 @@ struct SignedVolume {
   bool is_flat() const;
 };
 
-/// The result of orient_shells().
 struct Nesting {
   std::size_t flipped = 0;        ///< shells turned
   std::size_t cavities = 0;       ///< inward shells within solid

@@ -53,7 +53,6 @@ void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& tr
   triangles.erase(kept, triangles.end());
 }
 
-/// Triangles with the same corners.
 struct Stack {
   std::vector<std::uint32_t> members;
   int sum = 0;  ///< of the members' directions, relative to the first

@@ -28,7 +28,6 @@ class ColladaDocument {
   std::uint64_t whole(Index element, std::string_view attribute,
                       std::optional<std::uint64_t> fallback = std::nullopt) const;
 
-  /// The numbers of an element's text.
   std::vector<double> reals(Index element) const;
   std::vector<double> reals(Index element, std::size_t count) const;
   std::vector<std::uint64_t> wholes(Index element) const;

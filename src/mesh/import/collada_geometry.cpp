@@ -15,7 +15,6 @@ namespace {
 using Index = ColladaDocument::Index;
 constexpr std::uint64_t kWidest = 255;  // inputs of a corner
 
-/// Reads one <geometry>.
 class GeometryReader {
  public:
   GeometryReader(const ColladaDocument& document, std::size_t& numbers_read)
@@ -40,7 +39,6 @@ class GeometryReader {
   }
 
  private:
-  /// Positions of a <vertices>.
   std::vector<Eigen::Vector3d> positions(Index vertices) {
     Index input = xml_[vertices].first_child;
     while (input != kNoElement && xml_.attribute(input, "semantic") != "POSITION")

@@ -12,7 +12,6 @@ namespace {
 
 using openvdb::FloatGrid;
 
-/// The file's one grid. Throws Error.
 openvdb::GridBase::Ptr only_grid(const std::string& path) {
   openvdb::io::File file(path);
   file.open(/*delayLoad=*/false);

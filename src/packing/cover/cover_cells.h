@@ -59,7 +59,6 @@ struct CoverDemand {
   IST_HD bool asks() const { return ball != 0xFFFFFFFFu; }
 };
 
-/// The outcome for a cell.
 struct CoverVerdict {
   bool divide = false;  ///< it has to be divided; `count` balls were kept
   std::uint32_t count = 0;
