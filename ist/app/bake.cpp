@@ -1,16 +1,12 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
 #include <system_error>
-#include <vector>
 
 #include "app/bake_library.h"
 #include "app/commands.h"

@@ -1,21 +1,16 @@
 #include "app/bake_library.h"
 
 #include <fmt/format.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <set>
-#include <string_view>
 #include <system_error>
 #include <utility>
 

@@ -2,10 +2,7 @@
 
 #include <ist/asset.h>
 #include <CLI/CLI.hpp>
-#include <cstdint>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "library/summary.h"
 

@@ -4,8 +4,6 @@
 #include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
 
 #include "app/commands.h"
 #include "app/options.h"

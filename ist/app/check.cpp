@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/types.h>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>

@@ -3,13 +3,9 @@
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <ctime>
-#include <memory>
-#include <vector>
 
 #include "app/commands.h"
 #include "app/glb_scene.h"

@@ -3,13 +3,8 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <ist/query.h>
-#include <ist/types.h>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
-#include <memory>
-#include <string>
 
 #include "app/commands.h"
 #include "app/glb_scene.h"

@@ -11,9 +11,7 @@
 #include <cstdlib>
 #include <exception>
 #include <memory>
-#include <span>
 #include <sstream>
-#include <string>
 #include <system_error>
 
 #include "app/commands.h"

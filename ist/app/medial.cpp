@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <ist/bake.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <chrono>
 #include <memory>

@@ -1,12 +1,8 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "library/input_mesh.h"
 #include "library/settings/bake_settings.h"

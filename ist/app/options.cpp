@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <ist/gpu.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <cerrno>

@@ -3,13 +3,6 @@
 #include <ist/bake.h>
 #include <ist/mesh.h>
 #include <CLI/CLI.hpp>
-#include <functional>
-#include <limits>
-#include <optional>
-#include <set>
-#include <span>
-#include <string>
-#include <string_view>
 
 #include "library/robot_assets.h"
 #include "library/settings/bake_settings.h"

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <fmt/format.h>
-#include <ist/types.h>
 #include <unistd.h>
 #include <cstdio>
-#include <string>
 #include <string_view>
 
 #include "app/interrupt.h"

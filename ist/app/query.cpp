@@ -2,11 +2,9 @@
 #include <ist/bake.h>
 #include <ist/mass_properties.h>
 #include <ist/shapes.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <algorithm>
 #include <chrono>
-#include <limits>
 #include <memory>
 
 #include "app/commands.h"

@@ -1,22 +1,18 @@
 #include "app/query_rows.h"
 
 #include <fmt/format.h>
-#include <ist/types.h>
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
 #include <cmath>
-#include <cstddef>
 #include <fstream>
 #include <iostream>
 #include <istream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <sstream>
 #include <system_error>
-#include <utility>
 
 #include "library/csv_reader.h"
 #include "library/settings/numbers.h"

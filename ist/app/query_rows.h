@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/query.h>
-#include <span>
 #include <string>
 #include <vector>
 

@@ -5,11 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 namespace ist::app {
 namespace {

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <memory>
-#include <string>
 
 #include "app/commands.h"
 #include "app/options.h"

@@ -1,10 +1,8 @@
 #include "app/sphere_output.h"
 
 #include <fmt/format.h>
-#include <ist/types.h>
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
 

@@ -1,12 +1,7 @@
 #pragma once
 
 #include <ist/cover_spheres.h>
-#include <ist/types.h>
 #include <algorithm>
-#include <cstddef>
-#include <map>
-#include <string>
-#include <vector>
 
 #include "library/link_solids.h"
 #include "robots/description/self_collision.h"

@@ -1,15 +1,11 @@
 #include <fmt/format.h>
 #include <ist/bake.h>
 #include <ist/cover_spheres.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <limits>
-#include <map>
-#include <memory>
 
 #include "app/commands.h"
 #include "app/interrupt.h"

@@ -4,17 +4,11 @@
 #include <ist/bake.h>
 #include <ist/mass_properties.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "app/bake_library.h"
 #include "app/commands.h"

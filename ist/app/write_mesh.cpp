@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <ist/types.h>
 #include <iterator>
-#include <string_view>
 #include <utility>
 
 #include "app/options.h"

@@ -1,15 +1,8 @@
-#include <ist/types.h>
 #include <tbb/task_group.h>
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <memory>
-#include <optional>
-#include <span>
-#include <utility>
-#include <vector>
 
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"

@@ -1,12 +1,8 @@
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <memory>
 #include <numbers>
-#include <vector>
 
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"

@@ -1,15 +1,9 @@
 #include <ist/shapes.h>
-#include <ist/types.h>
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <iterator>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"

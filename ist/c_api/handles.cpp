@@ -1,9 +1,7 @@
 #include "c_api/handles.h"
 
 #include <ist/asset_layout.h>
-#include <ist/types.h>
 #include <cstdio>
-#include <memory>
 
 #include "c_api/structs.h"
 #include "query/base/hooked_memory.h"

@@ -3,7 +3,6 @@
 #include <ist/c.h>
 #include <ist/deadline.h>
 #include <ist/query.h>
-#include <cstdint>
 #include <cstring>
 
 namespace ist::c_api {

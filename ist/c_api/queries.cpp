@@ -1,6 +1,5 @@
 #include <ist/query.h>
 #include <algorithm>
-#include <span>
 
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"

@@ -1,8 +1,6 @@
 #include <ist/c_scene.h>
 #include <ist/scene.h>
-#include <ist/types.h>
 #include <algorithm>
-#include <cstddef>
 #include <new>
 
 #include "c_api/structs.h"

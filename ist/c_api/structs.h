@@ -6,7 +6,6 @@
 #include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 #include <algorithm>
-#include <cstddef>
 #include <cstring>
 #include <type_traits>
 

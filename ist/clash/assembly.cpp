@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fnmatch.h>
 #include <ist/bake.h>
-#include <ist/types.h>
 #include <algorithm>
 #include <cmath>
 #include <set>

@@ -1,9 +1,6 @@
 #pragma once
 
 #include <ist/asset.h>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "clash/clash.h"
 #include "library/robot_assets.h"

@@ -2,9 +2,6 @@
 #include <minizip/zip.h>
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <string_view>
-#include <utility>
 
 #include "clash/report.h"
 #include "mesh/import/xml_document.h"

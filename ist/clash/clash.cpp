@@ -5,7 +5,6 @@
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
 #include <ist/scene.h>
-#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <algorithm>
 #include <cmath>
@@ -13,9 +12,7 @@
 #include <fstream>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <tuple>
-#include <utility>
 
 #include "base/thread_arena.h"
 #include "mesh/import/source_file.h"

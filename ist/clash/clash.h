@@ -1,10 +1,7 @@
 #pragma once
 
 #include <ist/query.h>
-#include <Eigen/Core>
-#include <cstddef>
 #include <functional>
-#include <span>
 #include <string>
 #include <vector>
 

@@ -2,10 +2,7 @@
 
 #include <nlohmann/json.hpp>
 #include <set>
-#include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "clash/clash.h"
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <ist/pose_eigen.h>
-#include <ist/types.h>
 #include <toml++/toml.h>
 #include <algorithm>
 #include <cmath>

@@ -3,8 +3,6 @@
 #include <ist/mesh.h>
 #include <functional>
 #include <map>
-#include <string>
-#include <vector>
 
 #include "clash/assembly.h"
 

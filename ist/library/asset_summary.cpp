@@ -4,7 +4,6 @@
 #include <ist/asset_layout.h>
 #include <ist/mass_properties.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <ist/asset.h>
-#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
 
 namespace ist {
 

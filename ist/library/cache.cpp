@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/mesh.h>
-#include <ist/types.h>
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 #include <nlohmann/json.hpp>
@@ -12,7 +11,6 @@
 #include <sys/stat.h>
 #include <algorithm>
 #include <fstream>
-#include <span>
 #include <system_error>
 #include <type_traits>
 #include <utility>

@@ -2,12 +2,8 @@
 
 #include <ist/bake.h>
 #include <atomic>
-#include <cstdint>
 #include <filesystem>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "library/job.h"
 

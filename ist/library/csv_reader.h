@@ -2,9 +2,7 @@
 
 #include <ist/types.h>
 #include <algorithm>
-#include <cstddef>
 #include <istream>
-#include <string>
 #include <utility>
 #include <vector>
 

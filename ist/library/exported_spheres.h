@@ -2,8 +2,6 @@
 
 #include <ist/asset.h>
 #include <Eigen/Core>
-#include <span>
-#include <string>
 #include <vector>
 
 namespace ist {

@@ -4,7 +4,6 @@
 #include <fnmatch.h>
 #include <ist/types.h>
 #include <algorithm>
-#include <functional>
 #include <iterator>
 #include <system_error>
 

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <string>
-#include <vector>
 
 #include "library/settings/bake_settings.h"
 

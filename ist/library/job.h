@@ -1,10 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "library/settings/bake_settings.h"
 #include "robots/description/robot_model.h"
 

@@ -7,7 +7,6 @@
 #include <fstream>
 #include <limits>
 #include <numeric>
-#include <string>
 #include <system_error>
 #include <utility>
 

@@ -2,10 +2,7 @@
 
 #include <condition_variable>
 #include <cstddef>
-#include <cstdint>
 #include <mutex>
-#include <optional>
-#include <vector>
 
 #include "library/job.h"
 

@@ -3,7 +3,6 @@
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <algorithm>
 #include <utility>

@@ -4,11 +4,6 @@
 #include <ist/cover_spheres.h>
 #include <ist/query.h>
 #include <Eigen/Geometry>
-#include <cstddef>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 namespace ist {
 

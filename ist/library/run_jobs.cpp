@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/gpu.h>
-#include <ist/types.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <algorithm>
@@ -13,7 +12,6 @@
 #include <fstream>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <string_view>
 #include <system_error>
 #include <thread>
 #include <utility>

@@ -2,15 +2,10 @@
 
 #include <ist/asset.h>
 #include <ist/bake.h>
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "library/cache.h"
 #include "library/job.h"

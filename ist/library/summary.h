@@ -1,9 +1,6 @@
 #pragma once
 
-#include <cstdint>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "library/job.h"
 

@@ -2,10 +2,7 @@
 
 #include <ist/bake.h>
 #include <ist/query.h>
-#include <Eigen/Core>
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <string>
 
 #include "library/settings/bake_settings.h"
 

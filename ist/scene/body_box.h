@@ -2,8 +2,6 @@
 
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
-#include <cstddef>
-#include <cstdint>
 
 #include "query/find_solid_box.h"
 #include "scene/box_tree.h"

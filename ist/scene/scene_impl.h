@@ -2,15 +2,11 @@
 
 #include <ist/scene.h>
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <deque>
-#include <optional>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "query/base/batch.h"
 #include "scene/body_box.h"

@@ -1,5 +1,4 @@
 #include <ist/scene.h>
-#include <ist/types.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -7,7 +6,6 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
-#include <string>
 #include <type_traits>
 
 #include "scene/scene_impl.h"

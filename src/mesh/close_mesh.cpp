@@ -1,14 +1,8 @@
 #include <ist/mesh.h>
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"

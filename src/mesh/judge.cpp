@@ -1,20 +1,10 @@
 #include "mesh/judge.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <iterator>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "mesh/connectivity/usable_mesh.h"
-#include "mesh/connectivity/weld.h"
 #include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"

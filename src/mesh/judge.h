@@ -4,11 +4,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <numeric>
-#include <string>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/weld.h"

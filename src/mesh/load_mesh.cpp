@@ -1,15 +1,12 @@
 #include <ist/mesh.h>
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
 #include <algorithm>
-#include <array>
 #include <assimp/Importer.hpp>
 #include <exception>
 #include <set>
 #include <span>
-#include <string>
 #include <utility>
 
 #include "base/message_text.h"

@@ -1,9 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "mesh/import/source_file.h"
 

@@ -6,10 +6,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <numbers>
 #include <span>
-#include <vector>
 
 #include "mesh/hierarchy/line_lattice.h"
 #include "mesh/hierarchy/winding.h"

@@ -1,7 +1,5 @@
 #include "mesh/mesh_solid.h"
 
-#include <ist/solid.h>
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 #include <algorithm>

@@ -2,12 +2,8 @@
 
 #include <ist/solid.h>
 #include <oneapi/tbb/collaborative_call_once.h>
-#include <Eigen/Core>
-#include <array>
-#include <cstdint>
 #include <limits>
 #include <optional>
-#include <vector>
 
 #include "base/raw_array.h"
 #include "mesh/hierarchy/bvh.h"

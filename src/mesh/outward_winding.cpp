@@ -3,7 +3,6 @@
 #include <ist/solid.h>
 #include <tbb/parallel_for.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>

@@ -1,11 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/geometry/mesh_view.h"

@@ -3,10 +3,7 @@
 #include <ist/types.h>
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <optional>
 #include <span>
-#include <utility>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"

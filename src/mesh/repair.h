@@ -1,9 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 

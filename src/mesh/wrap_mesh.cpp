@@ -1,14 +1,6 @@
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "mesh/connectivity/edge_table.h"

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <ist/asset_layout.h>
-#include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <vector>
 

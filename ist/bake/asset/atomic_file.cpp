@@ -2,14 +2,11 @@
 
 #include <fcntl.h>
 #include <ist/asset.h>
-#include <ist/types.h>
 #include <unistd.h>
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
-#include <string>
 #include <system_error>
-#include <utility>
 
 namespace ist {
 

@@ -1,9 +1,5 @@
 #include "bake/backend/make_backend.h"
 
-#include <ist/bake.h>
-#include <ist/types.h>
-#include <string>
-
 #include "base/thread_arena.h"
 #include "cuda/packing/cuda_backend.h"
 #include "packing/banded/banded_packer.h"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/bake.h>
-#include <memory>
 
 #include "packing/backend/solid_backend.h"
 

@@ -1,11 +1,9 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "bake/check/check_spheres.h"
 #include "bake/check/checked_mesh.h"

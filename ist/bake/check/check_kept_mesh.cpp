@@ -1,8 +1,6 @@
 #include <ist/asset.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "bake/check/check_spheres.h"
 #include "bake/mesh/kept_mesh.h"

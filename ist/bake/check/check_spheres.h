@@ -3,11 +3,8 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <tbb/parallel_for.h>
-#include <cstddef>
 #include <limits>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "bake/check/checked_mesh.h"
 

@@ -2,11 +2,6 @@
 
 #include <ist/mesh.h>
 #include <ist/solid.h>
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
-#include <cstdint>
-#include <vector>
 
 namespace ist {
 

@@ -2,7 +2,6 @@
 
 #include <ist/asset_layout.h>
 #include <array>
-#include <cstddef>
 
 #include "bake/cluster/bounding_ball.h"
 

@@ -1,10 +1,6 @@
 #pragma once
 
 #include <ist/asset_layout.h>
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 
 #include "bake/cluster/ball_lanes.h"
 #include "bake/cluster/bounding_ball.h"

@@ -7,7 +7,6 @@
 #include <numbers>
 #include <utility>
 
-#include "bake/cluster/bounding_ball.h"
 #include "base/plain.h"
 #include "base/roots.h"
 #include "base/rounding.h"

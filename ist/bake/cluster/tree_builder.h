@@ -1,9 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "bake/asset/asset_writer.h"
 #include "bake/cluster/bounding_ball.h"
 

@@ -3,7 +3,6 @@
 #include <ist/asset_layout.h>
 #include <tbb/parallel_for.h>
 #include <algorithm>
-#include <array>
 #include <numeric>
 #include <utility>
 

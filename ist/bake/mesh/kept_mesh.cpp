@@ -1,9 +1,7 @@
 #include "bake/mesh/kept_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "bake/mesh/patches.h"
 #include "base/rounding.h"

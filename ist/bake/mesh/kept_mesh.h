@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/asset.h>
-#include <memory>
 
 #include "bake/asset/asset_writer.h"
 #include "base/aside.h"

@@ -3,7 +3,6 @@
 #include <ist/asset_layout.h>
 #include <tbb/parallel_invoke.h>
 #include <cmath>
-#include <cstddef>
 #include <numeric>
 #include <tuple>
 #include <utility>

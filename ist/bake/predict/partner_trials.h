@@ -2,11 +2,7 @@
 
 #include <ist/asset.h>
 #include <ist/query.h>
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
 #include <functional>
-#include <vector>
 
 #include "mesh/mesh_solid.h"
 

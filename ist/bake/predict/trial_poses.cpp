@@ -1,7 +1,6 @@
 #include "bake/predict/trial_poses.h"
 
 #include <ist/query.h>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <limits>
 

@@ -2,11 +2,6 @@
 
 #include <ist/asset.h>
 #include <ist/asset_layout.h>
-#include <ist/types.h>
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 #include "mesh/mesh_solid.h"
 

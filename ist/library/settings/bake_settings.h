@@ -5,7 +5,6 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <string>
 #include <utility>
 
 // All that may be asked of a bake, by name: the options of the command line and the keys of a

@@ -1,13 +1,9 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <utility>
-#include <vector>
 
 namespace ist {
 

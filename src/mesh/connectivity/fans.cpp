@@ -2,10 +2,6 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cstddef>
-#include <span>
-#include <vector>
 
 #include "mesh/connectivity/fan_slabs.h"
 #include "mesh/connectivity/item_groups.h"

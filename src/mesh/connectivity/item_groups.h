@@ -3,7 +3,6 @@
 #include <tbb/parallel_for.h>
 #include <algorithm>
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <numeric>

@@ -1,15 +1,9 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <mutex>
 #include <numeric>
-#include <utility>
-#include <vector>
 
 #include "base/raw_array.h"
 #include "mesh/connectivity/edge_table.h"

@@ -3,13 +3,10 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <bit>
 #include <limits>
-#include <span>
-#include <utility>
 
 #include "base/hashing.h"
 #include "base/raw_array.h"

@@ -7,7 +7,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <utility>
 
 #include "base/thread_arena.h"
 

@@ -1,11 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <vector>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/edge_table.h"

@@ -4,9 +4,7 @@
 #include <tbb/parallel_reduce.h>
 #include <algorithm>
 #include <cstdlib>
-#include <functional>
 #include <unordered_map>
-#include <utility>
 
 #include "base/thread_arena.h"
 #include "mesh/connectivity/disjoint_sets.h"

@@ -2,12 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/item_groups.h"

@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 
 #include "mesh/connectivity/self_intersections.h"
 #include "mesh/geometry/exact_sign.h"

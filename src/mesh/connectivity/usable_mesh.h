@@ -1,10 +1,7 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Geometry>
 #include <cmath>
-#include <string>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 

@@ -1,10 +1,7 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Core>
 #include <bit>
-#include <cstdint>
-#include <vector>
 
 #include "base/hashing.h"
 

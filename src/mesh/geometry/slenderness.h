@@ -4,7 +4,6 @@
 #include <tbb/parallel_reduce.h>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <utility>
 
 #include "mesh/geometry/exact_triangle.h"

@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <limits>
-#include <span>
 #include <utility>
 #include <vector>
 

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <functional>
 
 #include "base/host_device.h"
 #include "mesh/connectivity/item_groups.h"

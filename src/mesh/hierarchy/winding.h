@@ -1,9 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/mesh_view.h"

@@ -1,6 +1,5 @@
 #include "mesh/hierarchy/winding.h"
 
-#include <cstdint>
 #include <numbers>
 
 #include "base/angle.h"

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
-#include <string_view>
 #include <unordered_map>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/xml_document.h"

@@ -1,11 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/collada_document.h"
 

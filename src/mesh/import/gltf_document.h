@@ -1,12 +1,9 @@
 #pragma once
 
-#include <cstddef>
 #include <deque>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "mesh/import/source_file.h"

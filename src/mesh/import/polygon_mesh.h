@@ -1,14 +1,7 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <map>
-#include <string>
-#include <vector>
 
 #include "mesh/import/source_file.h"
 

@@ -2,12 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/collada_document.h"
 #include "mesh/import/text_scanner.h"

@@ -1,14 +1,7 @@
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <map>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "mesh/import/gltf_document.h"

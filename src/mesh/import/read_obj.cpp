@@ -1,6 +1,4 @@
 #include <set>
-#include <string>
-#include <string_view>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"

@@ -1,5 +1,3 @@
-#include <string>
-#include <string_view>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"

@@ -1,15 +1,10 @@
 #include <tbb/parallel_for.h>
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"

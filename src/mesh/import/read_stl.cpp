@@ -2,8 +2,6 @@
 #include <bit>
 #include <cctype>
 #include <cstring>
-#include <string>
-#include <string_view>
 
 #include "base/message_text.h"
 #include "mesh/import/polygon_mesh.h"

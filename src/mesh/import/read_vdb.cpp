@@ -1,5 +1,4 @@
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>

@@ -1,5 +1,3 @@
-#include <Eigen/Geometry>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 

@@ -1,11 +1,8 @@
 #include "mesh/level_set/polygonise.h"
 
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "base/message_text.h"
 

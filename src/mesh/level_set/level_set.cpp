@@ -1,5 +1,4 @@
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>

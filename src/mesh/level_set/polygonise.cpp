@@ -1,11 +1,6 @@
 #include "mesh/level_set/polygonise.h"
 
 #include <algorithm>
-#include <string>
-#include <utility>
-
-#include "base/stage.h"
-#include "mesh/level_set/surface_cells.h"
 
 namespace ist {
 

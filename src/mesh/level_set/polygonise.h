@@ -2,9 +2,6 @@
 
 #include <ist/mesh.h>
 #include <ist/solid.h>
-#include <ist/types.h>
-#include <string>
-#include <vector>
 
 #include "base/stage.h"
 #include "mesh/level_set/surface_cells.h"

@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/exact_triangle.h"

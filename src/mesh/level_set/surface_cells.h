@@ -1,11 +1,6 @@
 #pragma once
 
 #include <ist/solid.h>
-#include <Eigen/Core>
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 namespace ist {
 

@@ -3,11 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/surface_reduction.h"
-#include "mesh/resolve/exact_points.h"
 #include "mesh/resolve/planar_triangulation.h"
 
 namespace ist {

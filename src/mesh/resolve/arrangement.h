@@ -2,12 +2,8 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <array>
 #include <atomic>
 #include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "base/aside.h"
 #include "mesh/connectivity/edge_table.h"

@@ -1,12 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <boost/multiprecision/cpp_int.hpp>
-#include <cstdint>
 #include <string>
 #include <unordered_map>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 

@@ -4,8 +4,6 @@
 #include <cmath>
 #include <deque>
 
-#include "mesh/resolve/exact_points.h"
-
 namespace ist {
 namespace {
 

@@ -1,9 +1,7 @@
 #include "mesh/resolve/press.h"
 
 #include <tbb/parallel_for.h>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "mesh/connectivity/disjoint_sets.h"

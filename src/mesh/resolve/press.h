@@ -1,8 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <Eigen/Core>
-#include <vector>
 
 namespace ist {
 

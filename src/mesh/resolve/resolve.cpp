@@ -1,14 +1,9 @@
 #include "mesh/resolve/resolve.h"
 
 #include <tbb/task_arena.h>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <mutex>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "base/stage.h"

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <ist/types.h>
-#include <string>
 
 namespace ist {
 

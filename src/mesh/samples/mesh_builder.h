@@ -2,9 +2,7 @@
 
 #include <ist/mesh.h>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
-#include <vector>
 
 namespace ist {
 

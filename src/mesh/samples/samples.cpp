@@ -2,7 +2,6 @@
 
 #include <ist/types.h>
 #include <array>
-#include <string>
 
 #include "mesh/samples/shapes.h"
 

@@ -3,8 +3,6 @@
 #include <ist/bake.h>
 #include <functional>
 #include <memory>
-#include <span>
-#include <vector>
 
 #include "packing/backend/tasks.h"
 

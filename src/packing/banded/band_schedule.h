@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ist/types.h>
-
 #include "base/hashing.h"
 #include "base/roots.h"
 #include "packing/base/certificate.h"

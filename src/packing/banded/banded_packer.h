@@ -2,7 +2,6 @@
 
 #include <ist/bake.h>
 #include <algorithm>
-#include <vector>
 
 #include "base/stage.h"
 #include "base/thread_arena.h"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-#include <cstdint>
 
 #include "base/vec3.h"
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <memory>
 #include <numeric>
-#include <utility>
 
 #include "base/stage.h"
 #include "mesh/geometry/exact_triangle.h"

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "base/host_device.h"
 #include "base/team.h"
 #include "mesh/hierarchy/line_lattice.h"

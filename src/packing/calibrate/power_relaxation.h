@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <numbers>
 
 #include "base/roots.h"

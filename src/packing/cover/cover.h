@@ -1,9 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-#include <functional>
-#include <span>
-#include <vector>
 
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"

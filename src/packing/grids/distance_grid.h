@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/types.h>
-#include <cstdint>
 
 #include "mesh/geometry/triangle_frame.h"
 #include "packing/grids/grid_layout.h"

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "base/hashing.h"
 #include "base/host_device.h"
 #include "base/vec3.h"

@@ -3,7 +3,6 @@
 #include <ist/types.h>
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 namespace ist::packing {
 namespace {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/bake.h>
-#include <cstddef>
 
 #include "packing/grids/grid_layout.h"
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include "packing/grids/ascent.h"
 #include "packing/grids/host_grid.h"

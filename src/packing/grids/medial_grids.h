@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/bake.h>
-#include <vector>
 
 #include "mesh/mesh_solid.h"
 #include "packing/grids/ascent.h"
