@@ -8,7 +8,6 @@
 #include "packing/base/packing_settings.h"
 #include "packing/calibrate/host_calibration.h"
 #include "packing/cover/cover.h"
-#include "packing/grids/medial_grids.h"
 #include "packing/grids/pack_grids.h"
 
 namespace ist {

@@ -35,11 +35,9 @@ void HostGrid::measure_distances() {
   };
   for_active([&](const CellRecord& r, std::uint32_t) { field[r.cell] = start_distance(r); });
   for (int axis = 0; axis < 3; ++axis)
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<int>(0, grid_lines(layout_, axis), 64),
-                              [&](const oneapi::tbb::blocked_range<int>& lines) {
-                                for (int n = lines.begin(); n != lines.end(); ++n)
-                                  sweep_line(field.data(), grid_line(layout_, axis, n));
-                              });
+    for_each_index(0, static_cast<std::size_t>(grid_lines(layout_, axis)), 64, [&](std::size_t n) {
+      sweep_line(field.data(), grid_line(layout_, axis, static_cast<int>(n)));
+    });
   for_active([&](const CellRecord& r, std::uint32_t& word) {
     word = DistanceGrid::slot(word) | std::uint32_t{field[r.cell]} << 24;
   });
