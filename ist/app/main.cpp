@@ -140,9 +140,8 @@ int main(int argc, char** argv) {
   app.formatter(std::make_shared<HelpFormat>());
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
-      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation or clash a clash, "
-      "130 "
-      "interrupted.");
+      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation or clash a "
+      "clash, 130 interrupted.");
   add_bake(app);
   add_cache(app);
   add_summary(app);
