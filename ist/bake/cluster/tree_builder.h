@@ -16,7 +16,7 @@ TreeArrays build_tree(std::span<const Sphere> spheres, std::span<const float> co
 std::vector<std::uint32_t> sphere_order(std::span<const Sphere> spheres, bool swaps = true);
 
 /// The tree of matched spheres that lie much as others do, one for one, from sphere_order() of
-/// those (refined_order(), tree_order.h).
+/// those (refined_order()).
 TreeArrays build_tree_like(std::span<const Sphere> spheres, std::vector<std::uint32_t> order);
 
 /// The tree whose leaves are the spheres in a given order: lane i is spheres[order[i]].
