@@ -178,10 +178,9 @@ Invariant neighbours(const MeshOfAsset& mesh) {
                                   std::back_inserter(wrong));
     tally.add(static_cast<double>(wrong.size()), b);
   });
-  DisjointSets groups(mesh.count);
   for (std::uint32_t v = 0; v < around.size(); ++v) {
     if (!is_large(v)) continue;
-    groups = LaneGroups(mesh.count);
+    DisjointSets groups(mesh.count);
     for (const std::uint32_t b : around[v])
       for (const std::uint32_t other : named_by(b))
         if (has(other, v)) groups.unite(b, other);
