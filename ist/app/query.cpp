@@ -19,31 +19,31 @@ namespace {
 using Eigen::Vector3d;
 
 /// Numbers of a kind of field, as a user writes them.
-struct Kind {
+struct FieldKind {
   const char* name;
   std::vector<const char*> numbers;
   const char* meaning;
 };
 
-const std::array<Kind, 5>& kinds() {
-  static const std::array<Kind, 5> all = {
-      Kind{"plane",
-           {"nx", "ny", "nz", "d"},
-           "the solid n · x ≤ d: an outward normal n of any length above 0 and d"},
-      Kind{"box", {"hx", "hy", "hz"}, "half extents above 0"},
-      Kind{"ball", {"r"}, "a radius above 0"},
-      Kind{"capsule",
-           {"r", "h"},
-           "a radius above 0 and the half height, 0 or more, of the segment along z"},
-      Kind{"cylinder", {"r", "h"}, "a radius and a half height along z, above 0"}};
+const std::array<FieldKind, 5>& kinds() {
+  static const std::array<FieldKind, 5> all = {
+      FieldKind{"plane",
+                {"nx", "ny", "nz", "d"},
+                "the solid n · x ≤ d: an outward normal n of any length above 0 and d"},
+      FieldKind{"box", {"hx", "hy", "hz"}, "half extents above 0"},
+      FieldKind{"ball", {"r"}, "a radius above 0"},
+      FieldKind{"capsule",
+                {"r", "h"},
+                "a radius above 0 and the half height, 0 or more, of the segment along z"},
+      FieldKind{"cylinder", {"r", "h"}, "a radius and a half height along z, above 0"}};
   return all;
 }
 
-const Kind* kind_of(std::string_view text) {
+const FieldKind* kind_of(std::string_view text) {
   const std::size_t colon = text.find(':');
   if (colon == std::string_view::npos) return nullptr;
   const std::string_view name = text.substr(0, colon);
-  for (const Kind& kind : kinds())
+  for (const FieldKind& kind : kinds())
     if (name == kind.name) return &kind;
   return nullptr;
 }
@@ -51,7 +51,7 @@ const Kind* kind_of(std::string_view text) {
 /// A description, and what its errors say.
 class Spec {
  public:
-  Spec(const std::string& text, const Kind& kind) : text_(text), kind_(kind) {
+  Spec(const std::string& text, const FieldKind& kind) : text_(text), kind_(kind) {
     std::string_view rest = std::string_view(text).substr(text.find(':') + 1);
     std::vector<std::string_view> fields;
     for (std::size_t comma; (comma = rest.find(',')) != std::string_view::npos;) {
@@ -102,7 +102,7 @@ class Spec {
   }
 
   const std::string& text_;
-  const Kind& kind_;
+  const FieldKind& kind_;
   std::vector<double> values_;
 };
 
@@ -111,7 +111,7 @@ bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
 
 /// Throws Error that says what of the description is wrong and what is expected.
 Shape parse_field(const std::string& text) {
-  const Kind* const kind = kind_of(text);
+  const FieldKind* const kind = kind_of(text);
   if (kind == nullptr) throw Error("'" + text + "' does not describe a field");
   const Spec spec(text, *kind);
   const std::string_view name = kind->name;
