@@ -1,17 +1,12 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
-
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <string>
+#include <nlohmann/json.hpp>
 #include <system_error>
-#include <vector>
 
 #include "app/bake_library.h"
 #include "app/commands.h"
@@ -19,7 +14,6 @@
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "app/progress_line.h"
-#include "app/write_mesh.h"
 #include "library/asset_summary.h"
 #include "library/settings/bake_settings.h"
 #include "library/text.h"
@@ -64,7 +58,6 @@ Baked bake_interruptibly(const ClosedMesh& mesh, const BakeSettings& settings, b
       [&](const ProgressCallback& progress) { return bake_as_asked(mesh, settings, progress); });
 }
 
-/// The folder, made if it is not there. Throws Error.
 void require_folder(const std::string& folder) {
   std::error_code error;
   if (fs::exists(folder, error) && !fs::is_directory(folder, error))

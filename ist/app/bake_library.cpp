@@ -1,22 +1,16 @@
 #include "app/bake_library.h"
 
 #include <fmt/format.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
-
 #include <unistd.h>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstddef>
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
 #include <filesystem>
-#include <memory>
-#include <set>
-#include <string_view>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
@@ -91,7 +85,6 @@ class LibraryProgress final : public RunObserver {
 
   bool stop() override { return interrupted(); }
 
-  /// wipes the line
   void end() {
     if (line_) fmt::print(stderr, "{}", kWipe);
   }
@@ -197,7 +190,6 @@ std::string cache_folder(const LibraryOptions& options) {
   return from_environment != nullptr ? from_environment : "";
 }
 
-/// Prints the jobs of a dry run.
 void print_jobs(const std::vector<Job>& jobs, bool json) {
   if (json) {
     auto assets = nlohmann::ordered_json::array();

@@ -1,12 +1,8 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include <ist/asset.h>
+#include <CLI/CLI.hpp>
+#include <optional>
 
 #include "library/summary.h"
 
@@ -20,7 +16,6 @@ struct LibraryOptions {
   bool remove_stale = false, list = false, lines = false;
 };
 
-/// Adds --manifest and the options that need it.
 void add_library_options(CLI::App* command, LibraryOptions& options);
 
 struct LibraryRun {

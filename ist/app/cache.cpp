@@ -1,12 +1,9 @@
 #include "library/cache.h"
 
 #include <fmt/format.h>
-
 #include <cstdlib>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
 
 #include "app/commands.h"
 #include "app/options.h"

@@ -1,14 +1,11 @@
 #include <fmt/format.h>
-
+#include <ist/asset_layout.h>
+#include <ist/bake.h>
 #include <algorithm>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include <ist/bake.h>
-#include <ist/types.h>
-
-#include <ist/asset_layout.h>
 #include "app/commands.h"
 #include "app/options.h"
 #include "library/input_mesh.h"
@@ -53,7 +50,6 @@ void print_table(const CheckOptions& options, const std::vector<Invariant>& inva
   fmt::print("{}\n", sound ? "sound: no violations" : "NOT SOUND");
 }
 
-/// The mesh as it was baked.
 ClosedMesh baked_mesh(std::uint32_t flags, const CheckOptions& options) {
   MeshSettings settings = options.placed.settings.mesh;
   settings.repair = (flags & kFlagRepaired) != 0;

@@ -3,14 +3,9 @@
 #include <ist/mass_properties.h>
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <ctime>
-#include <memory>
-#include <vector>
 
 #include "app/commands.h"
 #include "app/glb_scene.h"
@@ -35,7 +30,6 @@ struct ClashOptions {
 
 using Triangle = std::array<Vector3d, 3>;
 
-/// The triangles of a part in its place.
 std::vector<Triangle> triangles_of(const PlacedAsset& solid) {
   const AssetHeader& asset = solid.asset.header();
   const auto& mesh = *at<MeshHeader>(asset, asset.mesh);
@@ -124,9 +118,7 @@ std::string now() {
 
 void check_options(const ClashOptions& options) {
   refuse_idle_options(options.assembly.robot, options.input);
-  if (!options.assembly.joints.empty() && !is_robot_file(options.input))
-    throw CLI::ValidationError(
-        "--pose", "has no effect: '" + options.input + "' is not a robot (.urdf, .xml, .sdf)");
+  if (!options.assembly.joints.empty()) refuse_without_robot("--pose", options.input);
   for (const auto& [path, what] : {std::pair(&options.bcf, "the BCF"), {&options.glb, "the scene"}})
     if (!path->empty()) require_output(*path, options.input, what);
 }
@@ -161,33 +153,27 @@ void clash(const ClashOptions& options) {
   if (!report.faults.empty()) throw ExitCode{kExitError};
 }
 
-/// JOINT=NUMBER or JOINT=FIRST:LAST:COUNT.
-JointRange joint_range(const std::string& text) {
+/// JOINT=NUMBER or JOINT=FIRST:LAST:COUNT; false for anything else.
+bool take_joint(const std::string& text, std::vector<JointRange>& joints) {
   constexpr std::size_t kMost = 1'000'000;
   const std::size_t equals = text.rfind('=');
-  JointRange range;
+  if (equals == std::string::npos || equals == 0) return false;
+  JointRange& range = joints.emplace_back();
+  range.joint = text.substr(0, equals);
   std::vector<std::string> words;
-  if (equals != std::string::npos && equals > 0) {
-    range.joint = text.substr(0, equals);
-    for (std::size_t at = equals; at != std::string::npos;) {
-      const std::size_t next = text.find(':', at + 1);
-      words.push_back(text.substr(at + 1, next == std::string::npos ? next : next - at - 1));
-      at = next;
-    }
+  for (std::size_t at = equals; at != std::string::npos;) {
+    const std::size_t next = text.find(':', at + 1);
+    words.push_back(text.substr(at + 1, next == std::string::npos ? next : next - at - 1));
+    at = next;
   }
   const auto take = [&](const std::string& word, double& value) {
     const std::optional<double> parsed = parse_number(word);
     value = parsed.value_or(0);
     return parsed && std::isfinite(*parsed);
   };
-  bool right = words.size() == 1 && take(words[0], range.first);
-  if (words.size() == 3)
-    right = take(words[0], range.first) && take(words[1], range.last) &&
-            take_whole<std::size_t>(words[2], 2, kMost, range.count);
-  if (!right)
-    throw CLI::ValidationError(
-        "--pose", fmt::format("'{}' is not JOINT=NUMBER or JOINT=FIRST:LAST:COUNT", text));
-  return range;
+  if (words.size() == 1) return take(words[0], range.first);
+  return words.size() == 3 && take(words[0], range.first) && take(words[1], range.last) &&
+         take_whole<std::size_t>(words[2], 2, kMost, range.count);
 }
 
 }  // namespace
@@ -220,18 +206,11 @@ void add_clash(CLI::App& app) {
       add_file(command, "--poses", options->assembly.poses,
                "CSV of poses to sweep: id,part,qw,qx,qy,qz,tx,ty,tz, or of a robot a column a "
                "joint. The worst of each pair is listed, with its id");
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--pose",
-          [options](const std::vector<std::string>& given) {
-            for (const std::string& one : given)
-              options->assembly.joints.push_back(joint_range(one));
-          },
-          "Robots: position of a joint [rad or u]; FIRST:LAST:COUNT sweeps. Repeatable. Default: 0 "
-          "or the middle of its limits")
-      ->type_name("JOINT=NUMBER")
-      ->expected(1)
-      ->take_all()
+  add_repeated(
+      command, "--pose", "JOINT=NUMBER", "JOINT=NUMBER or JOINT=FIRST:LAST:COUNT",
+      [options](const std::string& one) { return take_joint(one, options->assembly.joints); },
+      "Robots: position of a joint [rad or u]; FIRST:LAST:COUNT sweeps. Repeatable. Default: 0 "
+      "or the middle of its limits")
       ->excludes(poses);
   add_robot_options(command, options->assembly.robot);
   add_setting_options(command, options->closing, closing_settings());

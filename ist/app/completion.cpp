@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-
 #include <string_view>
 
 #include "app/reference.h"
@@ -32,7 +31,6 @@ std::string replaced(const std::string& text, std::string_view unsafe, const std
   return out;
 }
 
-/// Inside single quotes of a shell.
 std::string shell_quoted(const std::string& text) {
   std::string out;
   for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);

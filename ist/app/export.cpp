@@ -3,14 +3,8 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <ist/query.h>
-#include <ist/types.h>
-
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
-#include <memory>
-#include <string>
 
 #include "app/commands.h"
 #include "app/glb_scene.h"
@@ -21,8 +15,7 @@
 namespace ist::app {
 namespace {
 
-/// Colours of the spheres, their groups, the groups' groups …; all but the spheres let light
-/// through.
+/// Colours of the spheres, their groups, the groups' groups …; all but the spheres are transparent.
 std::array<double, 4> colour_of(std::size_t level) {
   constexpr std::array<std::array<double, 3>, 5> kColours = {{{0.90, 0.62, 0.28},
                                                               {0.25, 0.55, 0.85},

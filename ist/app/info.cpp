@@ -1,8 +1,6 @@
 #include <fmt/format.h>
-
-#include <memory>
-
 #include <ist/bake.h>
+#include <memory>
 
 #include "app/commands.h"
 #include "app/options.h"

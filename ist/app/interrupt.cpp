@@ -2,7 +2,6 @@
 
 #include <sys/time.h>
 #include <unistd.h>
-
 #include <csignal>
 
 #include "app/commands.h"
@@ -16,7 +15,6 @@ volatile std::sig_atomic_t patience_us = 0;
 
 void on_timer(int) { _exit(kExitInterrupted); }
 
-/// 0: no timer.
 void set_timer(std::sig_atomic_t microseconds) {
   itimerval timer = {};
   timer.it_value = {microseconds / 1'000'000, microseconds % 1'000'000};

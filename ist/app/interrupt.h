@@ -2,8 +2,8 @@
 
 namespace ist::app {
 
-/// Ctrl-C, or SIGTERM alike, ends the program with exit code 130 at once, unless an InterruptGuard
-/// is alive.
+/// Ctrl-C or SIGTERM ends the program with exit code 130 at once, unless an InterruptGuard is
+/// alive.
 void install_interrupt_handler();
 
 /// While one is alive, the first Ctrl-C only sets interrupted(), so that a long stage can end

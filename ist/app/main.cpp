@@ -2,19 +2,16 @@
 #include <ist/version.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
-#include <CLI/CLI.hpp>
-
 #include <sys/ioctl.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <memory>
-#include <span>
 #include <sstream>
-#include <string>
 #include <system_error>
 
 #include "app/commands.h"
@@ -34,7 +31,6 @@ std::size_t terminal_width() {
   return std::clamp<std::size_t>(size.ws_col, kNarrowest, kWidest);
 }
 
-/// Columns of UTF-8 text.
 std::size_t columns(const std::string& text) {
   return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
     return (static_cast<unsigned char>(c) & 0xC0) != 0x80;
@@ -71,8 +67,7 @@ std::string wrapped(const std::string& text, std::size_t indent, std::size_t wid
   return out;
 }
 
-/// CLI11's help, with lines that end at the terminal's right edge (at column 80 without a terminal,
-/// at 100 at most).
+/// CLI11's help in lines of the terminal's width: 80 columns without a terminal, 100 at most.
 class HelpFormat : public CLI::Formatter {
  public:
   HelpFormat() : width_(terminal_width() - kGroupIndent) {}
@@ -89,7 +84,6 @@ class HelpFormat : public CLI::Formatter {
     return wrapped(Formatter::make_description(app), 0, width_);
   }
 
-  /// Examples and lists stay as they are.
   std::string make_footer(const CLI::App* app) const override {
     std::istringstream lines(Formatter::make_footer(app));
     std::string out;
@@ -146,9 +140,8 @@ int main(int argc, char** argv) {
   app.formatter(std::make_shared<HelpFormat>());
   app.set_version_flag("--version", "ist " IST_VERSION_STRING);
   app.footer(
-      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation or clash a clash, "
-      "130 "
-      "interrupted.");
+      "Exit codes: 0 success, 1 error, 2 wrong usage, 3 check found a violation or clash a "
+      "clash, 130 interrupted.");
   add_bake(app);
   add_cache(app);
   add_summary(app);

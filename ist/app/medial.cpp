@@ -1,12 +1,8 @@
-#include <ist/bake.h>
-
 #include <fmt/format.h>
+#include <ist/bake.h>
 #include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <memory>
-
-#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/mesh_notes.h"

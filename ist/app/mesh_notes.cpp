@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cctype>
 #include <utility>
@@ -18,8 +17,7 @@ std::string without_numbers(std::string text) {
   return text;
 }
 
-/// close_as_asked(); a mesh that repair closed is wrapped too, if that is asked for, and the
-/// better of both is taken.
+/// close_as_asked(); if both are asked for, the better of repair and wrap.
 ClosedMesh close_better(TriangleMesh mesh, const std::string& name, const MeshSettings& settings) {
   if (!settings.repair || settings.wrap == 0)
     return close_as_asked(std::move(mesh), name, settings);

@@ -1,13 +1,8 @@
 #pragma once
 
 #include <ist/mesh.h>
-#include <nlohmann/json.hpp>
-
-#include <functional>
 #include <map>
-#include <optional>
-#include <string>
-#include <vector>
+#include <nlohmann/json.hpp>
 
 #include "library/input_mesh.h"
 #include "library/settings/bake_settings.h"
@@ -25,14 +20,12 @@ class LinkMeshes {
   /// Returns a substitute for a mesh that cannot be closed, given the reason; nothing: an error.
   using Otherwise = std::function<std::optional<ClosedMesh>(const std::string& why)>;
 
-  /// The mesh of these links that `make` returns, closed; by repair or by a wrap, whichever has the
-  /// higher confidence, if both are asked for. Nothing where that or closing it throws Error, which
-  /// is a fault of each link.
+  /// The mesh that `make` returns, closed; if both are asked for, by the better of repair and wrap.
+  /// Nothing where either throws Error, which is a fault of each of these links.
   std::optional<ClosedMesh> close(const std::vector<std::string>& links,
                                   const std::function<TriangleMesh()>& make,
                                   const Otherwise& otherwise = {});
 
-  /// Whether one of these links is to be repaired.
   bool repairs(const std::vector<std::string>& links) const;
 
   /// A finding about a link, which finish() says.
@@ -41,7 +34,6 @@ class LinkMeshes {
   /// Says what was found since it was last called. Throws Error if any link failed.
   void finish();
 
-  /// All that finish() said.
   const std::vector<std::string>& said() const { return said_; }
 
  private:

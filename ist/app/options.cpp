@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 #include <ist/gpu.h>
-#include <ist/types.h>
 #include <spdlog/spdlog.h>
-
 #include <unistd.h>
 #include <cerrno>
 #include <cstdio>
@@ -26,6 +24,24 @@ CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::s
           throw CLI::ValidationError(name, fmt::format("'{}' is not {}", text, meaning));
       },
       help);
+}
+
+CLI::Option* add_repeated(CLI::App* command, const std::string& name, const std::string& type,
+                          const std::string& meaning,
+                          const std::function<bool(const std::string&)>& take,
+                          const std::string& help) {
+  return command
+      ->add_option_function<std::vector<std::string>>(
+          name,
+          [name, meaning, take](const std::vector<std::string>& given) {
+            for (const std::string& one : given)
+              if (!take(one))
+                throw CLI::ValidationError(name, fmt::format("'{}' is not {}", one, meaning));
+          },
+          help)
+      ->type_name(type)
+      ->expected(1)
+      ->take_all();
 }
 
 void add_setting_options(CLI::App* command, SettingOptions& options,
@@ -52,22 +68,16 @@ void complete_settings(SettingOptions& options) {
 }
 
 void add_robot_options(CLI::App* command, RobotOptions& options) {
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--package",
-          [&options](const std::vector<std::string>& given) {
-            for (const std::string& one : given) {
-              const std::size_t equals = one.find('=');
-              if (equals == 0 || equals == std::string::npos || equals + 1 == one.size())
-                throw CLI::ValidationError("--package", "'" + one + "' is not NAME=DIR");
-              options.packages[one.substr(0, equals)] = one.substr(equals + 1);
-            }
-          },
-          "Robots: the folder of package://NAME/…. Repeatable. Default: ROS_PACKAGE_PATH, then the "
-          "folders above the URDF")
-      ->type_name("NAME=DIR")
-      ->expected(1)
-      ->take_all();
+  add_repeated(
+      command, "--package", "NAME=DIR", "NAME=DIR",
+      [&options](const std::string& one) {
+        const std::size_t equals = one.find('=');
+        if (equals == 0 || equals == std::string::npos || equals + 1 == one.size()) return false;
+        options.packages[one.substr(0, equals)] = one.substr(equals + 1);
+        return true;
+      },
+      "Robots: the folder of package://NAME/…. Repeatable. Default: ROS_PACKAGE_PATH, then the "
+      "folders above the URDF");
   command->add_flag("--visual", options.visual,
                     "Robots: use visual shapes instead of collision shapes");
   for (const auto& [name, links, help] :
@@ -78,15 +88,18 @@ void add_robot_options(CLI::App* command, RobotOptions& options) {
 }
 
 void refuse_idle_options(const RobotOptions& options, const std::string& input) {
-  if (is_robot_file(input)) return;
   const char* const given = options.visual              ? "--visual"
                             : !options.packages.empty() ? "--package"
                             : !options.skipped.empty()  ? "--skip"
                             : !options.repaired.empty() ? "--repair-link"
                                                         : nullptr;
-  if (given == nullptr) return;
-  throw CLI::ValidationError(given,
-                             "has no effect: '" + input + "' is not a robot (.urdf, .xml, .sdf)");
+  if (given != nullptr) refuse_without_robot(given, input);
+}
+
+void refuse_without_robot(const std::string& option, const std::string& input) {
+  if (!is_robot_file(input))
+    throw CLI::ValidationError(option,
+                               "has no effect: '" + input + "' is not a robot (.urdf, .xml, .sdf)");
 }
 
 bool is_robot_file(const std::string& path) {

@@ -1,15 +1,8 @@
 #pragma once
 
 #include <ist/bake.h>
+#include <ist/mesh.h>
 #include <CLI/CLI.hpp>
-
-#include <functional>
-#include <limits>
-#include <optional>
-#include <set>
-#include <span>
-#include <string>
-#include <string_view>
 
 #include "library/robot_assets.h"
 #include "library/settings/bake_settings.h"
@@ -21,7 +14,6 @@
 
 namespace ist::app {
 
-/// Settings as options, and the names of those that were given.
 struct SettingOptions {
   BakeSettings settings;
   std::set<std::string> given;
@@ -34,18 +26,18 @@ void add_setting_options(CLI::App* command, SettingOptions& options,
 /// To be called once all are parsed. Throws (exit code 2) if they do not go together.
 void complete_settings(SettingOptions& options);
 
-/// Adds --package, --visual, --skip and --repair-link.
 void add_robot_options(CLI::App* command, RobotOptions& options);
 
 /// Throws (exit code 2) where options of a robot are given with what is none.
 void refuse_idle_options(const RobotOptions& options, const std::string& input);
 
-/// It ends in .urdf or .sdf, or as MuJoCo's models in .xml or .mjcf. Throws Error for .xacro, which
-/// is to be expanded.
+/// The same where `option` was given.
+void refuse_without_robot(const std::string& option, const std::string& input);
+
+/// Whether it ends in .urdf, .sdf, or MuJoCo's .xml or .mjcf. Throws Error for .xacro.
 bool is_robot_file(const std::string& path);
 
-/// An argument or option that names a file to read, required unless the caller says otherwise; ""
-/// and "-" are refused.
+/// A required argument or option that names a file to read; "" and "-" are refused.
 CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& path,
                        const std::string& help);
 
@@ -68,7 +60,6 @@ void require_output(const std::string& path, const std::string& input, const std
 /// The whole file, or not at all; "-" is standard output. Throws Error.
 void write_text(const std::string& path, std::string_view text);
 
-/// Adds --device: auto, cpu or cuda.
 void add_device_option(CLI::App* command, std::string& name, const std::string& help);
 
 /// The device of that name. Throws Error if it is a GPU and there is none to be used.
@@ -81,6 +72,12 @@ void announce_device(Device device);
 CLI::Option* add_parsed(CLI::App* command, const std::string& name, const std::string& meaning,
                         const std::function<bool(const std::string&)>& take,
                         const std::string& help);
+
+/// The same for an option that may be given many times; `type`: of its value, for help.
+CLI::Option* add_repeated(CLI::App* command, const std::string& name, const std::string& type,
+                          const std::string& meaning,
+                          const std::function<bool(const std::string&)>& take,
+                          const std::string& help);
 
 /// A whole number in [least, most]; `value` holds the default.
 template <class T>
@@ -102,8 +99,13 @@ CLI::Option* add_whole(CLI::App* command, const std::string& name, T& value,
 CLI::Option* add_number(CLI::App* command, const std::string& name, double& value,
                         const Range& range, const std::string& help, bool is_share = false);
 
-/// Bytes: 4096, 512M, 10G.
 CLI::Option* add_bytes(CLI::App* command, const std::string& name,
                        std::optional<std::uint64_t>& value, const std::string& help);
+
+bool has_mesh_ending(const std::string& path);  ///< one that write_mesh() takes
+
+/// Writes a mesh as .obj, .ply (ASCII) or .off with every digit of its doubles, or as .stl (binary;
+/// the format itself keeps single precision): its ending decides. Throws Error.
+void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace ist::app

@@ -1,6 +1,9 @@
 #pragma once
 
-#include <ist/types.h>
+#include <fmt/format.h>
+#include <unistd.h>
+#include <cstdio>
+#include <string_view>
 
 #include "app/interrupt.h"
 #include "library/whole_progress.h"
@@ -13,12 +16,25 @@ inline constexpr const char* kWipe = "\r\033[K";  ///< a line on a terminal
 class ProgressLine {
  public:
   /// `rounds`: see WholeProgress.
-  explicit ProgressLine(bool quiet, bool rounds = false);
-  ~ProgressLine();  ///< wipes the line
+  explicit ProgressLine(bool quiet, bool rounds = false)
+      : active_(!quiet && isatty(STDERR_FILENO) == 1), whole_(rounds) {}
+  ~ProgressLine() {
+    if (active_) fmt::print(stderr, "{}", kWipe);
+  }
   ProgressLine(const ProgressLine&) = delete;
   ProgressLine& operator=(const ProgressLine&) = delete;
 
-  void show(const Progress& progress);
+  void show(const Progress& progress) {
+    if (!active_) return;
+    std::string packed;  // the other stages know neither
+    if (std::string_view(progress.stage) == "pack")
+      packed = fmt::format("coverage {:.2f} %  radius {:.3g}  ", 100 * progress.coverage,
+                           progress.radius);
+    fmt::print(stderr, "{}{:3.0f} %  {:<9} {} spheres  {}{:.1f} s", kWipe,
+               100 * whole_.share(progress), progress.stage, progress.spheres, packed,
+               progress.elapsed);
+    std::fflush(stderr);
+  }
 
  private:
   bool active_;

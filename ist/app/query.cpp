@@ -1,25 +1,126 @@
-#include <ist/shapes.h>
-
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
-#include <algorithm>
-#include <chrono>
-#include <limits>
-#include <memory>
-
 #include <ist/bake.h>
 #include <ist/mass_properties.h>
-#include <ist/types.h>
+#include <ist/shapes.h>
+#include <spdlog/spdlog.h>
+#include <algorithm>
+#include <chrono>
+#include <memory>
 
 #include "app/commands.h"
-#include "app/field_spec.h"
 #include "app/options.h"
 #include "app/query_rows.h"
 #include "library/asset_summary.h"
+#include "library/settings/numbers.h"
 
 namespace ist::app {
 namespace {
+
+using Eigen::Vector3d;
+
+/// Numbers of a kind of field, as a user writes them.
+struct FieldKind {
+  const char* name;
+  std::vector<const char*> numbers;
+  const char* meaning;
+};
+
+const std::array<FieldKind, 5>& kinds() {
+  static const std::array<FieldKind, 5> all = {
+      FieldKind{"plane",
+                {"nx", "ny", "nz", "d"},
+                "the solid n · x ≤ d: an outward normal n of any length above 0 and d"},
+      FieldKind{"box", {"hx", "hy", "hz"}, "half extents above 0"},
+      FieldKind{"ball", {"r"}, "a radius above 0"},
+      FieldKind{"capsule",
+                {"r", "h"},
+                "a radius above 0 and the half height, 0 or more, of the segment along z"},
+      FieldKind{"cylinder", {"r", "h"}, "a radius and a half height along z, above 0"}};
+  return all;
+}
+
+const FieldKind* kind_of(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string_view::npos) return nullptr;
+  const std::string_view name = text.substr(0, colon);
+  for (const FieldKind& kind : kinds())
+    if (name == kind.name) return &kind;
+  return nullptr;
+}
+
+/// A description, and what its errors say.
+class Spec {
+ public:
+  Spec(const std::string& text, const FieldKind& kind) : text_(text), kind_(kind) {
+    std::string_view rest = std::string_view(text).substr(text.find(':') + 1);
+    std::vector<std::string_view> fields;
+    for (std::size_t comma; (comma = rest.find(',')) != std::string_view::npos;) {
+      fields.push_back(rest.substr(0, comma));
+      rest.remove_prefix(comma + 1);
+    }
+    fields.push_back(rest);
+    if (fields.size() != kind.numbers.size())
+      fail(fmt::format("it has {} number{}, not {}", fields.size(), fields.size() == 1 ? "" : "s",
+                       kind.numbers.size()));
+    for (std::size_t k = 0; k < fields.size(); ++k) {
+      const std::optional<double> value = parse_number(fields[k]);
+      if (!value || !std::isfinite(*value))
+        fail(fmt::format("{} = '{}' is not a finite number", kind.numbers[k], fields[k]));
+      values_.push_back(*value);
+    }
+  }
+
+  double number(std::size_t k) const { return values_[k]; }
+
+  /// [u] above 0, or from 0 on.
+  double length(std::size_t k, bool may_be_zero = false) const {
+    const double value = values_[k];
+    if (!(may_be_zero ? value >= 0 : value > 0))
+      fail(fmt::format("{} = {:g} is not {}", kind_.numbers[k], value,
+                       may_be_zero ? "0 or more" : "above 0"));
+    if (value > kLongest)
+      fail(fmt::format("{} = {:g} is more than {:g}", kind_.numbers[k], value, kLongest));
+    return value;
+  }
+
+  HalfSpaceShape plane() const {
+    const Vector3d normal(values_[0], values_[1], values_[2]);
+    const double length = normal.stableNorm();
+    if (!(length > 0)) fail("the normal is zero and has no direction");
+    const double offset = values_[3] / length;
+    if (!(std::abs(offset) <= kLongest))
+      fail(fmt::format("the plane is {:g} away, more than {:g}", offset, kLongest));
+    return {normal.stableNormalized(), offset};
+  }
+
+ private:
+  static constexpr double kLongest = 1e150;  // [u] what the queries take
+
+  [[noreturn]] void fail(const std::string& fault) const {
+    throw Error(fmt::format("'{}' is not a {}: {}; write {}:{}, {}", text_, kind_.name, fault,
+                            kind_.name, fmt::join(kind_.numbers, ","), kind_.meaning));
+  }
+
+  const std::string& text_;
+  const FieldKind& kind_;
+  std::vector<double> values_;
+};
+
+/// Whether an argument describes a field and names no file: it begins with a kind and a colon.
+bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
+
+/// Throws Error that says what of the description is wrong and what is expected.
+Shape parse_field(const std::string& text) {
+  const FieldKind* const kind = kind_of(text);
+  if (kind == nullptr) throw Error("'" + text + "' does not describe a field");
+  const Spec spec(text, *kind);
+  const std::string_view name = kind->name;
+  if (name == "plane") return spec.plane();
+  if (name == "box") return BoxShape{Vector3d(spec.length(0), spec.length(1), spec.length(2))};
+  if (name == "ball") return BallShape{spec.length(0)};
+  if (name == "capsule") return CapsuleShape{spec.length(0), spec.length(1, true)};
+  return CylinderShape{spec.length(0), spec.length(1)};
+}
 
 struct QueryOptions {
   std::string a, asset_b, pose, poses;

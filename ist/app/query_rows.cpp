@@ -1,108 +1,25 @@
 #include "app/query_rows.h"
 
 #include <fmt/format.h>
-#include <ist/types.h>
-#include <istream>
-
 #include <algorithm>
 #include <array>
 #include <cctype>
 #include <cerrno>
 #include <cmath>
-#include <cstddef>
 #include <fstream>
 #include <iostream>
+#include <istream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <sstream>
 #include <system_error>
-#include <utility>
 
+#include "library/csv_reader.h"
 #include "library/settings/numbers.h"
 #include "library/text.h"
 
 namespace ist::app {
 namespace {
-
-constexpr const char* kBlank = " \t\r";
-
-/// Rows of comma-separated text (RFC 4180): a field in quotes may hold commas, line breaks and
-/// doubled quotes; others lose the blanks around them. Rows without anything are passed over, and
-/// so is the mark of UTF-8 that Excel writes.
-class CsvReader {
- public:
-  /// `name`: of the file, for messages.
-  CsvReader(std::istream& text, std::string name) : text_(text), name_(std::move(name)) {}
-
-  /// False at the end. Throws Error.
-  bool next(std::vector<std::string>& fields) {
-    do {
-      if (!next_line()) return false;
-      row_line_ = lines_;
-    } while (line_.find_first_not_of(kBlank) == std::string::npos);
-    fields.clear();
-    for (std::size_t at = 0; at <= line_.size(); ++at) fields.push_back(field(at));
-    return true;
-  }
-
-  /// Throws Error that names the line at which the last row began.
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(name_ + ":" + std::to_string(row_line_) + ": " + what);
-  }
-
- private:
-  bool next_line() {
-    if (!std::getline(text_, line_)) return false;
-    if (lines_++ == 0 && line_.starts_with("\xEF\xBB\xBF")) line_.erase(0, 3);
-    return true;
-  }
-
-  /// The field that begins at `at`, which is left on the comma or the line's end after it.
-  std::string field(std::size_t& at) {
-    const std::size_t first = line_.find_first_not_of(kBlank, at);
-    if (first != std::string::npos && line_[first] == '"') {
-      at = first + 1;
-      return quoted_field(at);
-    }
-    const std::size_t end = std::min(line_.find(',', at), line_.size());
-    std::string text = line_.substr(at, end - at);
-    at = end;
-    if (text.find('"') != std::string::npos)
-      fail(
-          "a quote inside an unquoted field; quote the whole field and double the quotes inside "
-          "it");
-    const std::size_t last = text.find_last_not_of(kBlank);
-    text.erase(last == std::string::npos ? 0 : last + 1);
-    return text.erase(0, std::min(text.find_first_not_of(kBlank), text.size()));
-  }
-
-  std::string quoted_field(std::size_t& at) {
-    std::string text;
-    while (true) {
-      if (at >= line_.size()) {
-        if (!next_line()) fail("a closing quote is missing");
-        text += '\n';
-        at = 0;
-      } else if (line_[at] != '"') {
-        text += line_[at++];
-      } else if (at + 1 < line_.size() && line_[at + 1] == '"') {
-        text += '"';
-        at += 2;
-      } else {
-        break;
-      }
-    }
-    const std::size_t end = line_.find_first_not_of(kBlank, at + 1);
-    at = std::min(end, line_.size());
-    if (at < line_.size() && line_[at] != ',') fail("text after a closing quote");
-    return text;
-  }
-
-  std::istream& text_;
-  std::string name_, line_;
-  std::size_t lines_ = 0, row_line_ = 0;
-};
 
 constexpr std::array kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
 
@@ -134,7 +51,6 @@ std::optional<std::size_t> find_column(const std::vector<std::string>& header,
   return found;
 }
 
-/// Column numbers.
 struct Columns {
   std::array<std::size_t, kPose.size()> pose;
   std::optional<std::size_t> id, label, scale;
@@ -180,6 +96,31 @@ PoseTable read(std::istream& text, const std::string& name) {
   if (text.bad()) throw Error(name + ": reading failed before the end");
   if (table.rows.empty()) throw Error(name + ": no rows after the header");
   return table;
+}
+
+/// The numeric columns between `id` and `status`, in order.
+std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparation& r) {
+  const Penetration& p = r.penetration;
+  const Separation& s = r.separation;
+  std::vector<std::pair<std::string, double>> out = {
+      {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
+  for (const auto& [name, v] :
+       {std::pair{"c", p.centroid}, {"force_", p.force}, {"torque_", p.torque}})
+    for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
+  out.insert(out.end(), {{"distance", s.distance},
+                         {"distance_min", s.distance_min},
+                         {"distance_max", s.distance_max}});
+  return out;
+}
+
+/// Those behind `time_us`: how the solids touch, which spheres cannot know.
+std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
+  const Penetration& p = answer.result.penetration;
+  const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };
+  std::vector<std::pair<std::string, double>> out = {{"contact_area", known(p.contact_area)}};
+  for (int k = 0; k < 3; ++k)
+    out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
+  return out;
 }
 
 }  // namespace
@@ -229,35 +170,6 @@ std::string pose_fault(const PoseRow& row) {
       "{} is {:g}, out of range: sizes and distances may differ by a factor of at most 1e60", name,
       worst);
 }
-
-namespace {
-
-/// The numeric columns between `id` and `status`, in order.
-std::vector<std::pair<std::string, double>> numbers(const PenetrationAndSeparation& r) {
-  const Penetration& p = r.penetration;
-  const Separation& s = r.separation;
-  std::vector<std::pair<std::string, double>> out = {
-      {"volume", p.volume}, {"volume_min", p.volume_min}, {"volume_max", p.volume_max}};
-  for (const auto& [name, v] :
-       {std::pair{"c", p.centroid}, {"force_", p.force}, {"torque_", p.torque}})
-    for (int k = 0; k < 3; ++k) out.emplace_back(std::string(name) + "xyz"[k], v[k]);
-  out.insert(out.end(), {{"distance", s.distance},
-                         {"distance_min", s.distance_min},
-                         {"distance_max", s.distance_max}});
-  return out;
-}
-
-/// Those behind `time_us`: how the solids touch, which spheres cannot know.
-std::vector<std::pair<std::string, double>> contact_numbers(const Answer& answer) {
-  const Penetration& p = answer.result.penetration;
-  const auto known = [&](double value) { return answer.exact ? value : std::nan(""); };
-  std::vector<std::pair<std::string, double>> out = {{"contact_area", known(p.contact_area)}};
-  for (int k = 0; k < 3; ++k)
-    out.emplace_back(std::string("contact_n") + "xyz"[k], known(p.contact_normal[k]));
-  return out;
-}
-
-}  // namespace
 
 std::uint64_t Answer::node_visits() const {
   return std::uint64_t{result.penetration.node_visits} + result.separation.node_visits;

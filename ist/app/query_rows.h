@@ -1,12 +1,8 @@
 #pragma once
 
-#include <span>
+#include <ist/query.h>
 #include <string>
 #include <vector>
-
-#include <ist/query.h>
-
-// The rows of `ist query`: poses that are read, and answers that are written.
 
 namespace ist::app {
 
@@ -55,12 +51,10 @@ struct Answer {
   std::uint64_t sphere_pairs() const;
 };
 
-// The columns of docs/user_guide.md (*Query*), 17 digits; other tools read them: new ones only at
-// the end.
+// The columns of docs/user_guide.md (*Query*), 17 digits. Other tools read them: append only.
 std::string answers_csv(std::span<const Answer> answers);
 std::string answers_json(std::span<const Answer> answers);
 
-/// One answer for a person.
 std::string answer_text(const Answer& answer, const PenetrationSettings& settings);
 
 }  // namespace ist::app

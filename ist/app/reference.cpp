@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/types.h>
 #include <ist/version.h>
-
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
@@ -39,7 +38,6 @@ std::string title(const std::string& name) {
   return fmt::format(".TH \"{}\" 1 \"\" \"ist {}\" \"User Commands\"\n", name, IST_VERSION_STRING);
 }
 
-/// Lines as they stand.
 std::string verbatim(const std::string& heading, const std::string& text) {
   if (text.empty()) return "";
   return fmt::format(".SH {}\n.nf\n{}\n.fi\n", heading, roff(text));

@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-// Man pages and shell completions, made from the commands' own options and help.
-
 namespace ist::app {
 
 struct OptionReference {

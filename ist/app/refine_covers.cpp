@@ -1,16 +1,13 @@
-#include "app/refine_covers.h"
+#include "app/sphere_output.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <set>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 namespace ist::app {
 namespace {
@@ -109,14 +106,12 @@ struct LinkRoom {
   std::vector<Near> near = {};
 };
 
-/// The state of a link.
 struct Refined {
   const ClosedMesh* mesh;  ///< null: its spheres stay as they are
   std::size_t own;         ///< spheres that cover the mesh
   double first;            ///< [u] protrusion before
 };
 
-/// Two links, by index.
 using Two = std::pair<std::size_t, std::size_t>;
 
 /// By link; of those that stay as they are none is near. `narrow`: pairs that need a margin.

@@ -1,13 +1,9 @@
-#include "mesh/samples/samples.h"
-
 #include <fmt/format.h>
-
 #include <memory>
-#include <string>
 
 #include "app/commands.h"
 #include "app/options.h"
-#include "app/write_mesh.h"
+#include "mesh/samples/samples.h"
 
 namespace ist::app {
 namespace {

@@ -1,14 +1,10 @@
 #include "app/sphere_output.h"
 
 #include <fmt/format.h>
-
 #include <cmath>
 #include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
-
-#include <ist/types.h>
 
 #include "app/glb_scene.h"
 #include "app/mesh_notes.h"

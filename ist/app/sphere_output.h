@@ -1,11 +1,9 @@
 #pragma once
 
-#include <algorithm>
-#include <string>
-#include <vector>
-
 #include <ist/cover_spheres.h>
+#include <algorithm>
 
+#include "library/link_solids.h"
 #include "robots/description/self_collision.h"
 
 namespace ist::app {
@@ -59,5 +57,22 @@ SphereWriter sphere_writer(const std::string& output);
 std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds);
 std::string spheres_report_json(const SphereRobot& robot, const std::string& output,
                                 double seconds);
+
+/// Adds to a link's cover the spheres of its description and, for a repaired link, spheres that
+/// contain the mesh as it was read (`read`).
+void complete_cover(SphereLink& link, bool read);
+
+/// Covers links again whose spheres overlap others' though the solids do not: with as many spheres
+/// as it takes to protrude only into the gaps that the solids leave there, of which the tightest
+/// are given up until 40 spheres a link on average are enough, or 60 for a tenth or more. Nothing
+/// is changed where at most a tenth of the free poses are called colliding, or where that would not
+/// become fewer.
+///
+/// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
+/// `is_open`: whether counts may change; if not, it is told alone what is in the way.
+void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSolids& solids,
+                   const SphereCoverSettings& cover,
+                   const std::map<std::string, std::size_t>& fixed, bool is_open,
+                   const ProgressCallback& progress);
 
 }  // namespace ist::app

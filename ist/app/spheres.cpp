@@ -1,24 +1,17 @@
 #include <fmt/format.h>
+#include <ist/bake.h>
+#include <ist/cover_spheres.h>
 #include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <limits>
-#include <map>
-#include <memory>
-
-#include <ist/bake.h>
-#include <ist/cover_spheres.h>
-#include <ist/types.h>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/mesh_notes.h"
 #include "app/options.h"
 #include "app/progress_line.h"
-#include "app/refine_covers.h"
 #include "app/sphere_output.h"
 #include "library/exported_spheres.h"
 #include "library/link_solids.h"
@@ -419,19 +412,11 @@ void add_spheres(CLI::App& app) {
              Dash::refused);
   const std::string meaning =
       fmt::format("N or LINK=N, with a whole number N from 1 to {}", kMostCoverSpheres);
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--count",
-          [options, meaning](const std::vector<std::string>& given) {
-            for (const std::string& one : given)
-              if (!take_count(*options, one))
-                throw CLI::ValidationError("--count", fmt::format("'{}' is not {}", one, meaning));
-          },
-          "Number of spheres of each link, or with LINK=N of that link. Repeatable. With "
-          "--max-protrusion the maximum (default 1024)")
-      ->type_name("[LINK=]N")
-      ->expected(1)
-      ->take_all();
+  add_repeated(
+      command, "--count", "[LINK=]N", meaning,
+      [options](const std::string& one) { return take_count(*options, one); },
+      "Number of spheres of each link, or with LINK=N of that link. Repeatable. With "
+      "--max-protrusion the maximum (default 1024)");
   CLI::Option* const total =
       add_whole<std::size_t>(command, "--total", options->cover.total,
                              "Number of spheres of the whole robot, shared to keep the largest "
@@ -462,29 +447,21 @@ void add_spheres(CLI::App& app) {
   matched->excludes(cover)->excludes(inner)->excludes(most)->excludes(total);
   most->excludes(total);
   add_robot_options(command, options->robot);
-  command
-      ->add_option_function<std::vector<std::string>>(
-          "--pose",
-          [options](const std::vector<std::string>& given) {
-            for (const std::string& one : given) {
-              const std::size_t equals = one.rfind('=');
-              const auto position =
-                  equals == std::string::npos ? std::nullopt : parse_real(one.substr(equals + 1));
-              if (equals == 0 || !position || !std::isfinite(*position))
-                throw CLI::ValidationError("--pose", fmt::format("'{}' is not JOINT=NUMBER", one));
-              options->pose[one.substr(0, equals)] = *position;
-            }
-          },
-          "Robots: position of a joint in the default pose [rad or u]. Repeatable. Default: 0 or "
-          "the middle of its limits, or searched, so that no links overlap")
-      ->type_name("JOINT=NUMBER")
-      ->expected(1)
-      ->take_all();
-  add_input(command, "--srdf", options->srdf,
-            "Robots: an SRDF: its group_states are tried first as the default pose, and the pairs "
-            "of its disable_collisions are ignored")
-      ->required(false)
-      ->type_name("FILE");
+  add_repeated(
+      command, "--pose", "JOINT=NUMBER", "JOINT=NUMBER",
+      [options](const std::string& one) {
+        const std::size_t equals = one.rfind('=');
+        const auto position =
+            equals == std::string::npos ? std::nullopt : parse_real(one.substr(equals + 1));
+        if (equals == 0 || !position || !std::isfinite(*position)) return false;
+        options->pose[one.substr(0, equals)] = *position;
+        return true;
+      },
+      "Robots: position of a joint in the default pose [rad or u]. Repeatable. Default: 0 or "
+      "the middle of its limits, or searched, so that no links overlap");
+  add_file(command, "--srdf", options->srdf,
+           "Robots: an SRDF: its group_states are tried first as the default pose, and the pairs "
+           "of its disable_collisions are ignored");
   add_whole(command, "--seed", options->cover.seed,
             "Random seed of the search; any value works equally well");
   add_whole(command, "--threads", options->cover.threads,
@@ -506,10 +483,8 @@ void add_spheres(CLI::App& app) {
       throw CLI::ValidationError(
           "--count", fmt::format("{} with --capsules; at most {}", most, kMostCoverCapsules));
     refuse_idle_options(options->robot, options->input);
-    if (!is_robot_file(options->input) && !(options->pose.empty() && options->srdf.empty()))
-      throw CLI::ValidationError(
-          options->pose.empty() ? "--srdf" : "--pose",
-          "has no effect: '" + options->input + "' is not a robot (.urdf, .xml, .sdf)");
+    if (!options->pose.empty() || !options->srdf.empty())
+      refuse_without_robot(options->pose.empty() ? "--srdf" : "--pose", options->input);
     run_spheres(*options);
   });
 }

@@ -4,18 +4,11 @@
 #include <ist/bake.h>
 #include <ist/mass_properties.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "app/bake_library.h"
 #include "app/commands.h"
@@ -66,17 +59,6 @@ void print_table(const Summary& summary, bool failed) {
   fmt::print("{}{}: {} assets, {}\n", summary.manifest, shard, grouped(summary.results.size()),
              counts_in_words(summary));
 }
-
-}  // namespace
-
-void print_summary(const Summary& summary, bool json, bool quiet, bool failed) {
-  if (json)
-    fmt::print("{}\n", json_text(to_json(summary, failed)));
-  else if (!quiet)
-    print_table(summary, failed);
-}
-
-namespace {
 
 using Eigen::Vector3d;
 
@@ -254,6 +236,13 @@ void run_summary(const SummaryOptions& options) {
 }
 
 }  // namespace
+
+void print_summary(const Summary& summary, bool json, bool quiet, bool failed) {
+  if (json)
+    fmt::print("{}\n", json_text(to_json(summary, failed)));
+  else if (!quiet)
+    print_table(summary, failed);
+}
 
 void add_summary(CLI::App& app) {
   const auto options = std::make_shared<SummaryOptions>();

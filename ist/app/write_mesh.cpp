@@ -1,12 +1,8 @@
-#include "app/write_mesh.h"
 
 #include <fmt/format.h>
-
-#include <iterator>
-#include <string_view>
-#include <utility>
-
 #include <ist/types.h>
+#include <iterator>
+#include <utility>
 
 #include "app/options.h"
 #include "bake/asset/atomic_file.h"
@@ -72,7 +68,6 @@ std::string stl(const TriangleMesh& mesh) {
 
 using Writer = std::string (*)(const TriangleMesh&);
 
-/// Null for another ending.
 Writer writer_of(const std::string& path) {
   constexpr std::pair<std::string_view, Writer> kWriters[] = {
       {".obj", obj}, {".off", off}, {".ply", ply}, {".stl", stl}};

@@ -1,22 +1,12 @@
-#include "bake/bake_solid.h"
-
 #include <tbb/task_group.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <limits>
-#include <memory>
-#include <optional>
-#include <span>
-#include <utility>
-#include <vector>
-
-#include <ist/types.h>
 
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
+#include "bake/bake_solid.h"
 #include "bake/cluster/bounding_ball.h"
 #include "bake/cluster/tree_builder.h"
 #include "base/aside.h"
@@ -69,8 +59,7 @@ std::vector<std::size_t> detail_counts(std::size_t spheres) {
   return counts;
 }
 
-/// The steps of a bake. The caller runs the first three in turn on the backend, the host's threads
-/// run the others.
+/// The steps of a bake. The first three run in turn on the backend, the others on the host.
 enum class Step { pack, calibrate, cover, order, bounds, finest_tree, inner_tree };
 
 /// Runs a table of stages on the host's threads. Each starts when all that it waits for is done:
@@ -99,7 +88,6 @@ class HostStages {
   HostStages(const HostStages&) = delete;
   HostStages& operator=(const HostStages&) = delete;
 
-  /// Work that waits for nothing.
   void add(std::function<void()> work) {
     if (at_once_)
       group_.run(std::move(work));
@@ -185,9 +173,8 @@ AssetArrays bake_arrays(const ClosedMesh& mesh, const MeshSolid& solid, SharedMe
           arrays.inner_tree =
               tree_from_order(arrays.inner_spheres, arrays.cover_radii, inner_order);
         }}});
-  // Where the host's threads are idle, they lay out the mesh and compute the moments from here on;
-  // elsewhere the packing, which is the first to ask, computes the moments, and the mesh follows
-  // the covers.
+  // Idle host threads lay out the mesh and compute the moments from here on; elsewhere the packing
+  // asks for the moments first, and the mesh follows the covers.
   if (backend.leaves_threads_idle()) {
     kept.start();
     host.add([&] { solid.unit_moments(); });

@@ -1,13 +1,8 @@
 #include <ist/solid.h>
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <memory>
 #include <numbers>
-#include <vector>
 
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
@@ -32,8 +27,7 @@ double random_at(std::uint64_t index) {
 }
 
 /// Throws Error, naming a place, if a signed distance is not finite or, between two of some
-/// thousand points in and around the bounds, changes by more than their distance. What passes may
-/// still do so elsewhere.
+/// thousand points in and around the bounds, changes by more than their distance.
 void require_lipschitz(const Solid& solid) {
   const UnitFrame frame = unit_frame(solid.bounds());
   const Eigen::Vector3d half = solid.bounds().sizes() / 2;

@@ -23,13 +23,11 @@ Asset bake_solid(const ClosedMesh& mesh, const MeshSolid& solid, const Resolutio
 /// Frame, hash and mass of the mesh: all of a header that needs no spheres.
 AssetHeader describe_solid(const ClosedMesh& mesh, const MeshSolid& solid);
 
-/// Volume, centre of mass and inertia.
 void describe_mass(const MeshMoments& moments, AssetHeader& header);
 
 /// Box and ball around the mesh, each `beyond` further out, unit frame.
 void describe_bounds(const MeshSolid& solid, double beyond, AssetHeader& header);
 
-/// Puts the mesh into an asset.
 void keep(const KeptMesh& kept, AssetArrays& arrays);
 
 /// Everything of that asset but its bytes.

@@ -1,16 +1,9 @@
 #include <ist/shapes.h>
-#include <ist/types.h>
-
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <iterator>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "bake/asset/asset_writer.h"
 #include "bake/backend/make_backend.h"
@@ -77,13 +70,11 @@ class Watch {
   bool cancelled_ = false, late_ = false;
 };
 
-/// A trial of a partner other than the copy.
 struct OtherTrial {
   TrialPartner partner;
   PartnerTrial trial;
 };
 
-/// An asset and how it answers.
 struct Candidate {
   Asset asset;
   std::vector<double> errors = {};        ///< relative, of the volumes at the first poses of copies
@@ -178,7 +169,6 @@ class TargetBake {
                               [&](double part) { return go_on(stage, part); });
   }
 
-  /// Trials of partners other than the copy.
   void find_other_trials() {
     Stage stage("predict", watch_.strict());
     const PartnerTrials trials(solid_, own_mesh());
@@ -254,8 +244,7 @@ class TargetBake {
     }
   }
 
-  /// If both meet the target, the one of fewer spheres is better, else the one with the smaller
-  /// error.
+  /// If both meet the target, fewer spheres are better, else a smaller error.
   bool is_better(const Candidate& candidate, const Candidate& than) const {
     if (does(candidate) && does(than)) return candidate.spheres() < than.spheres();
     return candidate.error() < than.error();

@@ -2,7 +2,6 @@
 #include <ist/bake.h>
 #include <ist/c_bake.h>
 #include <ist/mesh.h>
-
 #include <cstdio>
 #include <cstring>
 #include <exception>

@@ -10,8 +10,7 @@ constexpr std::size_t kFirst = 250;
 constexpr std::size_t kFewest = 16;  // no fewer are looked for
 constexpr std::size_t kMostTrials = 8;
 // Fractions of the requested error. A median over some tens of poses is itself off by a tenth or
-// two: the aim leaves a margin for that, and an error below kWasteful takes more spheres than
-// needed.
+// two, hence the margin; an error below kWasteful takes more spheres than needed.
 constexpr double kAim = 0.8, kWasteful = 0.6;
 constexpr double kCloseEnough = 1.25;  // between a count that fails and one that does
 constexpr double kApart = 1.1;         // from counts whose error is known

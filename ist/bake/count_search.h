@@ -15,7 +15,6 @@ class CountSearch {
   /// Counts in [1, most]; error > 0.
   CountSearch(double error, std::size_t most) : error_(error), most_(most) {}
 
-  /// Where to begin.
   static std::size_t first(std::size_t most);
 
   /// Takes the error of a bake of `count` spheres. Returns the next count, or nothing at the end.

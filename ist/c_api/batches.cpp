@@ -21,8 +21,7 @@ struct Staff {
   }
 };
 
-/// answers[i] by ask(i, workspace), or `unknown` where nobody was there to find out. `Settings`: of
-/// C++, for what was `given`.
+/// answers[i] by ask(i, workspace), or `unknown` without workers. `Settings`: of C++, for `given`.
 template <class Settings, class Given, class Answer, class Unknown, class Ask>
 ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& staff,
                           Answer* answers, std::size_t answer_size, const Unknown& unknown,

@@ -1,13 +1,10 @@
+#include <ist/contact_law.h>
+#include <ist/mass_properties.h>
 #include <cmath>
 #include <cstring>
 
-#include <ist/contact_law.h>
-#include <ist/mass_properties.h>
-
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"
-
-// Rigid bodies: mass, bounds, wrenches.
 
 namespace ist::c_api {
 namespace {

@@ -1,10 +1,7 @@
 #include "c_api/handles.h"
 
-#include <cstdio>
-#include <memory>
-
 #include <ist/asset_layout.h>
-#include <ist/types.h>
+#include <cstdio>
 
 #include "c_api/structs.h"
 #include "query/base/hooked_memory.h"

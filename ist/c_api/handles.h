@@ -1,13 +1,9 @@
 #pragma once
 
-#include <cstdint>
-#include <cstring>
-
 #include <ist/c.h>
 #include <ist/deadline.h>
 #include <ist/query.h>
-
-// The contents of the caller's handles.
+#include <cstring>
 
 namespace ist::c_api {
 
@@ -15,7 +11,6 @@ namespace ist::c_api {
 struct Allocator {
   MemoryHooks hooks;
 
-  /// Checks what the caller gave.
   static ist_status_t from(const ist_allocator_t* given, Allocator& out) noexcept;
 };
 
@@ -44,7 +39,6 @@ struct AssetHandle {
 };
 static_assert(sizeof(AssetHandle) <= sizeof(ist_asset_t) && sizeof(AssetView) == sizeof(void*));
 
-/// A workspace's handle.
 struct WorkspaceHandle {
   std::uint64_t mark;
   Workspace workspace;
@@ -67,7 +61,6 @@ inline const Deadline& deadline_in(const ist_deadline_t& deadline) noexcept {
   return *reinterpret_cast<const Deadline*>(&deadline);
 }
 
-/// The checked view behind a handle.
 inline ist_status_t view_of(const ist_asset_t* tree, AssetView& view) noexcept {
   if (tree == nullptr) return IST_NULL_POINTER;
   const AssetHandle& handle = AssetHandle::in(*tree);

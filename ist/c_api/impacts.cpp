@@ -1,6 +1,6 @@
 #include <ist/time_of_impact.h>
 
-#include "c_api/ask.h"
+#include "c_api/structs.h"
 #include "query/base/relative_pose.h"
 
 namespace ist::c_api {

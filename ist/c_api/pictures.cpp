@@ -1,8 +1,6 @@
-#include <ist/lenses.h>
-
-#include <cmath>
-
 #include <ist/asset_layout.h>
+#include <ist/lenses.h>
+#include <cmath>
 
 #include "c_api/structs.h"
 #include "query/asset/mesh_parts.h"

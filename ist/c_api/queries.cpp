@@ -1,9 +1,6 @@
-#include <algorithm>
-#include <span>
-
 #include <ist/query.h>
+#include <algorithm>
 
-#include "c_api/ask.h"
 #include "c_api/structs.h"
 #include "query/base/relative_pose.h"
 
@@ -12,7 +9,6 @@ namespace {
 
 using c_api::read;
 
-/// The worse of two.
 ist_status_t worse(ist_status_t a, ist_status_t b) noexcept {
   return std::min(a, b) < 0 ? std::min(a, b) : std::max(a, b);
 }
@@ -28,8 +24,7 @@ std::span<ContactPatch> room_of(const ist_contact_patches_t& given) noexcept {
   return {reinterpret_cast<ContactPatch*>(given.patches), given.capacity};
 }
 
-/// `ask(a, b, settings, workspace, patches)` answers ContactPatches. `status`: of the other
-/// arguments.
+/// `ask(a, b, settings, workspace, patches)` answers ContactPatches. `status`: of other arguments.
 template <class Solid, class Ask>
 ist_status_t find_patches(const ist_placed_t* a, const ist_placed_t* b,
                           const ist_contact_settings_t* given, ist_workspace_t* workspace,
@@ -71,7 +66,6 @@ ist_status_t find_overlap(const ist_placed_t* a, const ist_placed_t* b, ist_work
   });
 }
 
-/// Empties the outline.
 ist_status_t check_room(ist_outline_t* given) noexcept {
   const ist_status_t status = check_size(given);
   if (status != IST_OK) return status;

@@ -1,19 +1,13 @@
 #include <ist/c_scene.h>
 #include <ist/scene.h>
-#include <ist/types.h>
-
 #include <algorithm>
-#include <cstddef>
 #include <new>
 
 #include "c_api/structs.h"
 
-// Scenes in C.
-
 namespace ist::c_api {
 namespace {
 
-/// The object behind a handle.
 struct OwnedScene {
   explicit OwnedScene(const SceneSettings& settings) : scene(settings) {}
 

@@ -1,8 +1,7 @@
 #include <ist/raycast.h>
-
 #include <algorithm>
 
-#include "c_api/ask.h"
+#include "c_api/structs.h"
 
 // Rays and points: each by the function that asks one.
 

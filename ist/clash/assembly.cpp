@@ -1,18 +1,16 @@
 #include "clash/assembly.h"
 
 #include <fmt/format.h>
-
 #include <fnmatch.h>
+#include <ist/bake.h>
 #include <algorithm>
 #include <cmath>
 #include <set>
-#include <string_view>
-
-#include <ist/bake.h>
-#include <ist/types.h>
+#include <sstream>
 
 #include "base/thread_arena.h"
 #include "clash/sources.h"
+#include "library/csv_reader.h"
 #include "library/input_mesh.h"
 #include "library/settings/numbers.h"
 #include "mesh/import/source_file.h"
@@ -51,86 +49,63 @@ std::vector<Assembly::Rule> rules_of(ClashSource& source) {
   return rules;
 }
 
-std::vector<std::string_view> fields_of(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (;;) {
-    const std::size_t comma = line.find(',');
-    std::string_view field = line.substr(0, comma);
-    while (!field.empty() && field.front() == ' ') field.remove_prefix(1);
-    while (!field.empty() && (field.back() == ' ' || field.back() == '\r')) field.remove_suffix(1);
-    fields.push_back(field);
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
-  }
-}
-
 /// Rows of a sweep: a robot's joints by column; or a part's pose a line, lines of one id together.
 std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource& source,
                                       const std::vector<Pose>& still) {
-  const SourceFile file = read_source_file(path);
-  std::string_view text = without_byte_order_mark(file.bytes);
-  std::vector<std::string_view> header;
+  std::istringstream text(read_source_file(path).bytes);
+  CsvReader file(text, path);
+  std::vector<std::string> header, fields;
   std::vector<Assembly::Row> rows;
-  std::size_t line_number = 0;
-  const auto fault = [&](const std::string& what) {
-    throw Error(fmt::format("{}:{}: {}", path, line_number, what));
-  };
-  static const std::vector<std::string_view> kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
-  while (!text.empty()) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    ++line_number;
-    if (line.find_first_not_of(" \r,") == std::string_view::npos) continue;
-    const auto fields = fields_of(line);
+  static const std::vector<std::string> kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
+  while (file.next(fields)) {
+    if (std::all_of(fields.begin(), fields.end(), [](const auto& one) { return one.empty(); }))
+      continue;
     if (header.empty()) {
       header = fields;
-      if (std::set<std::string_view>(header.begin(), header.end()).size() != header.size())
-        fault("two columns have one name");
-      for (const std::string_view column : header)
+      if (std::set<std::string>(header.begin(), header.end()).size() != header.size())
+        file.fail("two columns have one name");
+      for (const std::string& column : header)
         if (!source.posed && column != "id" && column != "part" &&
             std::count(kPose.begin(), kPose.end(), column) == 0)
-          fault(fmt::format("unknown column '{}': write id,part,qw,qx,qy,qz,tx,ty,tz", column));
+          file.fail(fmt::format("unknown column '{}': write id,part,qw,qx,qy,qz,tx,ty,tz", column));
       if (!source.posed && header.size() != 9)
-        fault("write the columns id,part,qw,qx,qy,qz,tx,ty,tz");
+        file.fail("write the columns id,part,qw,qx,qy,qz,tx,ty,tz");
       continue;
     }
     if (fields.size() != header.size())
-      fault(fmt::format("{} fields, the first line has {}", fields.size(), header.size()));
+      file.fail(fmt::format("{} fields, the first line has {}", fields.size(), header.size()));
     std::string id = std::to_string(rows.size()), part;
     std::map<std::string, double> values;
     for (std::size_t k = 0; k < fields.size(); ++k) {
-      const std::string column(header[k]);
+      const std::string& column = header[k];
       if (column == "id" || (!source.posed && column == "part")) {
         (column == "id" ? id : part) = fields[k];
         continue;
       }
       const std::optional<double> value = parse_number(fields[k]);
       if (!value || !std::isfinite(*value))
-        fault(fmt::format("{}: '{}' is not a finite number", column, fields[k]));
+        file.fail(fmt::format("{}: '{}' is not a finite number", column, fields[k]));
       values[column] = *value;
     }
     if (source.posed) {
       try {
         rows.push_back({id, source.posed(values)});
       } catch (const Error& error) {
-        fault(error.what());
+        file.fail(error.what());
       }
       continue;
     }
     const auto named = std::find_if(source.parts.begin(), source.parts.end(),
                                     [&](const auto& one) { return one.name == part; });
-    if (named == source.parts.end()) fault(fmt::format("no part is called '{}'", part));
+    if (named == source.parts.end()) file.fail(fmt::format("no part is called '{}'", part));
     if (rows.empty() || rows.back().name != id) rows.push_back({id, still});
     Pose& pose = rows.back().poses[static_cast<std::size_t>(named - source.parts.begin())];
-    for (std::size_t k = 0; k < 7; ++k)
-      (k < 4 ? pose.q[k] : pose.t[k - 4]) = values[std::string(kPose[k])];
+    for (std::size_t k = 0; k < 7; ++k) (k < 4 ? pose.q[k] : pose.t[k - 4]) = values[kPose[k]];
   }
   if (rows.empty()) throw Error(path + ": holds no poses");
   return rows;
 }
 
-/// All combinations of the joints' values.
 std::vector<Assembly::Row> joint_rows(const std::vector<JointRange>& ranges,
                                       const ClashSource& source) {
   constexpr std::size_t kMost = 100'000;

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include <ist/asset.h>
 
 #include "clash/clash.h"

@@ -1,11 +1,7 @@
 #include <fmt/format.h>
 #include <minizip/zip.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <string_view>
-#include <utility>
 
 #include "clash/report.h"
 #include "mesh/import/xml_document.h"

@@ -1,27 +1,22 @@
 #include "clash/clash.h"
 
-#include <tbb/enumerable_thread_specific.h>
-
 #include <fmt/format.h>
+#include <ist/mass_properties.h>
+#include <ist/pose_eigen.h>
+#include <ist/raycast.h>
+#include <ist/scene.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <algorithm>
 #include <cmath>
 #include <deque>
 #include <fstream>
 #include <map>
 #include <mutex>
-#include <optional>
 #include <tuple>
-#include <utility>
-
-#include <ist/mass_properties.h>
-#include <ist/pose_eigen.h>
-#include <ist/raycast.h>
-#include <ist/scene.h>
-#include <ist/types.h>
 
 #include "base/thread_arena.h"
-#include "clash/world_mesh.h"
 #include "mesh/import/source_file.h"
+#include "query/exact/kept_mesh.h"
 
 namespace ist {
 namespace {
@@ -38,6 +33,72 @@ struct Scratch {
 
 double reach(const Bounds& box) {
   return std::max(box.lower.cwiseAbs().maxCoeff(), box.upper.cwiseAbs().maxCoeff());
+}
+
+/// A part's kept mesh where it stands.
+struct WorldMesh {
+  /// A triangle's plane, seen from either side: n · x = offset.
+  struct Plane {
+    double key;  ///< the same for equal planes, and else for hardly any two
+    Vector3d normal;
+    double offset;
+  };
+
+  /// `origin`, `size`: of the whole assembly.
+  WorldMesh(const PlacedAsset& solid, const Vector3d& origin, double size) {
+    const AssetHeader& asset = solid.asset.header();
+    const MeshTree mesh = mesh_of(solid);
+    const Eigen::Isometry3d place = to_isometry(solid.pose);
+    const double unit = std::ldexp(1.0, asset.exponent);
+    for (std::uint32_t v = 0; v < mesh.header->vertex_count; ++v) {
+      const Vector3d own = unit * vector(mesh.vertex(v)) + Vector3d(asset.centre);
+      vertices.emplace_back(place * Vector3d(solid.scale * own));
+    }
+    // No direction of a part is like it.
+    const Vector3d across(0.267, 0.534, 0.802);
+    for (std::uint32_t b = 0; b < mesh.count; ++b) {
+      const MeshBlock& block = mesh.blocks[b];
+      for (std::uint32_t t = 0; t < block.triangles; ++t) {
+        const auto corner = [&](int c) -> const Vector3d& {
+          return vertices[block.vertex[block.corner[c][t]]];
+        };
+        Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0));
+        const double length = normal.norm();
+        if (!(length > 0)) continue;
+        normal /= length;
+        for (const double side : {1.0, -1.0}) {
+          const Vector3d n = side * normal;
+          const double offset = n.dot(corner(0) - origin);
+          planes.push_back({size * n.dot(across) + offset, n, offset});
+        }
+      }
+    }
+    std::sort(planes.begin(), planes.end(),
+              [](const Plane& x, const Plane& y) { return x.key < y.key; });
+    const auto same = [&](const Plane& x, const Plane& y) {
+      return y.key - x.key <= 1e-12 * size && (x.normal - y.normal).norm() <= 1e-12;
+    };
+    planes.erase(std::unique(planes.begin(), planes.end(), same), planes.end());
+  }
+
+  std::vector<Vector3d> vertices;
+  std::vector<Plane> planes;  ///< by key
+};
+
+constexpr double kParallel = 1e-7;  ///< of normals
+
+/// Whether a plane of one lies within this [u] of one of the other: of one assembly of this size.
+bool have_common_plane(const WorldMesh& a, const WorldMesh& b, double size, double within) {
+  const double room = within + kParallel * size;  // of keys
+  std::size_t first = 0;
+  for (const WorldMesh::Plane& plane : a.planes) {
+    while (first < b.planes.size() && b.planes[first].key < plane.key - room) ++first;
+    for (std::size_t i = first; i < b.planes.size() && b.planes[i].key <= plane.key + room; ++i)
+      if (std::abs(b.planes[i].offset - plane.offset) <= within &&
+          (b.planes[i].normal - plane.normal).norm() <= kParallel)
+        return true;
+  }
+  return false;
 }
 
 /// A part as pairs see it.
@@ -75,11 +136,7 @@ struct Placed {
 };
 using PlacedParts = std::deque<Placed>;
 
-PenetrationSettings exactly() {
-  PenetrationSettings exact;
-  exact.measure = Measure::exact;
-  return exact;
-}
+constexpr PenetrationSettings kExactly = {.measure = Measure::exact};
 
 /// Pairs whose boxes meet, sorted.
 std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& parts,
@@ -87,12 +144,11 @@ std::vector<std::pair<std::size_t, std::size_t>> candidates(const PlacedParts& p
   double margin = 0;
   for (const Placed& part : parts) margin = std::max(margin, part.margin);
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
-  SceneSettings settings;
-  settings.max_bodies = std::max<std::size_t>(parts.size(), 1);
-  settings.workspace_capacity = 1;
+  SceneSettings settings = {.max_bodies = std::max<std::size_t>(parts.size(), 1),
+                            .workspace_capacity = 1};
   for (bool complete = false; !complete; settings.max_pairs *= 8) {
     Scene scene(settings);
-    scene.set_rule(0, 0, {SceneAnswer::boxes, exactly(), 2 * margin});
+    scene.set_rule(0, 0, {SceneAnswer::boxes, kExactly, 2 * margin});
     for (std::uint32_t i = 0; i < parts.size(); ++i)
       scene.add({.number = i, .solid = parts[i].part.solid});
     const SceneStep step = scene.step();
@@ -109,13 +165,11 @@ Vector3d unit(const Vector3d& v) {
   return length > 0 ? Vector3d(v / length) : Vector3d::Zero();
 }
 
-/// Sums over patches.
 struct Sums {
   double volume = 0, area = 0;  ///< [u³], [u²] the patches' areas
   Vector3d force = Vector3d::Zero();
 
-  /// Faces that face one direction have more than a quarter of their area along it; those of a pin
-  /// in its hole cancel.
+  /// Faces of one direction have more than a quarter of their area along it; a pin's cancel.
   bool has_way_out() const { return force.norm() > area / 4; }
   double depth() const { return volume / (has_way_out() ? force.norm() : area); }
 };
@@ -164,7 +218,7 @@ class PairQuery {
   /// Sums of the overlap with B at this place. `depth`: of the deepest connected part.
   Sums patches(const PlacedAsset& solid_b, Penetration& found, double* depth = nullptr) {
     const ContactPatches all =
-        contact_patches(a_.part.solid, solid_b, exactly(), scratch_.workspace, scratch_.patches);
+        contact_patches(a_.part.solid, solid_b, kExactly, scratch_.workspace, scratch_.patches);
     found = all.penetration;
     std::map<std::uint64_t, Sums> parts;
     Sums whole;
@@ -186,7 +240,7 @@ class PairQuery {
 
   /// The overlap once B has moved.
   Penetration aside(const Vector3d& by) {
-    return penetration(a_.part.solid, moved(by), exactly(), scratch_.workspace);
+    return penetration(a_.part.solid, moved(by), kExactly, scratch_.workspace);
   }
 
   bool may_be_flush() const {
@@ -228,12 +282,9 @@ class PairQuery {
   }
 
   Separation distance(double limit) {
-    SeparationSettings settings;
-    settings.max_distance = limit;
-    return separation(a_.part.solid, b_.part.solid, settings, scratch_.workspace);
+    return separation(a_.part.solid, b_.part.solid, {.max_distance = limit}, scratch_.workspace);
   }
 
-  /// The solids touch exactly.
   bool touches(const Penetration& found, Clash& out) {
     out.kind = ClashKind::touching;
     out.direction = found.contact_normal;

@@ -1,13 +1,9 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
+#include <ist/query.h>
 #include <functional>
-#include <span>
 #include <string>
 #include <vector>
-
-#include <ist/query.h>
 
 namespace ist {
 
@@ -39,8 +35,8 @@ struct ClashSettings {
 
 enum class ClashKind { overlapping, touching, apart };
 
-/// Two parts that overlap, touch, or are nearer than the clearance: a before b. Lengths are [u], in
-/// the world's frame.
+/// Two parts that overlap, touch, or are nearer than the clearance: a before b. In [u], world
+/// frame.
 struct Clash {
   std::size_t a = 0, b = 0;
   ClashKind kind = ClashKind::apart;
@@ -73,8 +69,7 @@ using PairFilter = std::function<bool(std::size_t a, std::size_t b)>;
 std::vector<Clash> find_clashes(std::span<const ClashPart> parts, const ClashSettings& settings,
                                 const PairFilter& ignored = {});
 
-/// Whether x is the worse clash of two between the same parts: by kind, then volume, area,
-/// nearness.
+/// Whether x is the worse of two clashes of the same parts: by kind, volume, area, nearness.
 bool is_worse(const Clash& x, const Clash& y);
 
 }  // namespace ist

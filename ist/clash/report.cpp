@@ -1,12 +1,10 @@
 #include "clash/report.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-
-#include <ist/types.h>
 
 #include "library/text.h"
 

@@ -2,18 +2,12 @@
 
 #include <nlohmann/json.hpp>
 #include <set>
-#include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "clash/clash.h"
 
-// Clashes as JSON, as CSV, as text, and as BCF 2.1.
-
 namespace ist {
 
-/// The parts of a report besides the pairs.
 struct ClashReport {
   using Names = std::pair<std::string, std::string>;  ///< of two parts, sorted
 
@@ -32,7 +26,6 @@ struct ClashReport {
   const char* verdict(const Clash& clash) const;
   /// It overlaps, and not certainly below the tolerance.
   bool is_clash(const Clash& clash) const;
-  /// Clashes that no earlier run had.
   std::size_t new_clashes() const;
   std::vector<Names> resolved() const;
 };

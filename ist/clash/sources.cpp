@@ -1,16 +1,13 @@
 #include "clash/sources.h"
 
 #include <fmt/format.h>
-
+#include <ist/pose_eigen.h>
 #include <toml++/toml.h>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <tuple>
 #include <utility>
-
-#include <ist/pose_eigen.h>
-#include <ist/types.h>
 
 #include "library/settings/spelling.h"
 #include "mesh/import/source_file.h"

@@ -1,11 +1,8 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <functional>
 #include <map>
-#include <string>
-#include <vector>
-
-#include <ist/mesh.h>
 
 #include "clash/assembly.h"
 

@@ -1,20 +1,20 @@
 #include "library/asset_summary.h"
 
 #include <fmt/format.h>
-
+#include <ist/asset_layout.h>
+#include <ist/mass_properties.h>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
-#include <ist/asset_layout.h>
-#include <ist/mass_properties.h>
 #include "bake/predict/trial_poses.h"
 #include "library/settings/spelling.h"
 #include "library/text.h"
 
 namespace ist {
 namespace {
+
+using Json = nlohmann::ordered_json;
 
 constexpr double kCoarse = 0.4;  // covered by inner spheres: less says that walls are thinner
 constexpr double kEnough = 0.5;
@@ -26,6 +26,116 @@ constexpr double kRoom = 1.9;
 std::uint64_t round_count(double count) {
   const double unit = std::pow(10.0, std::max(0.0, std::floor(std::log10(count)) - 1));
   return static_cast<std::uint64_t>(std::ceil(count / unit) * unit);
+}
+
+/// Whether the mode knows the largest sphere that would fit; the header of others says 1.
+bool keeps_bound(GridMode mode) { return mode == GridMode::banded; }
+
+/// Keys of JSON for kOverlapClassNames, in ASCII.
+constexpr std::array<const char*, kOverlapClasses> kOverlapClassKeys = {
+    "contained", "10-50%", "1-10%", "0.1-1%", "0.01-0.1%"};
+
+std::string hex(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
+
+Json tree_json(const TreeHeader& tree, double scale) {
+  return {{"spheres", tree.sphere_count},
+          {"levels", tree.level_count},
+          {"volume_sum", tree.volume_sum * scale * scale * scale},
+          {"root_radius", tree.root[3] * scale},
+          {"mean_radius", tree.mean_radius * scale},
+          {"overlap", tree.overlap}};
+}
+
+/// Empty where nothing was predicted.
+Json predicted_json(const AssetHeader& h) {
+  Json result = Json::object();
+  if (h.predicted_poses == 0) return result;
+  result["poses"] = h.predicted_poses;
+  for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
+    result["error"][kOverlapClassKeys[k]] = h.predicted_error[k];
+  return result;
+}
+
+/// The requested error and the result; empty if no error was requested.
+Json target_json(const AssetView& tree) {
+  Json result = Json::object();
+  const PredictedErrors errors = tree.predicted_errors();
+  if (errors.target_error == 0) return result;
+  result["target_error"] = errors.target_error;
+  result["target_overlap"] = errors.target_overlap;
+  result["target_met"] = errors.target_met();
+  result["measured_error"] =
+      errors.measured_poses > 0 ? Json(errors.measured_error) : Json(nullptr);
+  result["measured_poses"] = errors.measured_poses;
+  result["search_stop"] = name_of(static_cast<StopReason>(tree.header().search_stop));
+  result["worst_partner"] =
+      errors.measured_poses > 0 ? Json(name_of(errors.worst_partner)) : Json(nullptr);
+  return result;
+}
+
+const char* why_missed(StopReason stop) {
+  constexpr const char* kCount = "no more spheres are allowed";
+  return word_of(stop, {kCount, "the requested coverage ended the packing",
+                        "the requested smallest radius ended the packing",
+                        "the time limit ended the search", kCount, "no more spheres fit"});
+}
+
+/// The file ends with the mesh.
+std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
+
+Json mesh_json(const AssetView& tree) {
+  return {{"state", name_of(tree.mesh_state())},
+          {"triangles", tree.mesh_triangles()},
+          {"bytes", mesh_bytes(tree.header())},
+          {"error", tree.has_mesh() ? Json(tree.mesh_error()) : Json(nullptr)},
+          {"self_overlap_volume", tree.self_overlap_volume()}};
+}
+
+std::string describe_mesh(const AssetView& tree) {
+  if (!tree.has_mesh())
+    return tree.mesh_state() == MeshState::unresolved ? "none: parts of the mesh overlap" : "none";
+  const char* const whose = tree.mesh_state() == MeshState::own ? "all of the mesh"
+                            : tree.mesh_state() == MeshState::resolved
+                                ? "of the union of the mesh's parts"
+                                : "made from a signed distance";
+  return fmt::format("{} triangles, {}, within {:.4g} u of the solid's surface, {} bytes",
+                     grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
+                     grouped(mesh_bytes(tree.header())));
+}
+
+Json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Json mass_json(const AssetView& tree) {
+  const MassProperties mass = mass_properties(tree);
+  const Eigen::Matrix3d& m = mass.inertia;
+  return {{"volume", mass.volume},
+          {"volume_error", mass.volume_error},
+          {"centre_of_mass", json_of(mass.centre_of_mass)},
+          {"centre_of_mass_error", mass.centre_of_mass_error},
+          {"inertia", {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)}},
+          {"inertia_error", mass.inertia_error}};
+}
+
+Json bounds_json(const AssetView& tree) {
+  const Bounds held = bounds(tree);
+  return {{"lower", json_of(held.lower)},
+          {"upper", json_of(held.upper)},
+          {"ball_centre", json_of(held.centre)},
+          {"ball_radius", held.radius}};
+}
+
+std::string text_of(const Eigen::Vector3d& v) {
+  return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z());
+}
+
+Json details_json(const AssetHeader& h, double scale) {
+  Json list = Json::array();
+  for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
+    const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
+    list.push_back({{"protrusion", detail.protrusion * scale},
+                    {"matched_tree", tree_json(detail.matched_tree, scale)}});
+  }
+  return list;
 }
 
 }  // namespace
@@ -57,123 +167,6 @@ std::string describe_coarseness(const AssetView& tree) {
     return coarse + fmt::format("about {} spheres are enough", grouped(*enough));
   return coarse + "no number of spheres is enough. Bake the mesh alone (--mesh-only)";
 }
-
-namespace {
-
-/// Whether the mode knows the largest sphere that would fit; the header of others says 1.
-bool keeps_bound(GridMode mode) { return mode == GridMode::banded; }
-
-/// Keys of JSON for kOverlapClassNames, in ASCII.
-constexpr std::array<const char*, kOverlapClasses> kOverlapClassKeys = {
-    "contained", "10-50%", "1-10%", "0.1-1%", "0.01-0.1%"};
-
-std::string hex(std::uint64_t hash) { return fmt::format("{:016x}", hash); }
-
-nlohmann::ordered_json tree_json(const TreeHeader& tree, double scale) {
-  return {{"spheres", tree.sphere_count},
-          {"levels", tree.level_count},
-          {"volume_sum", tree.volume_sum * scale * scale * scale},
-          {"root_radius", tree.root[3] * scale},
-          {"mean_radius", tree.mean_radius * scale},
-          {"overlap", tree.overlap}};
-}
-
-/// Empty where nothing was predicted.
-nlohmann::ordered_json predicted_json(const AssetHeader& h) {
-  nlohmann::ordered_json result = nlohmann::ordered_json::object();
-  if (h.predicted_poses == 0) return result;
-  result["poses"] = h.predicted_poses;
-  for (std::uint32_t k = 0; k < kOverlapClasses; ++k)
-    result["error"][kOverlapClassKeys[k]] = h.predicted_error[k];
-  return result;
-}
-
-/// The requested error and the result; empty if no error was requested.
-nlohmann::ordered_json target_json(const AssetView& tree) {
-  nlohmann::ordered_json result = nlohmann::ordered_json::object();
-  const PredictedErrors errors = tree.predicted_errors();
-  if (errors.target_error == 0) return result;
-  result["target_error"] = errors.target_error;
-  result["target_overlap"] = errors.target_overlap;
-  result["target_met"] = errors.target_met();
-  result["measured_error"] = errors.measured_poses > 0
-                                 ? nlohmann::ordered_json(errors.measured_error)
-                                 : nlohmann::ordered_json(nullptr);
-  result["measured_poses"] = errors.measured_poses;
-  result["search_stop"] = name_of(static_cast<StopReason>(tree.header().search_stop));
-  result["worst_partner"] = errors.measured_poses > 0
-                                ? nlohmann::ordered_json(name_of(errors.worst_partner))
-                                : nlohmann::ordered_json(nullptr);
-  return result;
-}
-
-const char* why_missed(StopReason stop) {
-  constexpr const char* kCount = "no more spheres are allowed";
-  return word_of(stop, {kCount, "the requested coverage ended the packing",
-                        "the requested smallest radius ended the packing",
-                        "the time limit ended the search", kCount, "no more spheres fit"});
-}
-
-/// The file ends with the mesh.
-std::uint64_t mesh_bytes(const AssetHeader& h) { return h.mesh == 0 ? 0 : h.file_bytes - h.mesh; }
-
-nlohmann::ordered_json mesh_json(const AssetView& tree) {
-  return {{"state", name_of(tree.mesh_state())},
-          {"triangles", tree.mesh_triangles()},
-          {"bytes", mesh_bytes(tree.header())},
-          {"error", tree.has_mesh() ? nlohmann::ordered_json(tree.mesh_error())
-                                    : nlohmann::ordered_json(nullptr)},
-          {"self_overlap_volume", tree.self_overlap_volume()}};
-}
-
-std::string describe_mesh(const AssetView& tree) {
-  if (!tree.has_mesh())
-    return tree.mesh_state() == MeshState::unresolved ? "none: parts of the mesh overlap" : "none";
-  const char* const whose = tree.mesh_state() == MeshState::own ? "all of the mesh"
-                            : tree.mesh_state() == MeshState::resolved
-                                ? "of the union of the mesh's parts"
-                                : "made from a signed distance";
-  return fmt::format("{} triangles, {}, within {:.4g} u of the solid's surface, {} bytes",
-                     grouped(tree.mesh_triangles()), whose, tree.mesh_error(),
-                     grouped(mesh_bytes(tree.header())));
-}
-
-nlohmann::ordered_json json_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-nlohmann::ordered_json mass_json(const AssetView& tree) {
-  const MassProperties mass = mass_properties(tree);
-  const Eigen::Matrix3d& m = mass.inertia;
-  return {{"volume", mass.volume},
-          {"volume_error", mass.volume_error},
-          {"centre_of_mass", json_of(mass.centre_of_mass)},
-          {"centre_of_mass_error", mass.centre_of_mass_error},
-          {"inertia", {m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)}},
-          {"inertia_error", mass.inertia_error}};
-}
-
-nlohmann::ordered_json bounds_json(const AssetView& tree) {
-  const Bounds held = bounds(tree);
-  return {{"lower", json_of(held.lower)},
-          {"upper", json_of(held.upper)},
-          {"ball_centre", json_of(held.centre)},
-          {"ball_radius", held.radius}};
-}
-
-std::string text_of(const Eigen::Vector3d& v) {
-  return fmt::format("({:.9g}, {:.9g}, {:.9g})", v.x(), v.y(), v.z());
-}
-
-nlohmann::ordered_json details_json(const AssetHeader& h, double scale) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (std::uint32_t i = 1; i <= h.detail_count; ++i) {
-    const DetailLevel& detail = at<DetailLevel>(h, h.details)[i - 1];
-    list.push_back({{"protrusion", detail.protrusion * scale},
-                    {"matched_tree", tree_json(detail.matched_tree, scale)}});
-  }
-  return list;
-}
-
-}  // namespace
 
 std::string describe_asset(const AssetView& tree) {
   const AssetHeader& h = tree.header();
@@ -255,25 +248,22 @@ std::string describe_asset(const AssetView& tree) {
   return text;
 }
 
-nlohmann::ordered_json asset_json(const AssetView& tree) {
+Json asset_json(const AssetView& tree) {
   const AssetHeader& h = tree.header();
   const double scale = std::ldexp(1.0, h.exponent);
   const auto grid = static_cast<GridMode>(h.asked_grid);
-  const auto kept = [&](double ratio) {
-    return keeps_bound(grid) ? nlohmann::ordered_json(ratio) : nlohmann::ordered_json();
-  };
+  const auto kept = [&](double ratio) { return keeps_bound(grid) ? Json(ratio) : Json(); };
   const std::optional<std::uint64_t> enough = enough_spheres(tree);
-  nlohmann::ordered_json json = {
+  Json json = {
       {"format", fmt::format("{}.{}", h.format_major, h.format_minor)},
       {"bytes", h.file_bytes},
       {"content_hash", hex(h.content_hash)},
       {"mesh_hash", hex(h.mesh_hash)},
       {"spheres", h.sphere_count},
       {"coverage", h.coverage},
-      {"enough_spheres", enough ? nlohmann::ordered_json(*enough)
-                         : h.sphere_count > 0 && h.coverage >= kCoarse
-                             ? nlohmann::ordered_json(h.sphere_count)
-                             : nlohmann::ordered_json()},
+      {"enough_spheres", enough                                        ? Json(*enough)
+                         : h.sphere_count > 0 && h.coverage >= kCoarse ? Json(h.sphere_count)
+                                                                       : Json()},
       {"kept_ratio_worst", kept(h.kept_ratio_worst)},
       {"kept_ratio_median", kept(h.kept_ratio_median)},
       {"stop", name_of(static_cast<StopReason>(h.stop_reason))},

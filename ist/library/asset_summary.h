@@ -1,11 +1,8 @@
 #pragma once
 
-#include <cstdint>
+#include <ist/asset.h>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
-
-#include <ist/asset.h>
 
 namespace ist {
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/mesh.h>
-#include <ist/types.h>
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 #include <nlohmann/json.hpp>
@@ -12,13 +11,11 @@
 #include <sys/stat.h>
 #include <algorithm>
 #include <fstream>
-#include <span>
 #include <system_error>
 #include <type_traits>
 #include <utility>
 
 #include "bake/asset/atomic_file.h"
-#include "library/bake_revision.h"
 #include "library/text.h"
 #include "mesh/mesh_files.h"
 

@@ -1,14 +1,9 @@
 #pragma once
 
 #include <ist/bake.h>
-
 #include <atomic>
-#include <cstdint>
 #include <filesystem>
-#include <optional>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "library/job.h"
 
@@ -28,8 +23,8 @@ struct CacheKey {
   bool operator==(const CacheKey&) const = default;
 };
 
-/// Hashes the mesh's bytes, those of the files that it refers to, the settings, the asset's format
-/// and the revision of the bake; name, path, device and threads do not count. Throws Error if a
+/// Hashes the bytes of the mesh and of the files that it refers to, the settings, the asset's
+/// format and the revision of the bake, but not name, path, device and threads. Throws Error if a
 /// file cannot be read.
 CacheKey cache_key(const Job& job);
 
@@ -39,8 +34,8 @@ struct CacheEntry {
   std::optional<double> confidence = {};  ///< RepairQuality's, of a mesh that was not closed
 };
 
-/// An entry but for its asset as a line of JSON: the key, what was found about the mesh, and a hash
-/// of these and of the asset.
+/// An entry without its asset as a line of JSON: key, notes, confidence; a hash of these and the
+/// asset.
 std::string line_of(const CacheKey& key, const CacheEntry& entry);
 /// The entry of such a line. Throws an exception that says what is wrong where the line is damaged,
 /// or is another key's or another asset's.
@@ -52,8 +47,8 @@ class AssetCache {
   /// none are. Makes the folder; throws Error where that cannot be.
   explicit AssetCache(std::filesystem::path folder, std::uint64_t limit = 0);
 
-  /// Nothing where there is no such entry, or it is damaged: `damage` then says how. Marks it as
-  /// used. From any thread.
+  /// Nothing where there is no such entry or it is damaged, as `damage` says. Marks it used.
+  /// Thread-safe.
   std::optional<CacheEntry> find(const CacheKey& key, std::string& damage) const;
 
   /// In place of an entry that may be there. Throws Error. From any thread.
@@ -67,7 +62,6 @@ class AssetCache {
   std::atomic<std::uint64_t> stored_ = 0;  ///< [bytes] since the limit was last looked after
 };
 
-/// The size of a cache.
 struct CacheUse {
   std::uint64_t entries = 0, bytes = 0;
   std::uint64_t left_over = 0, left_over_bytes = 0;  ///< files that a killed program left
@@ -84,5 +78,12 @@ struct Pruned {
 /// Removes what a killed program left an hour ago or more, and, until `most` bytes are left, the
 /// entries that were not used for longest; files that are no cache's stay. Throws Error as above.
 Pruned prune_cache(const std::filesystem::path& folder, std::optional<std::uint64_t> most);
+
+/// Raise it with every change by which some mesh and settings give other bytes than before: older
+/// entries of a cache are then skipped.
+/// The tests compare the hash below with that of tests/soak/bake_hashes.csv, whose hashes of assets
+/// change then too: after writing new ones there, raise the one and copy the other.
+inline constexpr std::uint32_t kBakeRevision = 9;
+inline constexpr std::uint64_t kBakeHashesOfRevision = 1833951002004931908u;
 
 }  // namespace ist

@@ -1,14 +1,12 @@
 #include "library/exported_spheres.h"
 
 #include <fmt/format.h>
-
+#include <ist/asset_layout.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <iterator>
 #include <limits>
-
-#include <ist/asset_layout.h>
 
 namespace ist {
 namespace {

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <span>
-#include <string>
-#include <vector>
-
 #include <ist/asset.h>
+#include <Eigen/Core>
+#include <vector>
 
 namespace ist {
 

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 #include <fnmatch.h>
-
 #include <ist/types.h>
 #include <algorithm>
-#include <functional>
 #include <iterator>
 #include <system_error>
 

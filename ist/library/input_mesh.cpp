@@ -1,8 +1,7 @@
 #include "library/input_mesh.h"
 
-#include <utility>
-
 #include <ist/types.h>
+#include <utility>
 
 namespace ist {
 

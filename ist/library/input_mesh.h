@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include <ist/mesh.h>
 
 #include "library/settings/bake_settings.h"
@@ -14,8 +11,8 @@ struct InputMesh {
   ClosedMesh closed;
 };
 
-/// close_mesh() as `settings` have it; where it throws and a wrap is asked for, wrap_mesh(), with a
-/// note of why. Throws Error.
+/// close_mesh() by `settings`; where it throws and they ask for a wrap, wrap_mesh(), noting why.
+/// Throws Error.
 ClosedMesh close_as_asked(TriangleMesh mesh, const std::string& name, const MeshSettings& settings);
 
 /// Loads, scales, turns and closes a mesh. Throws Error.

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <optional>
-#include <string>
-
 #include "library/settings/bake_settings.h"
 #include "robots/description/robot_model.h"
 
@@ -15,7 +12,6 @@ struct Demands {
   double confidence = 0;  ///< at least; of a mesh that had to be closed
 };
 
-/// One asset to bake.
 struct Job {
   std::string name;                           ///< of the asset: NAME.ist
   std::string mesh;                           ///< path
@@ -23,6 +19,37 @@ struct Job {
   std::string urdf = {};                      ///< the robot's, for messages
   BakeSettings settings;
   Demands demands;
+};
+
+enum class JobStatus {
+  baked,      ///< and written
+  cached,     ///< taken from the cache
+  failed,     ///< `message` says why; nothing was written
+  not_baked,  ///< the run was interrupted before or meanwhile; nothing was written
+};
+const char* name_of(JobStatus status) noexcept;
+
+struct JobResult {
+  std::string name, mesh;
+  JobStatus status = JobStatus::not_baked;
+  std::string message;  ///< of a failure
+  double seconds = 0;   ///< wall time from beginning to end
+  std::vector<std::string> warnings;
+
+  // Filled in if an asset was written, else empty.
+  std::string asset;         ///< path
+  std::string content_hash;  ///< AssetHeader's, in 16 digits
+  std::uint64_t bytes = 0, spheres = 0;
+  double coverage = 0;                             ///< share of the solid's volume
+  double volume = 0, protrusion = 0;               ///< as AssetView has them
+  std::string mesh_state;                          ///< name_of(AssetView::mesh_state())
+  std::uint64_t mesh_triangles = 0;                ///< kept for exact queries
+  double mesh_error = 0, self_overlap_volume = 0;  ///< as AssetView has them
+  std::optional<double> target_error, error;  ///< asked for and measured, relative; see ErrorTarget
+  std::optional<bool> target_met;
+  std::optional<double> confidence;  ///< RepairQuality's, of a mesh that was repaired or wrapped
+
+  bool done() const { return status == JobStatus::baked || status == JobStatus::cached; }
 };
 
 }  // namespace ist

@@ -1,14 +1,12 @@
 #include "library/job_queue.h"
 
 #include <ist/types.h>
-
 #include <unistd.h>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numeric>
-#include <string>
 #include <system_error>
 #include <utility>
 
@@ -26,7 +24,6 @@ std::optional<std::uint64_t> number_in(const fs::path& path) {
   return file >> value ? std::optional(value) : std::nullopt;  // "max" is none
 }
 
-/// MemAvailable of the machine.
 std::uint64_t machine_memory() {
   std::ifstream file("/proc/meminfo");
   std::string name;

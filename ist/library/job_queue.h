@@ -2,10 +2,7 @@
 
 #include <condition_variable>
 #include <cstddef>
-#include <cstdint>
 #include <mutex>
-#include <optional>
-#include <vector>
 
 #include "library/job.h"
 
@@ -14,8 +11,7 @@ namespace ist {
 /// [bytes] that this process may still take: of the machine, and of the control groups it is in.
 std::uint64_t available_memory();
 
-/// [bytes] that a job takes at most while it runs, by its mesh file's size and its sphere count: a
-/// guess on the safe side.
+/// [bytes] that a job takes at most, by its mesh file's size and sphere count: a safe guess.
 std::uint64_t memory_of(const Job& job);
 
 /// Places for bakes on the GPUs of this machine. For many threads.

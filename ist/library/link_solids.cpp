@@ -3,9 +3,7 @@
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
 #include <ist/raycast.h>
-#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -42,11 +40,9 @@ std::string LinkSolids::add(const ClosedMesh* mesh, std::span<const CoverSphere>
 
 bool LinkSolids::overlap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const {
   if (!assets_[a] || !assets_[b]) return true;
-  PenetrationSettings exact;
-  exact.measure = Measure::exact;
   const Penetration found = penetration(PlacedSolid(assets_[a]->view(), Pose{}),
-                                        PlacedSolid(assets_[b]->view(), to_pose(b_in_a)), exact,
-                                        workspaces_->each.local());
+                                        PlacedSolid(assets_[b]->view(), to_pose(b_in_a)),
+                                        {.measure = Measure::exact}, workspaces_->each.local());
   return found.status != QueryStatus::ok || found.volume_min > 0;
 }
 

@@ -1,15 +1,9 @@
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cstddef>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
-
 #include <ist/asset.h>
 #include <ist/cover_spheres.h>
 #include <ist/query.h>
+#include <Eigen/Geometry>
 
 namespace ist {
 

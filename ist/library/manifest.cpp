@@ -1,19 +1,15 @@
 #include "library/manifest.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <toml++/toml.h>
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <set>
 #include <sstream>
-#include <string_view>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "library/glob.h"
 #include "library/settings/numbers.h"

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "library/job.h"
 #include "library/robot_assets.h"
 

@@ -1,11 +1,9 @@
 #include "library/robot_assets.h"
 
 #include <fmt/format.h>
-
+#include <ist/types.h>
 #include <algorithm>
 #include <cstdlib>
-
-#include <ist/types.h>
 
 #include "library/settings/spelling.h"
 

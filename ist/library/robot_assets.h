@@ -1,9 +1,6 @@
 #pragma once
 
-#include <map>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "library/job.h"
 #include "robots/description/package_paths.h"

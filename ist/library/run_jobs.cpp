@@ -3,9 +3,6 @@
 #include <fmt/format.h>
 #include <ist/asset_layout.h>
 #include <ist/gpu.h>
-#include <ist/types.h>
-#include <nlohmann/json.hpp>
-
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <algorithm>
@@ -14,7 +11,7 @@
 #include <condition_variable>
 #include <fstream>
 #include <new>
-#include <string_view>
+#include <nlohmann/json.hpp>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -200,7 +197,6 @@ class Run {
 
   std::size_t at_once() const { return at_once_; }
 
-  /// The loop of each thread.
   void work() {
     while (const std::optional<std::size_t> job = queue_.take()) {
       JobResult result = result_of(*job);
@@ -219,8 +215,7 @@ class Run {
     queue_.close();
   }
 
-  /// Collects the jobs that ended since the last call, after a short wait; false: those were the
-  /// last.
+  /// Waits a little and collects the jobs that ended since the last call; false: no more follow.
   bool wait(std::vector<std::pair<std::size_t, JobResult>>& ended) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, std::chrono::milliseconds(100),

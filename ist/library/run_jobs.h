@@ -2,20 +2,13 @@
 
 #include <ist/asset.h>
 #include <ist/bake.h>
-
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "library/cache.h"
 #include "library/job.h"
-#include "library/result.h"
 
 namespace ist {
 
@@ -25,8 +18,7 @@ class OutputRecord {
  public:
   explicit OutputRecord(const std::filesystem::path& folder);
 
-  /// The asset NAME.ist, if it is the one that was written from what the key stands for. From any
-  /// thread.
+  /// The asset NAME.ist, if it was written from what the key stands for. Thread-safe.
   std::optional<CacheEntry> find(const std::string& name, const CacheKey& key) const;
 
   /// From any thread. Throws Error.

@@ -1,12 +1,8 @@
 #pragma once
 
-#include <cstdint>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
 #include "library/job.h"
-#include "library/result.h"
 
 namespace ist {
 
@@ -31,7 +27,6 @@ struct Summary {
   bool complete() const;  ///< every asset was baked or cached
 };
 
-/// The hash of all names and settings.
 std::uint64_t hash_of_library(const std::vector<Job>& jobs);
 
 /// An entry of `assets` of the next.

@@ -1,7 +1,6 @@
 #include "library/text.h"
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
 
 #include "library/settings/spelling.h"

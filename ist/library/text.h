@@ -1,12 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
-#include <nlohmann/json_fwd.hpp>
-#include <string>
-
 #include <ist/bake.h>
 #include <ist/query.h>
+#include <nlohmann/json_fwd.hpp>
 
 #include "library/settings/bake_settings.h"
 

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
-
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
@@ -27,7 +24,6 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-/// Boxes of several bodies, side by side.
 struct BodyBlock {
   static constexpr std::size_t kCount = 8;
 

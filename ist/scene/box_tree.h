@@ -31,8 +31,7 @@ struct SceneBox {
   }
 };
 
-/// A hierarchy of boxes, four a node. Its shape changes no answer: which boxes meet depends on them
-/// alone.
+/// A hierarchy of boxes, four a node. Its shape changes no answer.
 class BoxTree {
  public:
   static constexpr std::uint32_t kNone = ~0u;
@@ -68,8 +67,8 @@ class BoxTree {
     if (2 * added_ > leaves_) build();
   }
 
-  /// visit(body) of the leaves below the boxes for which enter(box) holds. It may be asked again of
-  /// a box.
+  /// visit(body) of the leaves below the boxes that enter(box) lets in; it may be asked again of a
+  /// box.
   template <class Enter, class Visit>
   void each(const Enter& enter, const Visit& visit) const noexcept {
     visit_lanes(

@@ -1,10 +1,7 @@
 #include <ist/scene.h>
 
-#include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "scene/scene_impl.h"
 

@@ -1,17 +1,12 @@
 #pragma once
 
 #include <ist/scene.h>
-
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
-#include <cstdint>
 #include <deque>
-#include <optional>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "query/base/batch.h"
 #include "scene/body_box.h"
@@ -309,9 +304,7 @@ struct Scene::Impl {
     }
     two.meet = p.status != QueryStatus::ok || p.volume > 0 || p.touching;
     if (rule.margin > 0 && (std::isnan(p.volume) || p.volume == 0)) {
-      SeparationSettings limits;
-      limits.max_distance = rule.margin;
-      s = ist::separation(solid_a, solid_b, limits, workspace);
+      s = ist::separation(solid_a, solid_b, {.max_distance = rule.margin}, workspace);
       two.meet = two.meet || s.status != QueryStatus::ok || s.distance_min < rule.margin;
     }
   }
@@ -401,8 +394,7 @@ struct Scene::Impl {
     return out;
   }
 
-  /// Of those of before that stay and those that were asked: all, the pairs that meet, and those
-  /// that no longer do.
+  /// Merges the pairs that stay with those that were asked: all, those that meet, those that ended.
   void merge() noexcept {
     std::swap(now, before);
     now.clear();

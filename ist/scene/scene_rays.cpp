@@ -1,5 +1,4 @@
 #include <ist/scene.h>
-
 #include <algorithm>
 
 #include "scene/scene_impl.h"
@@ -41,8 +40,7 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
   return best;
 }
 
-SceneNearest Scene::nearest(const Eigen::Vector3d& point,
-                            const double max_distance) const noexcept {
+SceneNearest Scene::nearest(const Eigen::Vector3d& point, double max_distance) const noexcept {
   SceneNearest best;
   if (!point.allFinite()) return best;
   double farthest = max_distance;

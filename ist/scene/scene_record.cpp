@@ -1,5 +1,4 @@
 #include <ist/scene.h>
-#include <ist/types.h>
 
 #define XXH_INLINE_ALL
 #include <xxhash.h>
@@ -7,13 +6,11 @@
 #include <algorithm>
 #include <cstring>
 #include <new>
-#include <string>
 #include <type_traits>
 
 #include "scene/scene_impl.h"
 
-// A scene before a step, in bytes and back. What is written and what is read is said once, in
-// pass().
+// A scene before a step, in bytes and back: pass() says once what is written and read.
 
 namespace ist {
 namespace {

@@ -5,7 +5,7 @@
 #include <ist/types.h>
 #include <ist/version.h>
 
-#include "library/bake_revision.h"
+#include "library/cache.h"
 #include "offline.h"
 #include "solid_rows.h"
 

@@ -1,13 +1,29 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <future>
 #include <utility>
 
 #include "base/thread_arena.h"
-#include "base/work_stop.h"
 
 namespace ist {
+
+/// Ends work on other threads: loops look at it, and are left by a WorkStop::Stopped.
+class WorkStop {
+ public:
+  struct Stopped {};
+
+  void stop() noexcept { stopped_.store(true, std::memory_order_relaxed); }
+  bool stopped() const noexcept { return stopped_.load(std::memory_order_relaxed); }
+  /// Throws Stopped once stop() was called.
+  void look() const {
+    if (stopped()) throw Stopped();
+  }
+
+ private:
+  std::atomic<bool> stopped_ = false;
+};
 
 /// A part of a bake that is done once, on threads of its own. Where the scope is left before its
 /// end, it is stopped and waited for.
@@ -25,8 +41,7 @@ class Aside {
     if (!made_.valid()) made_ = do_aside(threads_, [this] { return work_(stop_); }).share();
   }
 
-  /// Starts it if nobody has, and asks `meanwhile` twenty times a second until it is there. Throws
-  /// what the work throws.
+  /// Starts it if nobody has; calls `meanwhile` twenty times a second. Throws what the work throws.
   Result wait(const std::function<void()>& meanwhile) {
     start();
     wait_for(made_, meanwhile);

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "base/bits.h"
-#include "base/float3.h"
+#include "base/vec3.h"
 
 // Names for things that no order of work can change: hashes of their coordinates' bits.
 

@@ -8,7 +8,7 @@
 namespace ist {
 
 /// The shortest text that reads back as the same number.
-inline std::string shortest(const double value) {
+inline std::string shortest(double value) {
   char text[32];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
@@ -21,11 +21,10 @@ inline std::string position_text(const Eigen::Vector3d& p) {
 }
 
 /// "1 hole", "3 holes".
-inline std::string counted(const std::size_t count, const std::string& one,
-                           const std::string& many) {
+inline std::string counted(std::size_t count, const std::string& one, const std::string& many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
 }
-inline std::string counted(const std::size_t count, const std::string& noun) {
+inline std::string counted(std::size_t count, const std::string& noun) {
   return counted(count, noun, noun + "s");
 }
 

@@ -1,8 +1,7 @@
 #include "base/stage.h"
 
-#include <string>
-
 #include <ist/types.h>
+#include <string>
 
 namespace ist {
 

@@ -1,10 +1,9 @@
 #pragma once
 
+#include <ist/types.h>
 #include <chrono>
 #include <optional>
 #include <utility>
-
-#include <ist/types.h>
 
 namespace ist {
 

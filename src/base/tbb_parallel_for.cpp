@@ -1,5 +1,4 @@
 #include <ist/query_tbb.h>
-
 #include <tbb/parallel_for.h>
 
 namespace ist {

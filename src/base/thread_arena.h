@@ -6,7 +6,6 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -27,8 +26,7 @@ inline oneapi::tbb::task_arena thread_arena(unsigned threads) {
   return oneapi::tbb::task_arena(static_cast<int>(used));
 }
 
-/// Calls work(i) for all i in [from, to) on the threads of the current arena, `grain` or more at a
-/// time.
+/// Calls work(i) for i in [from, to) on the current arena's threads, `grain` or more at a time.
 template <class Work>
 void for_each_index(std::size_t from, std::size_t to, std::size_t grain, const Work& work) {
   oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<std::size_t>(from, to, grain),
@@ -61,8 +59,7 @@ std::vector<std::uint32_t> indices_where(std::size_t count, const IsSo& is_so) {
   return sorted;
 }
 
-/// Does work on a thread of its own, whose loops have `threads` threads of theirs. Waits for it
-/// where the future is dropped.
+/// Does work on a thread of its own, whose loops have `threads` threads. The future waits for it.
 template <class Work>
 std::future<std::invoke_result_t<Work>> do_aside(unsigned threads, Work work) {
   return std::async(std::launch::async, [threads, work = std::move(work)] {

@@ -43,4 +43,15 @@ IST_HD inline void cross(const double (&a)[3], const double (&b)[3], double (&ou
   out[0] = c.x, out[1] = c.y, out[2] = c.z;
 }
 
+/// A point or vector of the unit frame, in float, for host and device code.
+struct Float3 {
+  float x = 0, y = 0, z = 0;
+};
+
+IST_HD inline Float3 operator+(Float3 a, Float3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+IST_HD inline Float3 operator-(Float3 a, Float3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+IST_HD inline Float3 operator*(float s, Float3 a) { return {s * a.x, s * a.y, s * a.z}; }
+IST_HD inline float dot(Float3 a, Float3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+IST_HD inline float norm(Float3 a) { return sqrtf(dot(a, a)); }
+
 }  // namespace ist

@@ -1,16 +1,8 @@
+#include <ist/mesh.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
-
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <ist/mesh.h>
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"
@@ -29,7 +21,7 @@ namespace {
 
 std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
   DisjointSets sets = connected_pieces(edges);
-  return count_where(mesh.triangles.size(), [&](const std::size_t t) {
+  return count_where(mesh.triangles.size(), [&](std::size_t t) {
     return sets.find(static_cast<std::uint32_t>(t)) == t && !has_repeated_corner(mesh.triangles[t]);
   });
 }
@@ -37,11 +29,11 @@ std::size_t count_components(const TriangleMesh& mesh, const EdgeTable& edges) {
 /// Vertices whose triangles do not all hang together by the edges there.
 std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable& edges) {
   DisjointSets corners(3 * mesh.triangles.size());
-  const auto corner_at = [&](const std::uint32_t side, const std::uint32_t vertex) {
+  const auto corner_at = [&](std::uint32_t side, std::uint32_t vertex) {
     const std::uint32_t next = side - side % 3 + (side + 1) % 3;
     return mesh.triangles[side / 3][side % 3] == vertex ? side : next;
   };
-  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t e) {
     const auto sides = edges.sides(e);
     for (const std::uint32_t v : {edges.low(e), edges.high(e)})
       for (const std::uint32_t side : sides.subspan(1))
@@ -49,13 +41,13 @@ std::size_t count_nonmanifold_vertices(const TriangleMesh& mesh, const EdgeTable
   });
   // Every fan is named by one of its corners.
   std::vector<std::uint32_t> fans(mesh.vertices.size(), 0);
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     if (has_repeated_corner(mesh.triangles[t])) return;
     for (std::size_t c = 3 * t; c < 3 * t + 3; ++c)
       if (corners.find(static_cast<std::uint32_t>(c)) == c)
         std::atomic_ref<std::uint32_t>(fans[mesh.triangles[t][c % 3]]).fetch_add(1);
   });
-  return count_where(fans.size(), [&](const std::size_t v) { return fans[v] > 1; });
+  return count_where(fans.size(), [&](std::size_t v) { return fans[v] > 1; });
 }
 
 /// All but self-intersections.
@@ -64,16 +56,16 @@ MeshReport survey(const TriangleMesh& mesh, const EdgeTable& edges) {
   report.vertices = mesh.vertices.size();
   report.triangles = mesh.triangles.size();
   report.bounds = bounds_of(mesh.vertices);
-  report.degenerate_triangles = count_where(mesh.triangles.size(), [&](const std::size_t t) {
+  report.degenerate_triangles = count_where(mesh.triangles.size(), [&](std::size_t t) {
     return is_degenerate(mesh.vertices, mesh.triangles[t]);
   });
   report.components = count_components(mesh, edges);
   report.nonmanifold_vertices = count_nonmanifold_vertices(mesh, edges);
   report.boundary_edges =
-      count_where(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() == 1; });
+      count_where(edges.size(), [&](std::size_t e) { return edges.sides(e).size() == 1; });
   report.nonmanifold_edges =
-      count_where(edges.size(), [&](const std::size_t e) { return edges.sides(e).size() >= 3; });
-  report.inconsistent_edges = count_where(edges.size(), [&](const std::size_t e) {
+      count_where(edges.size(), [&](std::size_t e) { return edges.sides(e).size() >= 3; });
+  report.inconsistent_edges = count_where(edges.size(), [&](std::size_t e) {
     const auto sides = edges.sides(e);
     return sides.size() == 2 &&
            runs_up(mesh.triangles, sides[0]) == runs_up(mesh.triangles, sides[1]);
@@ -169,7 +161,7 @@ void reduce(Surface& surface, std::optional<SelfIntersections>& met, MeshReport&
 /// Makes the faces at every edge agree about the outside.
 void orient_faces(Surface& surface, const std::string& name, MeshReport& report) {
   TriangleMesh& mesh = surface.mesh;
-  const auto corner = [&](const std::uint32_t side) {
+  const auto corner = [&](std::uint32_t side) {
     const std::uint32_t v = mesh.triangles[side / 3][side % 3];
     return "vertex " + std::to_string(v) + " " + position_text(mesh.vertices[v]);
   };
@@ -214,9 +206,7 @@ void keep_facing(const Surface& surface, MeshReport& report) {
   std::vector<double> volumes(shells.count, 0);
   const Eigen::Vector3d from = mesh.vertices[mesh.triangles[0][0]];
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto corner = [&](const std::size_t k) {
-      return mesh.vertices[mesh.triangles[t][k]] - from;
-    };
+    const auto corner = [&](std::size_t k) { return mesh.vertices[mesh.triangles[t][k]] - from; };
     volumes[shells.of_triangle[t]] += corner(0).dot(corner(1).cross(corner(2))) / 6;
   }
   report.shells = shells.count;
@@ -238,8 +228,8 @@ void judge_repair(const TriangleMesh& unrepaired, const TwoMeshes& both, ClosedM
 
 enum class Facing { any, outward };
 
-ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPolicy policy,
-                 const Facing facing) {
+ClosedMesh close(TriangleMesh input, const std::string& name, OpenMeshPolicy policy,
+                 Facing facing) {
   weld_usable(input, name);
   Surface surface{std::move(input)};
   TriangleMesh& mesh = surface.mesh;
@@ -290,7 +280,7 @@ ClosedMesh close(TriangleMesh input, const std::string& name, const OpenMeshPoli
 
 }  // namespace
 
-ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name, const OpenMeshPolicy policy) {
+ClosedMesh close_mesh(TriangleMesh mesh, const std::string& name, OpenMeshPolicy policy) {
   return close(std::move(mesh), name, policy, Facing::any);
 }
 

@@ -1,21 +1,10 @@
 #include "mesh/judge.h"
 
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
-
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <iterator>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "mesh/connectivity/usable_mesh.h"
-#include "mesh/connectivity/weld.h"
 #include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
@@ -73,13 +62,13 @@ std::optional<TriangleMesh> difference(const TriangleMesh& outward, const Triang
 /// Blocks of samples until there are enough of them in either. The winding number is that of
 /// `rest`, and of the solid where `add_solid` says so.
 std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
-                                       const TriangleWinding& rest, const bool add_solid,
+                                       const TriangleWinding& rest, bool add_solid,
                                        const MeshSolid& made) {
   const Eigen::AlignedBox3d box = bounds.merged(made.bounds());
   const Eigen::Vector3d low = box.min(), size = box.sizes();
   const Eigen::Vector3d& centre = made.frame().centre;
   const double scale = made.frame().scale();
-  const auto start_of = [&](const std::size_t line) -> Eigen::Vector3d {
+  const auto start_of = [&](std::size_t line) -> Eigen::Vector3d {
     return low + size.cwiseProduct(cube_point(line));
   };
   std::vector<VolumeSums> blocks;
@@ -156,8 +145,7 @@ std::unique_ptr<MeshSolid> part_near(const TriangleMesh& mesh,
   return triangles_as_solid(std::move(part));
 }
 
-/// `shared`: [triangle of `from`] 1 where `to` has it too. `corners`: [vertex of `from`] 1 where a
-/// triangle of `to` has it.
+/// `shared`, `corners`: [triangle, vertex of `from`] 1 where `to`'s triangles have it too.
 Distances distances(const TriangleMesh& from, const std::vector<std::uint8_t>& shared,
                     const std::vector<std::uint8_t>& corners, const TriangleMesh& to,
                     double limit) {

@@ -1,25 +1,22 @@
+#include <ist/mesh.h>
+#include <ist/solid.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
-#include <array>
 #include <assimp/Importer.hpp>
 #include <exception>
 #include <set>
 #include <span>
-#include <string>
 #include <utility>
 
-#include <ist/mesh.h>
-#include <ist/solid.h>
-#include <ist/types.h>
-
+#include "base/message_text.h"
 #include "mesh/connectivity/weld.h"
 #include "mesh/import/gltf_document.h"
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/mesh_files.h"
 
 namespace ist {
+
 namespace {
 
 using Reader = PolygonMesh (*)(const SourceFile&);
@@ -149,6 +146,15 @@ MeshScene read_mesh_scene(const std::string& path) {
   scene.notes = std::move(read.notes);
   scene.of_doubles = read.of_doubles;
   return scene;
+}
+
+void scale_mesh(TriangleMesh& mesh, const Eigen::Vector3d& factors) {
+  if (!factors.allFinite() || (factors.array() == 0).any())
+    throw Error("scale: " + position_text(factors) + " makes no solid; factors are finite, not 0");
+  if (factors == Eigen::Vector3d::Ones()) return;
+  for (Eigen::Vector3d& v : mesh.vertices) v = v.cwiseProduct(factors);
+  if ((factors.array() < 0).count() % 2 != 0)  // a mirror shows triangles from behind
+    for (auto& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
 }  // namespace ist

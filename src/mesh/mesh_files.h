@@ -2,10 +2,6 @@
 
 #include <ist/mesh.h>
 
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "mesh/import/source_file.h"
 
 namespace ist {

@@ -3,14 +3,11 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <numbers>
 #include <span>
-#include <vector>
 
 #include "mesh/hierarchy/line_lattice.h"
 #include "mesh/hierarchy/winding.h"
@@ -102,7 +99,7 @@ class ExcessIntegral {
     const bool flat = !(lattice_.step_y > 0 && lattice_.step_z > 0);
     if (flat) return;
     at_line_.resize(lattice_.lines());
-    cross_lattice(arrays, lattice_, [&](const std::uint32_t row, const LatticeCrossings& lines) {
+    cross_lattice(arrays, lattice_, [&](std::uint32_t row, const LatticeCrossings& lines) {
       tbb::parallel_for(std::size_t{0}, lines.size(), [&](std::size_t line) {
         at_line_[std::size_t{row} * lattice_.ny + line] = line_excess(lines[line]);
       });
@@ -186,7 +183,7 @@ double longest_triangle(const MeshView& mesh) {
         }
         return longest;
       },
-      [](const double a, const double b) { return std::max(a, b); });
+      [](double a, double b) { return std::max(a, b); });
 }
 
 using Eigen::Vector3d;
@@ -264,7 +261,6 @@ Sum<N> over_triangles(const MeshView& mesh, const Vector3d& apex, const Visit& v
   return all;
 }
 
-/// Volume and first moments.
 Sum<4> first_moments(const MeshView& mesh) {
   return over_triangles<4>(mesh, Vector3d::Zero(), [](const Tetrahedron& t, double& magnitude) {
     magnitude += t.magnitude;

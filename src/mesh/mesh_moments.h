@@ -13,21 +13,19 @@ using HierarchyMaker = std::function<const MeshView&()>;
 /// ∫ of 1, x, y, z, x², y², z², xy, xz, yz over something, unit frame.
 using Moments = Eigen::Array<double, 10, 1>;
 
-/// The volume that a mesh counts beyond its solid: ∫ (winding − [winding ≥ 1]) times each of the
-/// ten integrands.
+/// What a mesh counts beyond its solid: ∫ (winding − [winding ≥ 1]) of the ten integrands.
 struct WindingExcess {
   Moments value = Moments::Zero();
   Moments error = Moments::Zero();  ///< estimate: the bends of the last intervals, without signs
   double hidden = 0;  ///< volume of what a fold between the columns may hide, 95 times in 100
 };
 
-/// Integrated exactly along x and adaptively along y and z, by the volume's bends. The same for any
-/// number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where there is
-/// an excess.
+/// Integrated exactly along x and adaptively along y and z, by the volume's bends. Deterministic.
+/// `mesh` may lack its hierarchy, which is asked for only where there is an excess.
 WindingExcess winding_excess(const MeshView& mesh, const HierarchyMaker& hierarchy);
 
-/// Volume, centre of mass and inertia of a solid of density 1, unit frame, each with a bound on its
-/// error.
+/// Volume, centre of mass and inertia of a solid of density 1, unit frame, and bounds of their
+/// errors.
 struct MeshMoments {
   double volume = 0;
   double volume_error = 0;
@@ -39,21 +37,17 @@ struct MeshMoments {
 };
 
 /// Those of a mesh by the divergence theorem: ∫ winding number. The errors are proven bounds on the
-/// rounding. Where the winding number is only 0 or 1, they are those of the solid. The same for any
-/// number of threads.
+/// rounding. Where the winding number is only 0 or 1, they are those of the solid. Deterministic.
 MeshMoments enclosed_moments(const MeshView& mesh);
 
 /// Those of the set where the winding number is ≥ 1 (docs/design.md 3.6): the enclosed ones less
-/// those of the excess.
-/// No excess, no loss of accuracy. The errors include what the excess's integral estimates and,
-/// unless `meets_itself` is false, what folds of the surface may hide between its columns. The same
-/// for any number of threads. Of `mesh` the arrays suffice; the hierarchy is asked for only where
-/// there is an excess.
+/// the excess, without which no accuracy is lost. The errors include what the excess's integral
+/// estimates and, unless `meets_itself` is false, what folds may hide between its columns.
+/// Deterministic. `mesh`, `hierarchy`: as above.
 MeshMoments winding_set_moments(const MeshView& mesh, bool meets_itself,
                                 const HierarchyMaker& hierarchy);
 
-/// Bound on the volume of what lies within `distance` of the surface: by Steiner's formula for each
-/// triangle.
+/// Bound on the volume within `distance` of the surface: Steiner's formula for each triangle.
 double slab_volume(const MeshView& mesh, double distance);
 
 /// The same for a solid that agrees with the mesh's at all points further than `distance` from its

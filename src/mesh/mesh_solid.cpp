@@ -1,25 +1,23 @@
 #include "mesh/mesh_solid.h"
 
-#include <ist/types.h>
-#define XXH_INLINE_ALL
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-#include <xxhash.h>
-
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
 
 #include "mesh/geometry/closest_point.h"
 #include "mesh/geometry/exact_triangle.h"
 #include "mesh/hierarchy/winding.h"
 
 namespace ist {
-
 namespace {
 
 /// How far to_unit() moves a point by rounding, at most; 0 only where it does not round.
-double rounding_at(const UnitFrame& frame, const double scale, const Eigen::Vector3d& x) {
+double rounding_at(const UnitFrame& frame, double scale, const Eigen::Vector3d& x) {
   double off[3], largest = 0;
   for (int k = 0; k < 3; ++k) {
     const double difference = x[k] - frame.centre[k];
@@ -210,6 +208,22 @@ int MeshSolid::winding_number(const Eigen::Vector3d& unit) const {
 
 std::unique_ptr<Solid> make_solid(const ClosedMesh& mesh) {
   return std::make_unique<MeshSolid>(resolve(mesh));
+}
+
+double UnitFrame::scale() const { return std::ldexp(1.0, exponent); }
+
+UnitFrame unit_frame(const Eigen::AlignedBox3d& bounds) {
+  if (bounds.isEmpty() || !bounds.min().allFinite() || !bounds.max().allFinite())
+    throw Error("the bounding box is empty or not finite, so there is no solid");
+  // Halves first: the sum of two large coordinates may overflow.
+  const Eigen::Vector3d half = bounds.max() / 2 - bounds.min() / 2;
+  const double half_extent = half.maxCoeff();
+  if (!(half_extent > 0)) throw Error("the bounding box has size 0, so there is no solid");
+  UnitFrame frame;
+  frame.centre = bounds.min() / 2 + bounds.max() / 2;
+  const double mantissa = std::frexp(half_extent, &frame.exponent);
+  if (mantissa == 0.5) --frame.exponent;  // half-extent exactly 1, not ½
+  return frame;
 }
 
 }  // namespace ist

@@ -1,15 +1,9 @@
 #pragma once
 
+#include <ist/solid.h>
 #include <oneapi/tbb/collaborative_call_once.h>
-
-#include <Eigen/Core>
-#include <array>
-#include <cstdint>
 #include <limits>
 #include <optional>
-#include <vector>
-
-#include <ist/solid.h>
 
 #include "base/raw_array.h"
 #include "mesh/hierarchy/bvh.h"
@@ -58,8 +52,7 @@ class [[gnu::visibility("hidden")]] MeshSolid final : public Solid {
   double moved() const { return moved_; }
   /// Triangles of the mesh intersect, or may: they were not looked for. Not by rounding alone.
   bool meets_itself() const { return meets_itself_; }
-  /// ClosedMesh::meeting_pairs if they are valid in the unit frame too (the frame rounded no
-  /// coordinate), else null.
+  /// ClosedMesh::meeting_pairs if the unit frame rounded no coordinate, else null.
   const std::vector<std::array<std::uint32_t, 2>>* meeting_pairs() const {
     return meeting_pairs_ ? &*meeting_pairs_ : nullptr;
   }

@@ -2,9 +2,7 @@
 
 #include <ist/solid.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -57,11 +55,10 @@ struct Votes {
   std::int64_t fronts = 0, backs = 0;
 };
 
-/// Adds what is seen of each patch along one axis; corners are `points`, unit frame, with that axis
-/// first.
+/// Adds what is seen of each patch along one axis, which comes first in `points` (unit frame).
 void look_along(const std::vector<std::array<double, 3>>& points,
-                const std::vector<Triangle>& triangles, const std::uint32_t lines,
-                DisjointSets& patches, std::vector<Votes>& votes) {
+                const std::vector<Triangle>& triangles, std::uint32_t lines, DisjointSets& patches,
+                std::vector<Votes>& votes) {
   LineLattice lattice;
   lattice.y0 = lattice.z0 = -1;
   lattice.ny = lattice.nz = lines;
@@ -100,7 +97,7 @@ std::vector<Votes> look(const TriangleMesh& soup, DisjointSets& patches,
                         const std::vector<Eigen::Vector3d>& unit) {
   const std::uint32_t lines = lines_to_see(soup, patches);
   std::array<std::vector<Votes>, 3> along;
-  tbb::parallel_for(0, 3, [&](const int axis) {
+  tbb::parallel_for(0, 3, [&](int axis) {
     std::vector<std::array<double, 3>> points(soup.vertices.size());
     for (std::size_t v = 0; v < points.size(); ++v) {
       const Eigen::Vector3d& x = unit[v];

@@ -2,15 +2,9 @@
 
 #include <ist/mesh.h>
 
-#include <cstdint>
-#include <memory>
-#include <optional>
-#include <utility>
-#include <vector>
-
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/geometry/mesh_view.h"
-#include "mesh/hierarchy/winding_kernel.h"
+#include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 
 namespace ist {

@@ -1,13 +1,9 @@
 #include "mesh/repair.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <optional>
 #include <span>
-#include <utility>
 
 #include "base/message_text.h"
 #include "base/thread_arena.h"
@@ -88,7 +84,7 @@ std::vector<bool> border_vertices(const TriangleMesh& mesh, const EdgeTable& edg
 
 /// Splits border triangles at border vertices on their sides, one side a triangle: of `asked` ones,
 /// which become those that were split, and their pieces. Returns whether there was any to split.
-bool split_once(Surface& surface, const BorderVertices& border, const double tolerance,
+bool split_once(Surface& surface, const BorderVertices& border, double tolerance,
                 std::vector<bool>& asked) {
   TriangleMesh& mesh = surface.mesh;
   const EdgeTable& edges = surface.edges;
@@ -105,7 +101,7 @@ bool split_once(Surface& surface, const BorderVertices& border, const double tol
         std::pair(std::min(u, v), std::max(u, v)) != std::pair(edges.low(e), edges.high(e)))
       continue;  // already split at another side
     std::vector<std::uint32_t> stops = border.on_segment(u, v, tolerance);
-    std::erase_if(stops, [&](const std::uint32_t w) { return w == tip || !is_border[w]; });
+    std::erase_if(stops, [&](std::uint32_t w) { return w == tip || !is_border[w]; });
     if (stops.empty()) continue;
     stops.push_back(v);
     split[side / 3] = true;
@@ -124,7 +120,7 @@ bool split_once(Surface& surface, const BorderVertices& border, const double tol
 /// Closes cracks: joins border vertices that lie within `tolerance` [u] of each other, and splits
 /// border triangles where a border vertex lies within it of their side (T-junctions). Interior
 /// vertices stay. Border: edges with an odd number of sides.
-Surface stitch(const Surface& surface, const double tolerance) {
+Surface stitch(const Surface& surface, double tolerance) {
   Surface result{weld_among(surface.mesh, tolerance, border_vertices(surface.mesh, surface.edges))};
   const BorderVertices border(result.mesh, border_vertices(result.mesh, result.edges));
   std::vector<bool> asked(result.mesh.triangles.size(), true);
@@ -143,7 +139,7 @@ void tidy(Surface& surface) {
 }
 
 /// The least tolerance up to `most` by which stitch() changes anything; infinity where none does.
-double least_crack(const Surface& surface, const double most) {
+double least_crack(const Surface& surface, double most) {
   const EdgeTable& edges = surface.edges;
   const BorderVertices border(surface.mesh, border_vertices(surface.mesh, edges));
   double least = HUGE_VAL;
@@ -181,7 +177,7 @@ void close_cracks(Surface& surface, MeshReport& report) {
 
 /// How often each patch lies on an edge: patch, sides.
 std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
-    DisjointSets& patches, const std::span<const std::uint32_t> sides) {
+    DisjointSets& patches, std::span<const std::uint32_t> sides) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> counts;
   for (const std::uint32_t side : sides) counts.emplace_back(patches.find(side / 3), 1);
   std::sort(counts.begin(), counts.end());
@@ -196,8 +192,7 @@ std::vector<std::pair<std::uint32_t, std::uint32_t>> patches_at(
   return counts;
 }
 
-/// Patches that hang together by edges of two faces, named by their first triangles, and what they
-/// do to others.
+/// Patches connected by edges of two faces, named by their first triangles.
 struct HangingPatches {
   DisjointSets sets;
   std::vector<int> gain;  ///< odd edges fewer without this patch
@@ -242,7 +237,7 @@ std::size_t drop_fins_once(Surface& surface) {
   std::vector<double> size(gain.size(), 0);
   for (std::uint32_t t = 0; t < size.size(); ++t)
     size[patches.find(t)] += area_of(mesh.vertices, mesh.triangles[t]);
-  std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return gain[a] * size[b] > gain[b] * size[a];
   });
   std::vector<bool> changed(edges.size(), false), dropped(mesh.triangles.size(), false);
@@ -312,7 +307,7 @@ void cap_holes(Surface& surface, MeshReport& report) {
     caps.push_back(cap(mesh.vertices, loop));
     for (const Triangle& t : caps.back()) cap_area[piece] += area_of(mesh.vertices, t);
   }
-  const auto is_sheet = [&](const std::uint32_t piece) {
+  const auto is_sheet = [&](std::uint32_t piece) {
     return cap_area[piece] > kSheet * own_area[piece];
   };
   std::vector<Triangle> result;
@@ -367,7 +362,7 @@ void drop_inner_walls(Surface& surface, MeshReport& report) {
 std::size_t count_t_junctions(const TriangleMesh& mesh, const EdgeTable& edges) {
   const BorderVertices border(mesh, border_vertices(mesh, edges));
   const double tolerance = kWidestCrack * bounds_of(mesh.vertices).diagonal().norm();
-  return count_where(edges.size(), [&](const std::size_t e) {
+  return count_where(edges.size(), [&](std::size_t e) {
     return edges.sides(e).size() == 1 &&
            !border.on_segment(edges.low(e), edges.high(e), tolerance).empty();
   });

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include <ist/mesh.h>
 
 #include "mesh/connectivity/edge_table.h"
@@ -40,8 +36,7 @@ struct BorderLoop {
   std::uint32_t edge = kNoIndex;        ///< one of its edges
 };
 
-/// Loops that together run along every odd edge once. (There are always such: the border of a
-/// surface has no end.)
+/// Loops that together run along every odd edge once. They exist: a surface's border has no end.
 std::vector<BorderLoop> border_loops(const EdgeTable& edges);
 
 /// Triangles that span a loop, in its own plane where it has one.

@@ -1,22 +1,12 @@
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/usable_mesh.h"
 #include "mesh/judge.h"
-#include "mesh/level_set/level_set_surface.h"
+#include "mesh/level_set/polygonise.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"
 
@@ -77,8 +67,8 @@ class Wrap {
 
   /// Away from holes this is the distance from the surface, negative inside; across a hole it
   /// passes 0 where the winding number is ½. Near thin walls it is at least what is left of one
-  /// step to them. The solid ends one step beyond the bounds: triangles that face either side may
-  /// wind about points outside.
+  /// step to them. The solid ends one step beyond the bounds: unoriented triangles may wind about
+  /// points outside.
   double value(const Eigen::Vector3d& x) const {
     const double side = std::clamp(4 * (0.5 - winding_.at(x)), -1.0, 1.0);
     const double most = kFarthest * step_;

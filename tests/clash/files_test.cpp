@@ -225,7 +225,7 @@ TEST_F(ClashFiles, PosesAreSweptForTheWorst) {
   write("two.toml", part("still", 0) + part("moving", 5) + part("beside", -0.5));
   write("poses.csv",
         "id,part,qw,qx,qy,qz,tx,ty,tz\nfar,moving,1,0,0,0,4,0,0\nnear,moving,1,0,0,0,0.9,0,0\n"
-        "deep,moving,1,0,0,0,0.5,0,0\nout,moving,1,0,0,0,3,0,0\n");
+        "deep,\"moving\",1,0,0,0,0.5,0,0\nout,moving,1,0,0,0,3,0,0\n");
   const Json report = json("two.toml", {"--poses", "poses.csv"}, 3);
   ASSERT_EQ(pairs(report), (Words{"still moving overlapping", "still beside overlapping",
                                   "moving beside touching"}));
@@ -237,6 +237,7 @@ TEST_F(ClashFiles, PosesAreSweptForTheWorst) {
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,none,1,0,0,0,0,0,0\n", ":2: no part is called 'none'"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,1,0,0,0,nan,0,0\n", ":2: tx: 'nan'"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,1\n", ":2: 3 fields"},
+           {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,\"still,1,0,0,0,0,0,0\n", ":2: a closing quote"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n", "holds no poses"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,0,0,0,0,0,0,0\n", "still: its pose"}}) {
     write("poses.csv", text);

@@ -8,7 +8,6 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include "library/bake_revision.h"
 #include "library/cache.h"
 
 namespace ist {

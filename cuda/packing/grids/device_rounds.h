@@ -3,11 +3,11 @@
 #include <vector>
 
 #include "cuda/packing/grids/device_grid.h"
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 
 namespace ist::gpu {
 
-/// The work of a grid packing's rounds on the GPU (packing/grids/grid_rounds.h says what the calls
+/// The work of a grid packing's rounds on the GPU (packing/grids/ascent.h says what the calls
 /// do), a warp a prototype. Must not outlive the queue.
 class DeviceRounds {
  public:

@@ -1,6 +1,5 @@
 // The grid functions of a build without the paper's grids: all of them throw.
 #include "cuda/packing/grids/pack_grids.h"
-#include "packing/grids/medial_grids.h"
 
 namespace ist::gpu {
 

@@ -1,7 +1,6 @@
 #include "cuda/packing/grids/pack_grids.h"
 
 #include "cuda/packing/grids/device_rounds.h"
-#include "packing/grids/medial_grids.h"
 
 namespace ist::gpu {
 

@@ -8,7 +8,6 @@
 namespace ist {
 namespace {
 
-/// Copies arrays to their offsets in a zeroed block.
 class SectionWriter {
  public:
   explicit SectionWriter(std::vector<std::byte>& bytes) : bytes_(bytes) {}

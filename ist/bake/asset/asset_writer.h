@@ -1,11 +1,8 @@
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
+#include <ist/asset_layout.h>
 #include <memory>
 #include <vector>
-
-#include <ist/asset_layout.h>
 
 namespace ist {
 
@@ -46,7 +43,6 @@ struct MeshArrays {
   std::vector<std::vector<BoxSums>> sums;    ///< of each level of boxes
 };
 
-/// The parts of an asset.
 struct AssetArrays {
   AssetHeader header;  ///< scalar fields; offsets, counts, magic and hash are filled in by writing
   std::vector<Sphere> inner_spheres;

@@ -1,18 +1,15 @@
 #include "bake/asset/atomic_file.h"
 
 #include <fcntl.h>
+#include <ist/asset.h>
 #include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstdio>
-#include <string>
 #include <system_error>
-#include <utility>
-
-#include <ist/types.h>
 
 namespace ist {
+
 namespace {
 
 [[noreturn]] void fail(const std::filesystem::path& path, const char* what) {
@@ -131,6 +128,11 @@ void write_atomically(const std::filesystem::path& path, std::span<const std::by
 
 void write_atomically(const std::filesystem::path& path, std::string_view text) {
   write_atomically(path, std::as_bytes(std::span(text)));
+}
+
+void Asset::save(const std::filesystem::path& path) const {
+  if (view_.empty()) throw Error(path.string() + ": nothing to save: the asset was moved from");
+  write_atomically(path, bytes());
 }
 
 }  // namespace ist

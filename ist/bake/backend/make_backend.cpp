@@ -1,7 +1,6 @@
 #include "bake/backend/make_backend.h"
 
-#include <ist/types.h>
-
+#include "base/thread_arena.h"
 #include "cuda/packing/cuda_backend.h"
 #include "packing/banded/banded_packer.h"
 #include "packing/banded/field_surface.h"
@@ -9,10 +8,10 @@
 #include "packing/base/packing_settings.h"
 #include "packing/calibrate/host_calibration.h"
 #include "packing/cover/cover.h"
-#include "packing/grids/medial_grids.h"
 #include "packing/grids/pack_grids.h"
 
 namespace ist {
+
 namespace {
 
 class HostBackend final : public SolidBackend {
@@ -92,6 +91,24 @@ std::unique_ptr<SolidBackend> make_backend(const Solid& solid, Device device,
       solid.mesh() != nullptr &&
       (device == Device::cuda || (device == Device::automatic && gpu_available(gpu.device)));
   return on_gpu ? ist::gpu::make_cuda_backend(*solid.mesh(), gpu) : make_host_backend(solid);
+}
+
+std::vector<MedialNode> medial_nodes(const Solid& solid, const MedialSettings& settings) {
+  if (solid.mesh() == nullptr) throw Error("medial axis: the solid must be a mesh");
+  if (settings.resolution > kMostGridCells)
+    throw Error("medial axis: resolution is " + std::to_string(settings.resolution) +
+                ", must be at most " + std::to_string(kMostGridCells) + " (0 = automatic)");
+  return thread_arena(settings.threads).execute([&] {
+    return make_backend(solid, settings.device, settings.gpu)->medial_nodes(settings);
+  });
+}
+
+SpherePacking pack(const Solid& solid, const PackingSettings& settings,
+                   const ProgressCallback& progress) {
+  packing::check_settings(settings);
+  return thread_arena(settings.threads).execute([&] {
+    return make_backend(solid, settings.device, settings.gpu)->pack(settings, progress);
+  });
 }
 
 }  // namespace ist

@@ -2,8 +2,6 @@
 
 #include <ist/bake.h>
 
-#include <memory>
-
 #include "packing/backend/solid_backend.h"
 
 namespace ist {

@@ -2,7 +2,6 @@
 #include <ist/gpu.h>
 #include <ist/gpu_query.h>
 #include <ist/gpu_scene.h>
-#include <ist/types.h>
 
 #include "cuda/packing/cuda_backend.h"
 

@@ -1,15 +1,11 @@
 #include <ist/asset_layout.h>
 #include <ist/bake.h>
 #include <ist/solid.h>
-#include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 #include "bake/check/checked_mesh.h"
 #include "base/thread_arena.h"
 #include "mesh/level_set/polygonise.h"
@@ -73,7 +69,6 @@ class SampledMoments {
   std::vector<char> inside_;
 };
 
-/// Volume, first and second moments by sampling.
 std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& solid) {
   const SampledMoments points(solid);
   const char* const kAbove =
@@ -107,7 +102,6 @@ std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& sol
                  std::string("difference of a first (0) or second (1) moment of points") + kAbove)};
 }
 
-/// The header's frame is the mesh's.
 Invariant check_frame(const AssetHeader& asset, const UnitFrame& frame) {
   Tally same;
   same.add(std::abs(asset.exponent - frame.exponent), 0);
@@ -142,8 +136,7 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
   return out;
 }
 
-/// Box and ball contain the surface, and the surroundings in which the surface of the solid may
-/// lie.
+/// Box and ball contain the surface, and all places where the solid's surface may lie.
 std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
   const Vector3d origin = vector(asset.centre);
@@ -189,9 +182,8 @@ class DistanceSolid final : public CheckedSolid {
   Eigen::AlignedBox3d bounds_;
 };
 
-/// `mesh`: what was baked, or made in the solid's place. `solid`: what spheres and covers are
-/// certified against; `checked`: what matched spheres are calibrated by; of a mesh's asset they are
-/// the same.
+/// `mesh`: what was baked, or made in the solid's place. `solid`: certifies spheres and covers;
+/// `checked`: calibrates matched spheres; of a mesh's asset they are the same.
 std::vector<Invariant> check_all(const AssetHeader& asset, const ClosedMesh& mesh,
                                  const CheckedSolid& solid, const CheckedMesh& checked,
                                  const UnitFrame& frame, const MeshMoments& moments) {
@@ -243,15 +235,13 @@ std::vector<Invariant> check_solid(const AssetHeader& asset, const Solid& solid)
 }  // namespace
 
 std::vector<Invariant> check(const Asset& asset, const ClosedMesh& mesh, unsigned threads) {
-  tbb::task_arena arena = thread_arena(threads);
-  return arena.execute([&] { return check_mesh(asset.view().header(), mesh); });
+  return thread_arena(threads).execute([&] { return check_mesh(asset.view().header(), mesh); });
 }
 
 std::vector<Invariant> check(const Asset& asset, const Solid& solid, unsigned threads) {
   if (solid.mesh() != nullptr)
     throw Error("solid: this solid is a mesh; check the asset against its ClosedMesh");
-  tbb::task_arena arena = thread_arena(threads);
-  return arena.execute([&] { return check_solid(asset.view().header(), solid); });
+  return thread_arena(threads).execute([&] { return check_solid(asset.view().header(), solid); });
 }
 
 }  // namespace ist

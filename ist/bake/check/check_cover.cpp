@@ -2,7 +2,6 @@
 #include <numeric>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 
 namespace ist {
 namespace {
@@ -21,8 +20,7 @@ struct Cell {
 using BallList = std::vector<std::uint32_t>;
 
 /// Proves a cell covered: one cover ball contains it, or it lies outside the solid, or its eighths
-/// are proven. A point in the solid that no ball contains, or a cell too small to divide, is a
-/// violation.
+/// are proven. An uncovered point of the solid, or a cell too small to divide, is a violation.
 class CoverProof {
  public:
   CoverProof(const AssetHeader& asset, const CheckedSolid& checked)

@@ -1,14 +1,10 @@
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <numeric>
-#include <utility>
-
 #include <ist/asset.h>
+#include <algorithm>
+#include <cmath>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 #include "bake/mesh/kept_mesh.h"
+#include "mesh/connectivity/disjoint_sets.h"
 
 namespace ist {
 namespace {
@@ -17,7 +13,6 @@ using CheckCorners = CheckedMesh::Corners;
 using Point = Eigen::Vector3d;
 using Edge = std::array<std::uint32_t, 2>;
 
-/// A mesh of an asset, block by block.
 class MeshOfAsset {
  public:
   MeshOfAsset(const AssetHeader& asset, const MeshHeader& mesh)
@@ -50,29 +45,11 @@ class MeshOfAsset {
   const double* const vertices_;
 };
 
-/// Sets that grow together.
-class LaneGroups {
- public:
-  explicit LaneGroups(std::size_t count) : of_(count), left_(count) {
-    std::iota(of_.begin(), of_.end(), std::size_t{0});
-  }
-  std::size_t find(std::size_t i) {
-    while (of_[i] != i) i = of_[i] = of_[of_[i]];
-    return i;
-  }
-  void join(std::size_t a, std::size_t b) {
-    a = find(a);
-    b = find(b);
-    if (a == b) return;
-    of_[std::max(a, b)] = std::min(a, b);
-    --left_;
-  }
-  std::size_t left() const { return left_; }
-
- private:
-  std::vector<std::size_t> of_;
-  std::size_t left_;
-};
+double count_of(DisjointSets& sets, std::uint32_t members) {
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < members; ++i) count += sets.find(i) == i ? 1 : 0;
+  return count;
+}
 
 using Key = std::array<double, 9>;
 
@@ -93,7 +70,6 @@ std::vector<Key> keys_of(const std::vector<CheckCorners>& triangles) {
   return keys;
 }
 
-/// The same triangles, corner for corner.
 Invariant same_triangles(const std::vector<CheckCorners>& kept,
                          const std::vector<CheckCorners>& baked) {
   const std::vector<Key> ours = keys_of(kept), theirs = keys_of(baked);
@@ -135,7 +111,6 @@ Invariant rounding(const ClosedMesh& closed, const UnitFrame& frame, double roun
              "displacement of a vertex by the unit frame's rounding − its bound, unit frame");
 }
 
-/// Every edge is used equally often in both directions.
 Invariant closed(const MeshOfAsset& mesh) {
   std::vector<std::pair<Edge, int>> runs;
   for (std::size_t b = 0; b < mesh.count; ++b)
@@ -155,15 +130,14 @@ Invariant closed(const MeshOfAsset& mesh) {
   return tally.named("mesh closed", "uses of an edge in one direction − uses in the other");
 }
 
-/// Triangles of a block hang together.
 Invariant blocks(const MeshOfAsset& mesh) {
   Tally tally;
   for (std::size_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];
-    LaneGroups groups(block.vertices);
+    DisjointSets groups(block.vertices);
     for (std::uint32_t l = 0; l < block.triangles; ++l)
-      for (std::size_t k = 1; k < 3; ++k) groups.join(block.corner[0][l], block.corner[k][l]);
-    tally.add(static_cast<double>(groups.left()) - 1, b);
+      for (std::size_t k = 1; k < 3; ++k) groups.unite(block.corner[0][l], block.corner[k][l]);
+    tally.add(count_of(groups, block.vertices) - 1, b);
   }
   return tally.named("mesh blocks", "parts of a block that share no vertex − 1");
 }
@@ -204,13 +178,12 @@ Invariant neighbours(const MeshOfAsset& mesh) {
                                   std::back_inserter(wrong));
     tally.add(static_cast<double>(wrong.size()), b);
   });
-  LaneGroups groups(mesh.count);
   for (std::uint32_t v = 0; v < around.size(); ++v) {
     if (!is_large(v)) continue;
-    groups = LaneGroups(mesh.count);
+    DisjointSets groups(mesh.count);
     for (const std::uint32_t b : around[v])
       for (const std::uint32_t other : named_by(b))
-        if (has(other, v)) groups.join(b, other);
+        if (has(other, v)) groups.unite(b, other);
     for (const std::uint32_t b : around[v])
       all.add(groups.find(b) == groups.find(around[v][0]) ? 0 : 1, b);
   }
@@ -253,10 +226,10 @@ Invariant boxes(const AssetHeader& asset, const MeshOfAsset& mesh) {
 
 /// Blocks that hang together are a shell, and there are no others.
 Invariant shells(const MeshOfAsset& mesh) {
-  LaneGroups groups(mesh.header.vertex_count);
+  DisjointSets groups(mesh.header.vertex_count);
   for (std::size_t b = 0; b < mesh.count; ++b)
     for (std::uint32_t i = 1; i < mesh.blocks[b].vertices; ++i)
-      groups.join(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);
+      groups.unite(mesh.blocks[b].vertex[0], mesh.blocks[b].vertex[i]);
   Tally together;
   for (std::size_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& first = mesh.blocks[mesh.shells[mesh.blocks[b].shell].block];
@@ -264,7 +237,8 @@ Invariant shells(const MeshOfAsset& mesh) {
         groups.find(mesh.blocks[b].vertex[0]) == groups.find(first.vertex[0]);
     together.add(hang_together ? 0 : 1, b);
   }
-  together.add(std::abs(static_cast<double>(groups.left()) - mesh.header.shell_count), mesh.count);
+  together.add(std::abs(count_of(groups, mesh.header.vertex_count) - mesh.header.shell_count),
+               mesh.count);
   return together.named("mesh shells",
                         "1 for a block not connected to its shell; connected parts − shells");
 }

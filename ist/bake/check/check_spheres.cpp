@@ -5,8 +5,6 @@
 #include <numbers>
 #include <numeric>
 
-#include "bake/check/check_tally.h"
-
 namespace ist {
 namespace {
 

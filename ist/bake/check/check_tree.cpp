@@ -5,7 +5,6 @@
 #include <numbers>
 
 #include "bake/check/check_spheres.h"
-#include "bake/check/check_tally.h"
 
 namespace ist {
 namespace {

@@ -33,7 +33,6 @@ int certain_sign(double determinant, double magnitude) {
   return determinant > 0 ? 1 : -1;
 }
 
-/// True if the ray from p may meet the box.
 bool ray_meets(const Eigen::Vector3d& p, const Eigen::AlignedBox3d& box) {
   double enter = 0;
   double leave = 1e30;

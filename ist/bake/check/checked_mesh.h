@@ -1,14 +1,7 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <vector>
-
 #include <ist/mesh.h>
 #include <ist/solid.h>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 
 namespace ist {
 
@@ -17,8 +10,7 @@ class CheckedSolid {
  public:
   virtual ~CheckedSolid() = default;
 
-  /// Distance to the surface, or less where that is not known exactly; once nothing is nearer than
-  /// `limit`, any value ≥ limit.
+  /// Distance to the surface, or less where it is not known; any value ≥ limit beyond `limit`.
   virtual double distance(const Eigen::Vector3d& p, double limit) const = 0;
 
   /// Winding number of a point off the surface: ≥ 1 inside.

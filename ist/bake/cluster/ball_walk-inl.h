@@ -14,7 +14,6 @@
 #include <span>
 
 #include "bake/cluster/ball_lanes.h"
-#include "bake/cluster/support_step.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
@@ -128,7 +127,6 @@ Ball smallest_ball(const Balls& balls, const Enough& enough) {
   return current;
 }
 
-/// Copies up to sixteen balls.
 HWY_INLINE BallLanes lanes_of(std::span<const Ball> balls) {
   BallLanes lanes;
   for (std::size_t i = 0; i < balls.size(); ++i) lanes.put(i, balls[i]);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <span>
+#include <vector>
 
 namespace ist {
 
@@ -22,5 +23,11 @@ inline double reach(double x, double y, double z, const Ball& ball) {
   const double dz = ball.z - z;
   return std::sqrt(dx * dx + dy * dy + dz * dz) + ball.r;
 }
+
+/// κ of every node of a tree: certified upper bounds on how many of its spheres cover one point.
+/// `spheres` lie in tree order; `balls[k]` are the balls around each 16^(k+1) consecutive ones.
+/// Answers bounds of the same shape as `balls`, then one entry more: {κ of the whole set}.
+std::vector<std::vector<float>> overlap_bounds(std::span<const Ball> spheres,
+                                               const std::vector<std::vector<Ball>>& balls);
 
 }  // namespace ist

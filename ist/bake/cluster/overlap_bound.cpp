@@ -1,4 +1,4 @@
-#include "bake/cluster/overlap_bound.h"
+#include "bake/cluster/bounding_ball.h"
 
 #include <ist/asset_layout.h>
 #include <tbb/blocked_range.h>
@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "bake/cluster/overlap_bound.cpp"
@@ -22,7 +21,6 @@ inline double square_of(double x) { return x * x; }
 /// A little more than the radius: errs on the side of meeting, by more than rounding.
 inline double enlarged(double radius) { return radius * (1 + 1e-9) + 1e-12; }
 
-/// Balls that may cover a point together.
 struct CoveringBalls {
   std::vector<double> x, y, z;
   std::vector<double> reach2;   ///< a little more than the radius, squared
@@ -185,7 +183,6 @@ class OverlapBounds {
   OverlapBounds(std::span<const Ball> spheres, const std::vector<std::vector<Ball>>& balls)
       : spheres_(spheres), balls_(balls) {}
 
-  /// Scratch memory of a thread.
   struct Scratch {
     std::vector<std::size_t> larger;
     CoveringBalls others;

@@ -1,4 +1,4 @@
-#include "bake/cluster/support_step.h"
+#include "bake/cluster/ball_lanes.h"
 
 #include <cmath>
 #include <limits>
@@ -7,8 +7,8 @@
 namespace ist {
 namespace {
 
-/// Solves the symmetric system g x = a, g x = b of size N ≤ 3. False if it is close to singular.
-/// `pivots`: their product.
+/// Solves the symmetric g x = a, g x = b of size N ≤ 3. False if close to singular. `pivots`: their
+/// product.
 template <int N>
 bool solve(double (&g)[3][3], double (&a)[3], double (&b)[3], double& pivots) {
   pivots = 1;
@@ -135,8 +135,7 @@ class SupportStep {
  public:
   SupportStep(const Support& support, const Ball& added) : support_(support), added_(added) {}
 
-  /// The smallest ball of the support and `added`, which it does not contain. False if there is
-  /// none.
+  /// The smallest ball of the support and `added`, outside it. False if there is none.
   bool run() { return guess() || try_all(); }
 
   const Support& support() const { return best_support_; }
@@ -208,8 +207,8 @@ class SupportStep {
 
   /// A ball whose centre lies well within those that it touches is their smallest; if it also
   /// contains the others with a margin, it is the smallest of all. A subset that lacks one of the
-  /// former, or has one of the latter, has another centre, so far away that its ball is larger or
-  /// does not contain all.
+  /// former, or has one of the latter, has a centre so far away that its ball is larger or lacks
+  /// one.
   bool accept(const Support& trial, const TangentBall& tangent, unsigned subset) {
     const Ball& ball = tangent.ball;
     if (!(tangent.height2 >= kSureShare * kSureShare * ball.r * ball.r)) return false;

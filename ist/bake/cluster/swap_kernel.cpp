@@ -1,4 +1,4 @@
-#include "bake/cluster/swap_kernel.h"
+#include "bake/cluster/gas_kernel.h"
 
 #include <limits>
 
@@ -227,8 +227,7 @@ class SwapSearch {
     return bits;
   }
 
-  /// The cost of a group with another ball in place of a member, or an intermediate cost that is
-  /// too high already.
+  /// The cost of a group with another ball in place of a member, or one that is too high already.
   template <class Gains>
   double cost_with(const SwapGroup& group, std::size_t left_out, const Ball& added,
                    const Gains& gains) const {

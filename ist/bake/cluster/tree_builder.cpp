@@ -7,8 +7,6 @@
 #include <numbers>
 #include <utility>
 
-#include "bake/cluster/bounding_ball.h"
-#include "bake/cluster/overlap_bound.h"
 #include "base/plain.h"
 #include "base/roots.h"
 #include "base/rounding.h"

@@ -1,15 +1,12 @@
-#include "bake/cluster/tree_order.h"
+#include "bake/cluster/tree_builder.h"
 
 #include <ist/asset_layout.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
 #include <numeric>
 #include <utility>
 
 #include "bake/cluster/gas_kernel.h"
-#include "bake/cluster/swap_kernel.h"
 
 namespace ist {
 namespace {
@@ -188,8 +185,7 @@ class EvenShares {
       leads_[p] = least_leads(distances2_.data(), group(p), p);
     std::array<int, kWidth> changed{};  // the sweep that last moved a ball of the group
     for (int sweep = 1; sweep <= kSweeps; ++sweep) {
-      // Every two groups meet once a sweep, in turns in which each group has one partner: one stays
-      // and the others go round.
+      // Round robin: every two groups meet once a sweep, one partner a turn.
       const std::size_t seats = groups_ + groups_ % 2;
       for (std::size_t turn = 0; turn + 1 < seats; ++turn)
         for (std::size_t k = 0; k < seats / 2; ++k) {
@@ -274,6 +270,12 @@ class EvenShares {
   std::vector<Entry> pool_;
 };
 
+/// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
+/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
+/// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
+/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
+/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
+/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres and stays last.
 class NeuralGas {
  public:
   NeuralGas(std::span<const Ball> balls, bool last_stays) : balls_(balls), last_stays_(last_stays) {
@@ -332,8 +334,8 @@ class NeuralGas {
     return at;
   }
 
-  /// Sorts `range` into groups of `unit`, the last of what remains; the last ball stays last if
-  /// `pinned`.
+  /// Sorts `range` into groups of `unit` and a last one of the rest; `pinned`: the last ball stays
+  /// last.
   void assign(std::span<std::uint32_t> range, const Prototypes& prototypes, std::size_t unit,
               bool pinned) const {
     Prototypes at = prototypes;
@@ -353,23 +355,6 @@ class NeuralGas {
   std::vector<std::uint32_t> order_;
 };
 
-/// Orders balls so that consecutive groups of 16, of 16², … are compact, by hierarchical batch
-/// neural gas: sixteen prototypes a node move to the mean of all balls, weighted by volume
-/// (magnification control) and by a kernel over the prototype's rank as seen from the ball, while
-/// the kernel narrows; then the balls are shared out evenly among the prototypes, near to near.
-/// (Weller, Zachmann: Inner Sphere Trees; Cottrell, Hammer et al.: Batch and median neural gas.)
-/// Only the last group may lack balls. `last_stays`: the last ball lacks spheres, so that it stays
-/// last.
-std::vector<std::uint32_t> neural_gas_order(std::span<const Ball> balls, bool last_stays) {
-  return NeuralGas(balls, last_stays).take();
-}
-
-std::vector<std::uint32_t> group_order(std::span<const Ball> balls, bool last_stays, bool swaps) {
-  std::vector<std::uint32_t> order = neural_gas_order(balls, last_stays);
-  if (swaps) improve_groups(balls, last_stays, order);
-  return order;
-}
-
 /// Balls around each 16 consecutive entries of `order`.
 std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::uint32_t> order) {
   std::vector<Ball> groups((order.size() + kWidth - 1) / kWidth);
@@ -382,17 +367,14 @@ std::vector<Ball> group_balls(std::span<const Ball> balls, std::span<const std::
   return groups;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps);
-
-/// The order of balls whose groups of 16 follow one another in `order`: groups of their balls, and
-/// so on up.
+/// Orders the groups of 16 that follow one another in `order`: groups of their balls, and so on.
 std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
                                         std::vector<std::uint32_t> order, bool last_stays,
                                         bool swaps) {
   if (order.size() <= std::size_t{kWidth} * kWidth) return order;
   // A group that is not full comes last, and so does any that contains one that is not.
   const std::vector<std::uint32_t> groups =
-      order_of(group_balls(balls, order), last_stays || order.size() % kWidth != 0, swaps);
+      tree_order(group_balls(balls, order), swaps, last_stays || order.size() % kWidth != 0);
   std::vector<std::uint32_t> sorted;
   sorted.reserve(order.size());
   for (const std::uint32_t g : groups)
@@ -402,14 +384,12 @@ std::vector<std::uint32_t> order_groups(std::span<const Ball> balls,
   return sorted;
 }
 
-std::vector<std::uint32_t> order_of(std::span<const Ball> balls, bool last_stays, bool swaps) {
-  return order_groups(balls, group_order(balls, last_stays, swaps), last_stays, swaps);
-}
-
 }  // namespace
 
-std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps) {
-  return order_of(spheres, false, swaps);
+std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps, bool last_stays) {
+  std::vector<std::uint32_t> order = NeuralGas(spheres, last_stays).take();
+  if (swaps) improve_groups(spheres, last_stays, order);
+  return order_groups(spheres, std::move(order), last_stays, swaps);
 }
 
 std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,

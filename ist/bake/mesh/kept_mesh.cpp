@@ -1,9 +1,7 @@
 #include "bake/mesh/kept_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
 
 #include "bake/mesh/patches.h"
 #include "base/rounding.h"
@@ -90,15 +88,15 @@ void lay_out_blocks(const MeshView& mesh, const std::vector<BlockPatch>& patches
 /// where these leave groups apart for one of each.
 template <class Visit>
 void for_neighbours(const MeshArrays& arrays, const ItemGroups<>& around, const Visit& visit) {
-  const auto place_of = [&](const std::uint32_t b, const std::uint32_t v) {
+  const auto place_of = [&](std::uint32_t b, std::uint32_t v) {
     const std::uint32_t* const all = arrays.blocks[b].vertex;
     return static_cast<std::uint32_t>(std::find(all, all + kWidth, v) - all);
   };
-  const auto both = [&](const std::uint32_t b, const std::uint32_t other, const std::uint32_t v) {
+  const auto both = [&](std::uint32_t b, std::uint32_t other, std::uint32_t v) {
     visit(b, other, place_of(b, v));
     visit(other, b, place_of(other, v));
   };
-  const auto is_large = [&](const std::uint32_t v) { return around[v].size() > kMostAround; };
+  const auto is_large = [&](std::uint32_t v) { return around[v].size() > kMostAround; };
   std::vector<std::array<std::uint32_t, 3>> spokes;  // large vertex, the edge's other end, block
   for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
     const MeshBlock& block = arrays.blocks[b];
@@ -118,11 +116,11 @@ void for_neighbours(const MeshArrays& arrays, const ItemGroups<>& around, const 
     const std::uint32_t v = spokes[i][0];
     const auto blocks = around[v];
     DisjointSets groups(blocks.size());
-    const auto number = [&](const std::uint32_t b) {
+    const auto number = [&](std::uint32_t b) {
       return static_cast<std::uint32_t>(std::lower_bound(blocks.begin(), blocks.end(), b) -
                                         blocks.begin());
     };
-    const auto join = [&](const std::uint32_t b, const std::uint32_t other) {
+    const auto join = [&](std::uint32_t b, std::uint32_t other) {
       both(b, other, v);
       groups.unite(number(b), number(other));
     };
@@ -143,10 +141,9 @@ void find_neighbours(MeshArrays& arrays) {
                             });
   // For each block: the other block and the place of the vertex.
   std::vector<std::vector<std::pair<std::uint32_t, std::uint32_t>>> found_of(arrays.blocks.size());
-  for_neighbours(arrays, around,
-                 [&](const std::uint32_t b, const std::uint32_t other, const std::uint32_t place) {
-                   found_of[b].emplace_back(other, place);
-                 });
+  for_neighbours(arrays, around, [&](std::uint32_t b, std::uint32_t other, std::uint32_t place) {
+    found_of[b].emplace_back(other, place);
+  });
   for (std::uint32_t b = 0; b < arrays.blocks.size(); ++b) {
     MeshBlock& block = arrays.blocks[b];
     std::vector<std::pair<std::uint32_t, std::uint32_t>>& found = found_of[b];
@@ -282,8 +279,7 @@ void find_slabs(MeshArrays& arrays) {
 /// Blocks that share a vertex are neighbours, and their triangles belong to one shell.
 ///
 /// `mesh`: unit frame; vertices are taken bit for bit, but −0 becomes 0. `header.error` and
-/// `header.rounding` are the caller's to set. Same bytes for any number of threads and on any
-/// machine.
+/// `header.rounding` are the caller's to set. Deterministic on any machine.
 MeshArrays lay_out_mesh(const MeshView& mesh) {
   MeshArrays arrays;
   lay_out_blocks(mesh, patches_in_order(mesh), arrays);

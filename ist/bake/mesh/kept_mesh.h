@@ -1,7 +1,5 @@
 #pragma once
 
-#include <memory>
-
 #include <ist/asset.h>
 
 #include "bake/asset/asset_writer.h"
@@ -21,8 +19,7 @@ struct KeptMesh {
   double self_overlap_volume = 0;  ///< unit frame, as AssetView::self_overlap_volume
 };
 
-/// `resolution`: how the solid's mesh was made. Same bytes for any number of threads and on any
-/// machine.
+/// `resolution`: how the solid's mesh was made. Deterministic on any machine.
 KeptMesh keep_mesh(const MeshSolid& solid, const Resolution& resolution);
 
 /// A solid's mesh, laid out once and shared by all its assets; `wanted`: false: no mesh.

@@ -1,14 +1,12 @@
 #include "bake/mesh/patches.h"
 
+#include <ist/asset_layout.h>
+#include <tbb/parallel_invoke.h>
 #include <cmath>
-#include <cstddef>
 #include <numeric>
 #include <tuple>
 #include <utility>
 
-#include <ist/asset_layout.h>
-
-#include <tbb/parallel_invoke.h>
 #include "mesh/connectivity/item_groups.h"
 
 namespace ist {
@@ -61,30 +59,6 @@ void settle(std::span<std::uint32_t> order) {
                   static_cast<std::ptrdiff_t>(std::min<std::size_t>(begin + kWidth, order.size())));
 }
 
-}  // namespace
-
-FloatMesh in_floats(const MeshView& mesh) {
-  FloatMesh out;
-  out.vertices.resize(mesh.vertex_count);
-  out.triangles.resize(mesh.triangle_count);
-  for (std::size_t v = 0; v < out.vertices.size(); ++v)
-    for (std::size_t k = 0; k < 3; ++k)
-      out.vertices[v][k] = static_cast<float>(mesh.vertices[3 * v + k]);
-  for (std::size_t t = 0; t < out.triangles.size(); ++t)
-    std::copy_n(mesh.triangles + 3 * t, 3, out.triangles[t].begin());
-  return out;
-}
-
-std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0u);
-  halve(points, order);
-  settle(order);
-  return order;
-}
-
-namespace {
-
 constexpr std::uint32_t kNone = ~0u;
 /// Patches are joined where the result is not larger than this, in radii of the larger.
 constexpr double kJoinedRadius = 1.5;
@@ -102,7 +76,6 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
 /// and looking at all of them for each patch would take the square of their number.
 constexpr std::size_t kLargestStar = 1024;
 
-/// Grows patches one after the other.
 class Growth {
  public:
   explicit Growth(const FloatMesh& mesh)
@@ -157,9 +130,8 @@ class Growth {
   /// In the one that grows.
   bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
-  /// Among the triangles that touch the patch and fit, takes the one that adds fewest vertices,
-  /// with a bonus for triangles that would be left alone; then the one nearest to the patch's
-  /// middle.
+  /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, with a bonus
+  /// for those that would be left alone; then the one nearest to the patch's middle.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
     FloatPoint middle = {};
@@ -184,8 +156,8 @@ class Growth {
     return std::get<2>(best);
   }
 
-  /// A triangle that touches the patch: of those with the fewest others left around them the
-  /// nearest to where it started.
+  /// Of the triangles at the patch with the fewest others left around them the nearest to its
+  /// first.
   std::uint32_t beside(const BlockPatch& patch) const {
     using Score = std::tuple<std::uint32_t, double, std::uint32_t>;
     Score best{kNone, 0, kNone};
@@ -278,6 +250,26 @@ std::vector<BlockPatch> joined(const FloatMesh& mesh, std::vector<BlockPatch> pa
 }
 
 }  // namespace
+
+FloatMesh in_floats(const MeshView& mesh) {
+  FloatMesh out;
+  out.vertices.resize(mesh.vertex_count);
+  out.triangles.resize(mesh.triangle_count);
+  for (std::size_t v = 0; v < out.vertices.size(); ++v)
+    for (std::size_t k = 0; k < 3; ++k)
+      out.vertices[v][k] = static_cast<float>(mesh.vertices[3 * v + k]);
+  for (std::size_t t = 0; t < out.triangles.size(); ++t)
+    std::copy_n(mesh.triangles + 3 * t, 3, out.triangles[t].begin());
+  return out;
+}
+
+std::vector<std::uint32_t> spatial_order(std::span<const FloatPoint> points) {
+  std::vector<std::uint32_t> order(points.size());
+  std::iota(order.begin(), order.end(), 0u);
+  halve(points, order);
+  settle(order);
+  return order;
+}
 
 std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh) {
   return joined(mesh, Growth(mesh).all());

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -19,7 +18,6 @@ struct FloatMesh {
   std::vector<Triangle> triangles;
 };
 
-/// A closed mesh over its vertices rounded to float.
 FloatMesh in_floats(const MeshView& mesh);
 
 /// Triangles that go into one block: at most kWidth, of at most kWidth vertices.
@@ -27,7 +25,6 @@ struct BlockPatch {
   std::vector<std::uint32_t> triangles;
   std::vector<std::uint32_t> vertices;  ///< theirs, each once
 
-  /// Where a vertex stands in `vertices`.
   std::uint8_t place_of(std::uint32_t vertex) const {
     return static_cast<std::uint8_t>(std::find(vertices.begin(), vertices.end(), vertex) -
                                      vertices.begin());

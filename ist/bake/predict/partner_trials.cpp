@@ -1,7 +1,6 @@
 #include "bake/predict/partner_trials.h"
 
 #include <ist/bake.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -16,7 +15,6 @@
 namespace ist {
 namespace {
 
-/// A part of a line.
 struct LinePart {
   double from = 0, to = 0;  ///< in lengths of the line's direction, from < to
 };
@@ -281,8 +279,7 @@ std::vector<PartnerTrial> PartnerTrials::find(TrialPartner partner, double overl
   TrialRandom random(seed + static_cast<std::uint64_t>(partner));
   std::vector<PartnerTrial> trials;
   Workspace workspace;
-  PenetrationSettings exact;
-  exact.measure = Measure::exact;
+  const PenetrationSettings exact = {.measure = Measure::exact};
   const auto go = [&] {
     return !go_on || go_on(static_cast<double>(trials.size()) / static_cast<double>(count));
   };

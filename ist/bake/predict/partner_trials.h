@@ -2,12 +2,7 @@
 
 #include <ist/asset.h>
 #include <ist/query.h>
-
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
 #include <functional>
-#include <vector>
 
 #include "mesh/mesh_solid.h"
 
@@ -40,8 +35,7 @@ inline constexpr TrialPartner kOtherPartners[] = {TrialPartner::plane, TrialPart
 /// shares a volume within half a decade of the one wanted. Places are found by points of the solid
 /// alone, so that they favour no packing; volumes are exact.
 ///
-/// Same trials for the same seed, on any machine and for any number of threads. Runs on the
-/// caller's TBB threads.
+/// Deterministic for a seed, on any machine. Runs on the caller's TBB threads.
 class PartnerTrials {
  public:
   /// `mesh`: an asset that contains the solid's own triangles. Both must outlive this.

@@ -1,10 +1,8 @@
 #include "bake/predict/trial_poses.h"
 
-#include <Eigen/Geometry>
+#include <ist/query.h>
 #include <algorithm>
 #include <limits>
-
-#include <ist/query.h>
 
 #include "bake/predict/trial_random.h"
 
@@ -104,10 +102,8 @@ class Trials {
  private:
   /// NaN where it is not known.
   double shared_volume(const Pose& b_in_a, double scale_b) {
-    PenetrationSettings exact;
-    exact.measure = Measure::exact;
-    const Penetration found =
-        penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b}, exact, workspace_);
+    const Penetration found = penetration({a_.mesh, {}, 1}, {b_.mesh, b_in_a, scale_b},
+                                          {.measure = Measure::exact}, workspace_);
     return found.status == QueryStatus::ok ? found.volume
                                            : std::numeric_limits<double>::quiet_NaN();
   }

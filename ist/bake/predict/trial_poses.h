@@ -1,14 +1,8 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <vector>
-
 #include <ist/asset.h>
-#include <ist/types.h>
-
 #include <ist/asset_layout.h>
+
 #include "mesh/mesh_solid.h"
 
 namespace ist {

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
-#include <cstdint>
 
 #include "base/hashing.h"
 

@@ -1,7 +1,6 @@
 #include "library/settings/bake_settings.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <type_traits>
@@ -290,12 +289,6 @@ std::optional<SettingFault> mesh_only_fault(const BakeSettings& settings,
   return std::nullopt;
 }
 
-}  // namespace
-
-std::span<const Setting> all_settings() { return settings_list(); }
-
-namespace {
-
 std::vector<Setting>::const_iterator setting_named(const char* name) {
   const std::vector<Setting>& list = settings_list();
   return std::find_if(list.begin(), list.end(),
@@ -303,6 +296,8 @@ std::vector<Setting>::const_iterator setting_named(const char* name) {
 }
 
 }  // namespace
+
+std::span<const Setting> all_settings() { return settings_list(); }
 
 std::span<const Setting> placing_settings() {
   return {setting_named("scale"), settings_list().end()};

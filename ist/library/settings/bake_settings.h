@@ -1,13 +1,11 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <functional>
 #include <optional>
 #include <set>
 #include <span>
-#include <string>
 #include <utility>
-
-#include <ist/bake.h>
 
 // All that may be asked of a bake, by name: the options of the command line and the keys of a
 // manifest are the same ones, read and checked here.
@@ -30,7 +28,6 @@ struct BakeSettings {
   bool mesh_only = false;                              ///< bake_mesh_only()
 };
 
-/// The form in which a setting is written.
 enum class SettingKind {
   whole,    ///< 4000
   real,     ///< 0.5
@@ -59,7 +56,6 @@ std::span<const Setting> placing_settings();   ///< scale, up-axis and world-up 
 std::span<const Setting> checking_settings();  ///< wrap and those
 std::span<const Setting> closing_settings();   ///< repair and wrap alone
 
-/// A setting's name and its fault.
 struct SettingFault {
   std::string name;
   std::string what;
@@ -68,9 +64,9 @@ struct SettingFault {
 /// To be called once all settings were taken. What was not given and follows from others is set;
 /// settings that contradict each other or have no effect are told.
 ///
-/// `given`: names of all that were given. `own`: those of them that were given for this bake alone,
-/// not as a default of many, whose having no effect is a mistake. Names in a fault's text begin
-/// with `prefix`: "--" or "".
+/// `given`: names of all that were given. `own`: those given for this bake alone, not as a default
+/// of many: to have no effect is then a mistake. Names in a fault's text begin with `prefix`: "--"
+/// or "".
 std::optional<SettingFault> complete(BakeSettings& settings, const std::set<std::string>& given,
                                      const std::set<std::string>& own, const std::string& prefix);
 

@@ -1,7 +1,6 @@
 #include "library/settings/numbers.h"
 
 #include <fmt/format.h>
-
 #include <cmath>
 #include <vector>
 

@@ -1,11 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <limits>
-#include <optional>
 #include <string>
-#include <string_view>
 
 #include "mesh/import/text_scanner.h"
 

@@ -14,9 +14,9 @@
 #include <thread>
 #include <vector>
 
+#include "base/aside.h"
 #include "base/stage.h"
 #include "base/thread_arena.h"
-#include "base/work_stop.h"
 #include "mesh/mesh_solid.h"
 #include "robots/covers/cover_proof.h"
 #include "robots/covers/cover_search.h"

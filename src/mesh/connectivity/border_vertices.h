@@ -1,14 +1,9 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <ist/mesh.h>
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <utility>
-#include <vector>
-
-#include <ist/mesh.h>
 
 namespace ist {
 
@@ -22,14 +17,11 @@ class BorderVertices {
   }
 
   /// Those within `tolerance` of the segment from u to v but not of its ends, in its order.
-  std::vector<std::uint32_t> on_segment(const std::uint32_t u, const std::uint32_t v,
-                                        const double tolerance) const {
+  std::vector<std::uint32_t> on_segment(std::uint32_t u, std::uint32_t v, double tolerance) const {
     std::vector<std::pair<double, std::uint32_t>> found;
-    for_each_beside(
-        u, v, tolerance,
-        [&](const std::uint32_t w, const double off, const double at, const double from_end) {
-          if (off <= tolerance && from_end > tolerance) found.emplace_back(at, w);
-        });
+    for_each_beside(u, v, tolerance, [&](std::uint32_t w, double off, double at, double from_end) {
+      if (off <= tolerance && from_end > tolerance) found.emplace_back(at, w);
+    });
     std::sort(found.begin(), found.end());
     std::vector<std::uint32_t> result;
     result.reserve(found.size());
@@ -39,13 +31,12 @@ class BorderVertices {
 
   /// The least tolerance up to `most` by which a vertex lies on the segment or is one with its
   /// ends; infinity where there is none.
-  double least_tolerance(const std::uint32_t u, const std::uint32_t v, const double most) const {
+  double least_tolerance(std::uint32_t u, std::uint32_t v, double most) const {
     double least = HUGE_VAL;
-    for_each_beside(
-        u, v, most, [&](const std::uint32_t w, const double off, double, const double from_end) {
-          const double needed = off < from_end ? off : std::min(distance(w, u), distance(w, v));
-          if (needed <= most) least = std::min(least, needed);
-        });
+    for_each_beside(u, v, most, [&](std::uint32_t w, double off, double, double from_end) {
+      const double needed = off < from_end ? off : std::min(distance(w, u), distance(w, v));
+      if (needed <= most) least = std::min(least, needed);
+    });
     return least;
   }
 
@@ -57,14 +48,14 @@ class BorderVertices {
 
   static constexpr std::size_t kFew = 8;  ///< are not parted
 
-  double distance(const std::uint32_t v, const std::uint32_t w) const {
+  double distance(std::uint32_t v, std::uint32_t w) const {
     return (mesh_.vertices[v] - mesh_.vertices[w]).norm();
   }
 
   /// visit(w, its distance from the line, its place along it from u, that from the nearer end) for
   /// all that lie within `tolerance` of the segment from u to v, and some others.
   template <class Visit>
-  void for_each_beside(const std::uint32_t u, const std::uint32_t v, const double tolerance,
+  void for_each_beside(std::uint32_t u, std::uint32_t v, double tolerance,
                        const Visit& visit) const {
     const Eigen::Vector3d& a = mesh_.vertices[u];
     const double length = distance(u, v);
@@ -78,12 +69,10 @@ class BorderVertices {
                });
   }
 
-  void part(const std::size_t first, const std::size_t last, const int axis) {
+  void part(std::size_t first, std::size_t last, int axis) {
     if (last - first <= kFew) return;
     const std::size_t middle = first + (last - first) / 2;
-    const auto at = [&](const std::size_t i) {
-      return points_.begin() + static_cast<std::ptrdiff_t>(i);
-    };
+    const auto at = [&](std::size_t i) { return points_.begin() + static_cast<std::ptrdiff_t>(i); };
     std::nth_element(at(first), at(middle), at(last),
                      [&](const Point& p, const Point& q) { return p.x[axis] < q.x[axis]; });
     part(first, middle, (axis + 1) % 3);
@@ -100,7 +89,7 @@ class BorderVertices {
   /// The vertices near a part of the line from a, and some others.
   template <class Visit>
   void visit_near(const Range range, const Eigen::Vector3d& a, const Eigen::Vector3d& along,
-                  const double tolerance, const Visit& visit) const {
+                  double tolerance, const Visit& visit) const {
     const auto& [first, last, axis, begin, end] = range;
     if (last - first <= kFew) {
       for (std::size_t i = first; i < last; ++i) visit(points_[i]);

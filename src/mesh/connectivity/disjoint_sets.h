@@ -1,7 +1,6 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
-
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -11,14 +10,13 @@
 namespace ist {
 
 /// Union–find whose representatives are the smallest members. unite() and find() may be called from
-/// many threads at once: once all have united, the representatives are what one thread would have
-/// made.
+/// many threads at once and end with the representatives of one thread.
 class DisjointSets {
  public:
-  explicit DisjointSets(const std::size_t size)
+  explicit DisjointSets(std::size_t size)
       : parent_(std::make_unique_for_overwrite<std::uint32_t[]>(size)) {
     tbb::parallel_for(std::size_t{0}, size,
-                      [&](const std::size_t i) { parent_[i] = static_cast<std::uint32_t>(i); });
+                      [&](std::size_t i) { parent_[i] = static_cast<std::uint32_t>(i); });
   }
 
   std::uint32_t find(std::uint32_t i) {
@@ -44,7 +42,7 @@ class DisjointSets {
   }
 
  private:
-  std::atomic_ref<std::uint32_t> parent(const std::uint32_t i) {
+  std::atomic_ref<std::uint32_t> parent(std::uint32_t i) {
     return std::atomic_ref<std::uint32_t>(parent_[i]);
   }
 

@@ -2,11 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "base/angle.h"
 #include "base/raw_array.h"

@@ -1,17 +1,11 @@
-#include "mesh/connectivity/fan_slabs.h"
-#include "mesh/connectivity/self_intersections.h"
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cstddef>
-#include <span>
-#include <vector>
 
+#include "mesh/connectivity/fan_slabs.h"
 #include "mesh/connectivity/item_groups.h"
+#include "mesh/connectivity/self_intersections.h"
 #include "mesh/geometry/exact_sign.h"
 
 namespace ist {
@@ -25,9 +19,8 @@ struct Fan {
   std::vector<exact_sign::BoundedCross> faces;
 };
 
-/// The sides opposite to a vertex, in the order in which they follow one another. False: they are
-/// no closed ring.
-bool find_ring(const std::uint32_t v, const std::span<const std::uint32_t> triangles_at,
+/// The sides opposite to a vertex, one after the other. False: they are no closed ring.
+bool find_ring(std::uint32_t v, std::span<const std::uint32_t> triangles_at,
                const std::vector<Triangle>& triangles, Fan& fan) {
   fan.sides.clear();
   for (const std::uint32_t at : triangles_at) {
@@ -48,7 +41,7 @@ bool find_ring(const std::uint32_t v, const std::span<const std::uint32_t> trian
   return from == fan.ring[0] && fan.ring.size() == fan.sides.size();
 }
 
-bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fan& fan) {
+bool is_spread(std::uint32_t v, const std::vector<Eigen::Vector3d>& vertices, Fan& fan) {
   const std::size_t count = fan.ring.size();
   std::vector<Eigen::Vector3d>& spokes = fan.spokes;
   std::vector<exact_sign::BoundedCross>& faces = fan.faces;
@@ -77,52 +70,11 @@ bool is_spread(const std::uint32_t v, const std::vector<Eigen::Vector3d>& vertic
   return true;
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
-                                       const std::vector<Triangle>& triangles,
-                                       const std::vector<std::uint8_t>& left_out) {
-  const auto is_asked = [&](const std::uint32_t triangle) {
-    return left_out.empty() || left_out[triangle] == 0;
-  };
-  const ItemGroups<> fans = triangles_at_vertices(vertices.size(), triangles);
-  std::vector<std::uint32_t> spread(vertices.size(), 0);
-  tbb::enumerable_thread_specific<Fan> of_threads;
-  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(vertices.size()),
-                    [&](const std::uint32_t v) {
-                      if (std::ranges::none_of(fans[v], is_asked)) return;
-                      Fan& fan = of_threads.local();
-                      if (find_ring(v, fans[v], triangles, fan) && is_spread(v, vertices, fan))
-                        spread[v] = static_cast<std::uint32_t>(fan.ring.size());
-                    });
-  return spread;
-}
-
-std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles,
-                                     const std::size_t vertices) {
-  constexpr std::uint32_t kMany = 64;
-  std::vector<std::uint32_t> count(vertices, 0), owners;
-  for (const Triangle& t : triangles)
-    for (const std::uint32_t v : t) ++count[v];
-  if (std::none_of(count.begin(), count.end(), [](const auto n) { return n >= kMany; }))
-    return owners;
-  owners.resize(triangles.size());
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
-    const auto corner = *std::max_element(
-        triangles[t].begin(), triangles[t].end(),
-        [&](const std::uint32_t a, const std::uint32_t b) { return count[a] < count[b]; });
-    owners[t] = count[corner] >= kMany ? corner : kNoIndex;
-  });
-  return owners;
-}
-
-namespace {
-
 constexpr double kFullCone = 4;  ///< [rad] no angle is larger
 
 /// A cone from the owner around what else the group has: less than half of all directions, or all.
 void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-              const std::span<const std::uint32_t> group, Slab& slab) {
+              std::span<const std::uint32_t> group, Slab& slab) {
   const auto for_each_direction = [&](const auto& visit) {
     const FloatPoint& o = points[slab.owner];
     for (const std::uint32_t i : group)
@@ -149,12 +101,48 @@ void add_cone(const RawArray<FloatPoint>& points, const std::vector<Triangle>& t
 
 }  // namespace
 
+std::vector<std::uint32_t> spread_fans(const std::vector<Eigen::Vector3d>& vertices,
+                                       const std::vector<Triangle>& triangles,
+                                       const std::vector<std::uint8_t>& left_out) {
+  const auto is_asked = [&](std::uint32_t triangle) {
+    return left_out.empty() || left_out[triangle] == 0;
+  };
+  const ItemGroups<> fans = triangles_at_vertices(vertices.size(), triangles);
+  std::vector<std::uint32_t> spread(vertices.size(), 0);
+  tbb::enumerable_thread_specific<Fan> of_threads;
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(vertices.size()),
+                    [&](std::uint32_t v) {
+                      if (std::ranges::none_of(fans[v], is_asked)) return;
+                      Fan& fan = of_threads.local();
+                      if (find_ring(v, fans[v], triangles, fan) && is_spread(v, vertices, fan))
+                        spread[v] = static_cast<std::uint32_t>(fan.ring.size());
+                    });
+  return spread;
+}
+
+std::vector<std::uint32_t> owners_of(const std::vector<Triangle>& triangles, std::size_t vertices) {
+  constexpr std::uint32_t kMany = 64;
+  std::vector<std::uint32_t> count(vertices, 0), owners;
+  for (const Triangle& t : triangles)
+    for (const std::uint32_t v : t) ++count[v];
+  if (std::none_of(count.begin(), count.end(), [](const auto n) { return n >= kMany; }))
+    return owners;
+  owners.resize(triangles.size());
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
+    const auto corner =
+        *std::max_element(triangles[t].begin(), triangles[t].end(),
+                          [&](std::uint32_t a, std::uint32_t b) { return count[a] < count[b]; });
+    owners[t] = count[corner] >= kMany ? corner : kNoIndex;
+  });
+  return owners;
+}
+
 Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-             const std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
-             const std::vector<std::uint32_t>& spread, const double margin) {
+             std::span<const std::uint32_t> group, const std::vector<std::uint32_t>& owners,
+             const std::vector<std::uint32_t>& spread, double margin) {
   Slab slab;
   slab.owner = owners[group[0]];
-  const auto point = [&](const std::uint32_t v) {
+  const auto point = [&](std::uint32_t v) {
     return Eigen::Vector3d(double{points[v][0]}, double{points[v][1]}, double{points[v][2]});
   };
   Eigen::Vector3d normal = Eigen::Vector3d::Zero(), longest = Eigen::Vector3d::UnitX();
@@ -187,7 +175,7 @@ Slab slab_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& tr
 }
 
 Slice slice_of(const RawArray<FloatPoint>& points, const std::vector<Triangle>& triangles,
-               const std::span<const std::uint32_t> group, const double margin) {
+               std::span<const std::uint32_t> group, double margin) {
   Slice slice;
   Eigen::Matrix<double, 3, Slice::kCorners> corners;
   for (std::size_t c = 0; c < Slice::kCorners; ++c)

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <atomic>
-#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <numeric>

@@ -1,16 +1,9 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <mutex>
 #include <numeric>
-#include <utility>
-#include <vector>
 
 #include "base/raw_array.h"
 #include "mesh/connectivity/edge_table.h"
@@ -52,7 +45,7 @@ class LineWinding {
       : vertices_(vertices),
         triangles_(triangles),
         shells_(shells),
-        columns_(triangles, 0, [&](const std::uint32_t v) { return vertices[v]; }) {}
+        columns_(triangles, 0, [&](std::uint32_t v) { return vertices[v]; }) {}
 
   /// Sets numbers[s] to the winding number of shell s around p, for every shell in `shells_met`,
   /// which lists those where it may differ from 0. `numbers` must come in as zeros.
@@ -119,9 +112,9 @@ std::vector<Shell> measure(const std::vector<Eigen::Vector3d>& vertices,
     for (const std::uint32_t s : shells.of_triangle) ++sizes[s];
   find_boxes(vertices, triangles, shells, result);
   RawArray<double> terms(triangles.size());
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     const Eigen::Vector3d origin = result[shells.of_triangle[t]].box.center();
-    const auto corner = [&](const std::size_t k) { return vertices[triangles[t][k]] - origin; };
+    const auto corner = [&](std::size_t k) { return vertices[triangles[t][k]] - origin; };
     terms[t] = corner(0).dot(corner(1).cross(corner(2))) / 6;
   });
   std::vector<std::size_t> until_probe(shells.count, 0);  // triangles
@@ -172,7 +165,7 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
   // From the outside in: a shell lies in more shells than those that contain it.
   std::vector<std::uint32_t> order(shells.count);
   std::iota(order.begin(), order.end(), 0u);
-  std::stable_sort(order.begin(), order.end(), [&](const std::uint32_t a, const std::uint32_t b) {
+  std::stable_sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
     return measured[a].containers.size() < measured[b].containers.size();
   });
   Nesting nesting;
@@ -204,7 +197,7 @@ Nesting orient_shells(const std::vector<Eigen::Vector3d>& vertices,
     nesting.volume.magnitude += shell.volume.magnitude;
   }
   if (std::find(turned.begin(), turned.end(), true) == turned.end()) return nesting;
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     if (turned[shells.of_triangle[t]]) std::swap(triangles[t][1], triangles[t][2]);
   });
   return nesting;

@@ -3,14 +3,10 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <atomic>
 #include <bit>
 #include <limits>
-#include <span>
-#include <utility>
 
 #include "base/hashing.h"
 #include "base/raw_array.h"
@@ -29,7 +25,7 @@ struct alignas(64) EightBoxes {
   float lower[3][kWidth], upper[3][kWidth];
 
   /// Bit k: box k meets box `lane` of `other`.
-  unsigned met_by(const EightBoxes& other, const std::size_t lane) const {
+  unsigned met_by(const EightBoxes& other, std::size_t lane) const {
     constexpr int kBit[kWidth] = {1, 2, 4, 8, 16, 32, 64, 128};
     float low[3], high[3];
     for (std::size_t i = 0; i < 3; ++i) {
@@ -66,7 +62,7 @@ class TriangleBoxes {
   std::size_t size() const { return order_.size(); }
   bool oriented() const { return !slabs_.empty(); }
   /// The triangle at a place of the curve.
-  std::uint32_t triangle(const std::size_t place) const { return order_[place]; }
+  std::uint32_t triangle(std::size_t place) const { return order_[place]; }
 
   /// Into how many parts the search for pairs falls.
   std::size_t parts() const { return levels_[start_].size(); }
@@ -74,7 +70,7 @@ class TriangleBoxes {
   /// Calls visit(i, j), i < j, for every two places whose boxes meet and that belong to one part of
   /// the search, until visit.done() is true.
   template <class Visit>
-  void for_each_pair(const std::size_t part, Visit& visit) const {
+  void for_each_pair(std::size_t part, Visit& visit) const {
     // A node of the starting level against itself and those behind it.
     within(start_, part, visit);
     if (start_ + 1 == levels_.size()) return;
@@ -89,17 +85,17 @@ class TriangleBoxes {
 
  private:
   /// Bit k: whether pairs of node `a` of the level below and box k of a node are to be visited.
-  unsigned wanted(const std::size_t level, const std::size_t a, const std::size_t node) const {
+  unsigned wanted(std::size_t level, std::size_t a, std::size_t node) const {
     if (wanted_.empty() || (wanted_[level][a / 8] >> a % 8 & 1) != 0) return ~0u;
     return wanted_[level][node];
   }
 
-  static std::size_t lowest(const unsigned bits) {
+  static std::size_t lowest(unsigned bits) {
     return static_cast<std::size_t>(std::countr_zero(bits));
   }
 
   template <class Visit>
-  void within(const std::size_t level, const std::size_t node, Visit& visit) const {
+  void within(std::size_t level, std::size_t node, Visit& visit) const {
     if (!slabs_.empty() && slabs_[level][node].spread) return;
     if (!wanted_.empty() && wanted_[level][node] == 0) return;
     const EightBoxes& boxes = levels_[level][node];
@@ -114,8 +110,7 @@ class TriangleBoxes {
 
   /// All pairs of a triangle under node a with one under node b, both of a level, a < b.
   template <class Visit>
-  void between(const std::size_t level, const std::size_t a, const std::size_t b,
-               Visit& visit) const {
+  void between(std::size_t level, std::size_t a, std::size_t b, Visit& visit) const {
     if (visit.done()) return;
     if (!slabs_.empty()) {
       const Slab &slab_a = slabs_[level][a], &slab_b = slabs_[level][b];
@@ -134,7 +129,7 @@ class TriangleBoxes {
 
   /// Children of a level's nodes.
   template <class Visit>
-  void pair(const std::size_t level, const std::size_t a, const std::size_t b, Visit& visit) const {
+  void pair(std::size_t level, std::size_t a, std::size_t b, Visit& visit) const {
     if (level == 0)
       visit(a, b);
     else
@@ -161,7 +156,7 @@ RawArray<FloatPoint> placed(const std::vector<Eigen::Vector3d>& vertices) {
   const Eigen::Vector3d corner = bounds.min();
   const double width = bounds.sizes().maxCoeff();
   RawArray<FloatPoint> points(vertices.size());
-  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](const std::size_t v) {
+  tbb::parallel_for(std::size_t{0}, vertices.size(), [&](std::size_t v) {
     for (int k = 0; k < 3; ++k)
       points[v][static_cast<std::size_t>(k)] =
           static_cast<float>((vertices[v][k] - corner[k]) / width);
@@ -191,9 +186,9 @@ EightBoxes no_boxes() {
 
 /// Blocks of eight: box_of(i, k) gives the lower and the upper bound of box i along axis k.
 template <class BoxOf>
-std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) {
+std::vector<EightBoxes> in_eights(std::size_t count, const BoxOf& box_of) {
   std::vector<EightBoxes> blocks((count + 7) / 8);
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](const std::size_t b) {
+  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     EightBoxes boxes = no_boxes();
     for (std::size_t i = 8 * b; i < std::min(8 * b + 8, count); ++i)
       for (std::size_t k = 0; k < 3; ++k) {
@@ -208,8 +203,8 @@ std::vector<EightBoxes> in_eights(const std::size_t count, const BoxOf& box_of) 
 
 TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
                              const std::vector<Triangle>& triangles,
-                             const std::vector<std::uint32_t>& spread, const double margin,
-                             const bool oriented) {
+                             const std::vector<std::uint32_t>& spread, double margin,
+                             bool oriented) {
   const RawArray<FloatPoint> points = placed(vertices);
   float wider = 0;
   if (margin > 0) {
@@ -217,39 +212,38 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
     wider = static_cast<float>(2 * margin / bounds_of(vertices).sizes().maxCoeff() + kRounding);
   }
   RawArray<std::uint64_t> keys(triangles.size());
-  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
     keys[t] = is_degenerate(vertices, triangles[t])
                   ? kLeftOut
                   : key_of(points, triangles[t]) << kIndexBits | t;
   });
   tbb::parallel_sort(keys.begin(), keys.end());
   order_.resize(std::lower_bound(keys.begin(), keys.end(), kLeftOut) - keys.begin());
-  tbb::parallel_for(std::size_t{0}, order_.size(), [&](const std::size_t i) {
+  tbb::parallel_for(std::size_t{0}, order_.size(), [&](std::size_t i) {
     order_[i] = static_cast<std::uint32_t>(keys[i] & ((std::uint64_t{1} << kIndexBits) - 1));
   });
   std::vector<std::uint32_t> owners;
   if (!spread.empty()) owners = owners_of(triangles, vertices.size());
   if (!owners.empty()) {
-    std::stable_sort(
-        order_.begin(), order_.end(),
-        [&](const std::uint32_t a, const std::uint32_t b) { return owners[a] < owners[b]; });
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return owners[a] < owners[b]; });
   } else if (
       oriented ||
-      mean_slenderness(triangles.size(), [&](const std::size_t t) {
+      mean_slenderness(triangles.size(), [&](std::size_t t) {
         const Triangle& of = triangles[t];
         return Corners{{vertices[of[0]].data(), vertices[of[1]].data(), vertices[of[2]].data()}};
       }) > kSlender) {
     owners.assign(triangles.size(), kNoIndex);
   }
 
-  levels_.push_back(in_eights(order_.size(), [&](const std::size_t i, const std::size_t k) {
+  levels_.push_back(in_eights(order_.size(), [&](std::size_t i, std::size_t k) {
     const Triangle& t = triangles[order_[i]];
     const auto [low, high] = std::minmax({points[t[0]][k], points[t[1]][k], points[t[2]][k]});
     return std::pair{low, high + wider};
   }));
   while (levels_.back().size() > 1) {
     const std::vector<EightBoxes>& below = levels_.back();
-    levels_.push_back(in_eights(below.size(), [&](const std::size_t i, const std::size_t k) {
+    levels_.push_back(in_eights(below.size(), [&](std::size_t i, std::size_t k) {
       return std::pair{*std::min_element(below[i].lower[k], below[i].lower[k] + 8),
                        *std::max_element(below[i].upper[k], below[i].upper[k] + 8)};
     }));
@@ -259,7 +253,7 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
   if (owners.empty()) return;
   for (std::size_t level = 0, size = 8; level <= start_; ++level, size *= 8) {
     std::vector<Slab>& slabs = slabs_.emplace_back(levels_[level].size());
-    tbb::parallel_for(std::size_t{0}, slabs.size(), [&](const std::size_t node) {
+    tbb::parallel_for(std::size_t{0}, slabs.size(), [&](std::size_t node) {
       const std::span<const std::uint32_t> all(order_);
       slabs[node] = slab_of(points, triangles,
                             all.subspan(size * node, std::min(size, all.size() - size * node)),
@@ -267,7 +261,7 @@ TriangleBoxes::TriangleBoxes(const std::vector<Eigen::Vector3d>& vertices,
     });
   }
   slices_.resize(levels_[0].size());
-  tbb::parallel_for(std::size_t{0}, slices_.size(), [&](const std::size_t node) {
+  tbb::parallel_for(std::size_t{0}, slices_.size(), [&](std::size_t node) {
     const std::span<const std::uint32_t> all(order_);
     slices_[node] = slice_of(points, triangles,
                              all.subspan(8 * node, std::min<std::size_t>(8, all.size() - 8 * node)),
@@ -289,7 +283,7 @@ void TriangleBoxes::leave_out(const std::vector<std::uint8_t>& marked) {
 /// Whether the exact boxes of two triangles meet.
 bool boxes_meet(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                 const Triangle& b) {
-  const auto range = [&](const Triangle& t, const int k) {
+  const auto range = [&](const Triangle& t, int k) {
     return std::minmax({vertices[t[0]][k], vertices[t[1]][k], vertices[t[2]][k]});
   };
   for (const int k : {0, 1, 2}) {
@@ -305,7 +299,7 @@ std::vector<Triangle> spread_corners(const std::vector<Triangle>& triangles,
                                      const std::vector<std::uint32_t>& fans,
                                      const TriangleBoxes& boxes) {
   std::vector<Triangle> corners(boxes.size());
-  tbb::parallel_for(std::size_t{0}, boxes.size(), [&](const std::size_t place) {
+  tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t place) {
     const Triangle& t = triangles[boxes.triangle(place)];
     for (std::size_t k = 0; k < 3; ++k) corners[place][k] = fans[t[k]] != 0 ? t[k] : kNoIndex;
   });
@@ -322,7 +316,7 @@ bool share_corner(const Triangle& a, const Triangle& b) {
 constexpr std::size_t kMostTriangles = 2'000'000, kMostPairs = 10'000'000;
 
 /// The boxes of needles meet those of many others.
-constexpr std::size_t most_candidates(const std::size_t triangles) {
+constexpr std::size_t most_candidates(std::size_t triangles) {
   return std::max(std::size_t{100'000'000}, 1000 * triangles);
 }
 
@@ -348,7 +342,7 @@ class Visitor {
     return sums_.candidates.load(std::memory_order_relaxed) > most_candidates(boxes_.size());
   }
 
-  void operator()(const std::size_t i, const std::size_t j) {
+  void operator()(std::size_t i, std::size_t j) {
     const Look found = look_at_(i, j);
     if (found == Look::apart) return;
     constexpr std::size_t kOften = 1024;
@@ -371,7 +365,7 @@ template <class LookAt>
 std::optional<SelfIntersections> search(const TriangleBoxes& boxes, const LookAt& look_at) {
   Sums sums;
   tbb::enumerable_thread_specific<std::vector<std::array<std::uint32_t, 2>>> of_threads;
-  tbb::parallel_for(std::size_t{0}, boxes.parts(), [&](const std::size_t part) {
+  tbb::parallel_for(std::size_t{0}, boxes.parts(), [&](std::size_t part) {
     Visitor visitor(boxes, look_at, sums, of_threads.local());
     boxes.for_each_pair(part, visitor);
   });
@@ -425,7 +419,7 @@ std::optional<SelfIntersections> find_self_intersections(
     TriangleBoxes boxes(vertices, triangles, fans, 0, oriented);
     if (!known_apart.empty()) boxes.leave_out(known_apart);
     const std::vector<Triangle> spread = spread_corners(triangles, fans, boxes);
-    auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
+    auto found = search(boxes, [&](std::size_t i, std::size_t j) {
       if (share_corner(spread[i], spread[j])) return Look::candidates;
       const Triangle &a = triangles[boxes.triangle(i)], &b = triangles[boxes.triangle(j)];
       if (!boxes_meet(vertices, a, b)) return Look::apart;
@@ -439,10 +433,10 @@ std::optional<SelfIntersections> find_self_intersections(
 
 std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
-    const double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted) {
+    double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted) {
   if (triangles.size() > kMostTriangles) return std::nullopt;
   const TriangleBoxes boxes(vertices, triangles, {}, margin);
-  auto found = search(boxes, [&](const std::size_t i, const std::size_t j) {
+  auto found = search(boxes, [&](std::size_t i, std::size_t j) {
     return wanted(boxes.triangle(i), boxes.triangle(j)) ? Look::met : Look::candidates;
   });
   return found ? std::move(found->pairs) : std::nullopt;

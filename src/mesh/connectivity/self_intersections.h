@@ -1,12 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <functional>
 #include <optional>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 
@@ -17,8 +14,8 @@ namespace ist {
 /// rounding. False says nothing: meet_elsewhere() decides.
 bool seen_apart(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a, const Triangle& b);
 
-/// Whether two triangles meet elsewhere than in the corners and sides they share. Exact. Neither
-/// may be degenerate.
+/// Whether two triangles meet beyond the corners and sides they share. Exact. Neither is
+/// degenerate.
 bool meet_elsewhere(const std::vector<Eigen::Vector3d>& vertices, const Triangle& a,
                     const Triangle& b);
 
@@ -48,8 +45,7 @@ std::optional<SelfIntersections> find_self_intersections(
     const std::vector<std::uint8_t>& known_apart = {});
 
 /// Pairs of triangles, the smaller index first, sorted, whose boxes are no further than `margin`
-/// [u] apart and for which `wanted` holds, which several threads ask at once. Limits and threads as
-/// above.
+/// [u] apart and for which `wanted` holds (thread-safe). Limits and threads as above.
 std::optional<std::vector<std::array<std::uint32_t, 2>>> find_pairs(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
     double margin, const std::function<bool(std::uint32_t, std::uint32_t)>& wanted);

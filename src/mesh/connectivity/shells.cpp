@@ -3,12 +3,10 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <utility>
 
 #include "base/thread_arena.h"
 
@@ -25,9 +23,9 @@ SidePartners manifold_partners(const EdgeTable& edges) {
   return partners;
 }
 
-DisjointSets connected_pieces(const EdgeTable& edges, const std::size_t most) {
+DisjointSets connected_pieces(const EdgeTable& edges, std::size_t most) {
   DisjointSets pieces(edges.side_count() / 3);
-  tbb::parallel_for(std::size_t{0}, edges.size(), [&](const std::size_t e) {
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t e) {
     const auto sides = edges.sides(e);
     if (sides.size() > most) return;
     for (const std::uint32_t side : sides) pieces.unite(sides[0] / 3, side / 3);
@@ -52,11 +50,11 @@ double diamond_angle(const Eigen::Vector3d& p, const Eigen::Vector3d& origin,
 /// Sides of an edge in the order of their angle about it.
 std::vector<std::pair<double, std::uint32_t>> around_edge(
     const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
-    const EdgeTable& edges, const std::size_t edge) {
+    const EdgeTable& edges, std::size_t edge) {
   const auto sides = edges.sides(edge);
   const Eigen::Vector3d& origin = vertices[edges.low(edge)];
   const Eigen::Vector3d axis = (vertices[edges.high(edge)] - origin).normalized();
-  const auto opposite = [&](const std::uint32_t side) {
+  const auto opposite = [&](std::uint32_t side) {
     return vertices[triangles[side / 3][(side + 2) % 3]];
   };
   std::vector<std::pair<double, std::uint32_t>> order;
@@ -64,6 +62,12 @@ std::vector<std::pair<double, std::uint32_t>> around_edge(
     order.emplace_back(diamond_angle(opposite(side), origin, axis, opposite(sides[0])), side);
   std::sort(order.begin(), order.end());
   return order;
+}
+
+int balance(const std::vector<Triangle>& triangles, std::span<const std::uint32_t> sides) {
+  int sum = 0;
+  for (const std::uint32_t side : sides) sum += runs_up(triangles, side) ? 1 : -1;
+  return sum;
 }
 
 }  // namespace
@@ -158,16 +162,6 @@ std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
   return std::nullopt;
 }
 
-namespace {
-
-int balance(const std::vector<Triangle>& triangles, const std::span<const std::uint32_t> sides) {
-  int sum = 0;
-  for (const std::uint32_t side : sides) sum += runs_up(triangles, side) ? 1 : -1;
-  return sum;
-}
-
-}  // namespace
-
 std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& triangles,
                                                   const EdgeTable& edges) {
   const std::uint32_t first = tbb::parallel_reduce(
@@ -177,7 +171,7 @@ std::optional<std::uint32_t> find_unbalanced_edge(const std::vector<Triangle>& t
           if (balance(triangles, edges.sides(e)) != 0) found = e;
         return found;
       },
-      [](const std::uint32_t a, const std::uint32_t b) { return std::min(a, b); });
+      [](std::uint32_t a, std::uint32_t b) { return std::min(a, b); });
   return first == kNoIndex ? std::nullopt : std::optional(first);
 }
 
@@ -210,7 +204,7 @@ Shells find_shells(const std::vector<Triangle>& triangles, const EdgeTable& edge
   shells.of_triangle.resize(triangles.size());
   std::atomic<bool> one{true};
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(triangles.size()),
-                    [&](const std::uint32_t t) {
+                    [&](std::uint32_t t) {
                       shells.of_triangle[t] = pieces.find(t);
                       if (shells.of_triangle[t] != 0) one.store(false, std::memory_order_relaxed);
                     });

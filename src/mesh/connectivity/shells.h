@@ -1,11 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <vector>
-
 #include <ist/mesh.h>
 
 #include "mesh/connectivity/disjoint_sets.h"
@@ -42,8 +36,8 @@ SidePartners nearest_partners(const std::vector<Eigen::Vector3d>& vertices,
                               const std::vector<Triangle>& triangles, const EdgeTable& edges);
 
 /// Turns triangles so that partners agree about the outside; the smaller part of each connected
-/// piece turns. Returns a side at which that is impossible (a Möbius strip), if there is one, and
-/// then turns none.
+/// piece turns. Returns a side at which that is impossible (a Möbius strip), if any, and then turns
+/// none.
 std::optional<std::uint32_t> make_consistent(std::vector<Triangle>& triangles,
                                              const SidePartners& partners);
 
@@ -65,7 +59,6 @@ struct SignedVolume {
   bool is_flat() const;
 };
 
-/// The result of orient_shells().
 struct Nesting {
   std::size_t flipped = 0;        ///< shells turned
   std::size_t cavities = 0;       ///< inward shells within solid

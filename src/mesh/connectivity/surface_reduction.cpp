@@ -2,12 +2,9 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cstdlib>
-#include <functional>
 #include <unordered_map>
-#include <utility>
 
 #include "base/thread_arena.h"
 #include "mesh/connectivity/disjoint_sets.h"
@@ -54,43 +51,6 @@ void remove(const std::vector<std::uint32_t>& dropped, std::vector<Triangle>& tr
   triangles.erase(kept, triangles.end());
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
-                                           std::vector<Triangle>& triangles,
-                                           const EdgeTable& edges) {
-  const std::vector<std::uint32_t> degenerate = indices_where(
-      triangles.size(), [&](std::size_t t) { return is_degenerate(vertices, triangles[t]); });
-  std::vector<std::uint32_t> dropped, open;
-  for (const std::uint32_t t : degenerate)
-    (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
-  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
-  const auto edge_of = [&](const std::uint32_t t, const std::size_t k) {
-    return edges.edge_of(3 * std::size_t{t} + k);
-  };
-  for (const std::uint32_t t : open)
-    for (std::size_t k = 0; k < 3; ++k)
-      sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
-  for (bool more = true; more;) {
-    const std::size_t before = dropped.size();
-    std::erase_if(open, [&](const std::uint32_t t) {
-      std::size_t odd = 0;
-      for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
-      if (odd < 2) return false;
-      for (std::size_t k = 0; k < 3; ++k) --sides[edge_of(t, k)];
-      dropped.push_back(t);
-      return true;
-    });
-    more = dropped.size() != before;
-  }
-  std::sort(dropped.begin(), dropped.end());
-  remove(dropped, triangles);
-  return dropped;
-}
-
-namespace {
-
-/// Triangles with the same corners.
 struct Stack {
   std::vector<std::uint32_t> members;
   int sum = 0;  ///< of the members' directions, relative to the first
@@ -103,7 +63,7 @@ bool same_direction(const Triangle& a, const Triangle& b) {
   return false;
 }
 
-std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, const std::uint32_t side) {
+std::uint32_t corner_opposite(const std::vector<Triangle>& triangles, std::uint32_t side) {
   return triangles[side / 3][(side + 2) % 3];
 }
 
@@ -152,6 +112,38 @@ std::vector<Stack> find_stacks(const std::vector<Triangle>& triangles, const Edg
 
 }  // namespace
 
+std::vector<std::uint32_t> drop_degenerate(const std::vector<Eigen::Vector3d>& vertices,
+                                           std::vector<Triangle>& triangles,
+                                           const EdgeTable& edges) {
+  const std::vector<std::uint32_t> degenerate = indices_where(
+      triangles.size(), [&](std::size_t t) { return is_degenerate(vertices, triangles[t]); });
+  std::vector<std::uint32_t> dropped, open;
+  for (const std::uint32_t t : degenerate)
+    (has_repeated_corner(triangles[t]) ? dropped : open).push_back(t);
+  std::unordered_map<std::uint32_t, std::size_t> sides;  // left at the edges of open ones
+  const auto edge_of = [&](std::uint32_t t, std::size_t k) {
+    return edges.edge_of(3 * std::size_t{t} + k);
+  };
+  for (const std::uint32_t t : open)
+    for (std::size_t k = 0; k < 3; ++k)
+      sides.emplace(edge_of(t, k), edges.sides(edge_of(t, k)).size());
+  for (bool more = true; more;) {
+    const std::size_t before = dropped.size();
+    std::erase_if(open, [&](std::uint32_t t) {
+      std::size_t odd = 0;
+      for (std::size_t k = 0; k < 3; ++k) odd += sides[edge_of(t, k)] % 2;
+      if (odd < 2) return false;
+      for (std::size_t k = 0; k < 3; ++k) --sides[edge_of(t, k)];
+      dropped.push_back(t);
+      return true;
+    });
+    more = dropped.size() != before;
+  }
+  std::sort(dropped.begin(), dropped.end());
+  remove(dropped, triangles);
+  return dropped;
+}
+
 std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable& edges) {
   if (!may_have_stacks(triangles, edges)) return 0;
   const std::vector<Stack> stacks = find_stacks(triangles, edges);
@@ -160,7 +152,7 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
   // Stacks that share an edge decide together.
   DisjointSets groups(stacks.size());
   std::vector<std::uint32_t> stack_at(edges.size(), kNoIndex);
-  const auto edge_of = [&](const Stack& stack, const std::size_t k) {
+  const auto edge_of = [&](const Stack& stack, std::size_t k) {
     return edges.edge_of(3 * std::size_t{stack.members[0]} + k);
   };
   for (std::uint32_t s = 0; s < stacks.size(); ++s)
@@ -170,9 +162,8 @@ std::size_t reduce_coincident(std::vector<Triangle>& triangles, const EdgeTable&
       groups.unite(other, s);
     }
 
-  // Two possible reductions of a group: how many copies of a stack stay, and how many edges are
-  // odd.
-  const auto copies_left = [&](const Stack& stack, const bool one_copy) {
+  // Two possible reductions of a group: copies of a stack that stay, and edges that are odd.
+  const auto copies_left = [&](const Stack& stack, bool one_copy) {
     return one_copy ? 1u : static_cast<std::uint32_t>(std::abs(stack.sum));
   };
   std::vector<std::array<std::size_t, 2>> odd(stacks.size(), {0, 0});

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <cstddef>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 

@@ -2,12 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/item_groups.h"
@@ -20,7 +15,7 @@ class TriangleColumns {
  public:
   /// `position` gives where a vertex lies.
   template <class Position>
-  TriangleColumns(const std::vector<Triangle>& triangles, const int axis, const Position& position)
+  TriangleColumns(const std::vector<Triangle>& triangles, int axis, const Position& position)
       : axes_{(axis + 1) % 3, (axis + 2) % 3} {
     const auto box_of = [&](const Triangle& t) {
       Eigen::AlignedBox2d box;
@@ -38,7 +33,7 @@ class TriangleColumns {
       for (std::uint32_t t = 0; t < triangles.size(); ++t) {
         const Eigen::AlignedBox2d box = box_of(triangles[t]);
         const auto from = cell(box.min()), to = cell(box.max());
-        const auto row = [&](const std::size_t y, const std::size_t first, const std::size_t last) {
+        const auto row = [&](std::size_t y, std::size_t first, std::size_t last) {
           for (std::size_t x = first; x <= last; ++x) visit(y * cells_ + x, t);
         };
         if (to[1] < from[1] + 2 || to[0] < from[0] + 2) {
@@ -74,11 +69,11 @@ class TriangleColumns {
 
   /// Grows with the coordinates, whatever is rounded.
   std::array<std::size_t, 2> cell(const Eigen::Vector2d& p) const {
-    const auto along = [&](const int i) { return place((p[i] - low_[i]) * per_unit_[i]); };
+    const auto along = [&](int i) { return place((p[i] - low_[i]) * per_unit_[i]); };
     return {along(0), along(1)};
   }
 
-  std::size_t place(const double at) const {
+  std::size_t place(double at) const {
     return at > 0 ? std::min(cells_ - 1, static_cast<std::size_t>(at)) : 0;
   }
 

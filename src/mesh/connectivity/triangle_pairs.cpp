@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstddef>
 
 #include "mesh/connectivity/self_intersections.h"
 #include "mesh/geometry/exact_sign.h"
@@ -42,7 +40,7 @@ bool plane_parts(const Side& of, const Side& other) {
 
 /// Seen along an axis, a side of `of` has its third corner strictly on one side and on the other,
 /// strictly, the other's corners but those that are ends of the side.
-bool line_parts(const Side& of, const Side& other, const int x, const int y) {
+bool line_parts(const Side& of, const Side& other, int x, int y) {
   // 0: too close to tell.
   const auto turn = [&](const Point& p, const Point& q, const Point& r) {
     const double left = (q[x] - p[x]) * (r[y] - p[y]), right = (q[y] - p[y]) * (r[x] - p[x]);
@@ -104,7 +102,7 @@ bool segments_meet_flat(const FlatView& view, const Point& p, const Point& q, co
          (ap == 0 && view.between(p, a, b)) || (aq == 0 && view.between(q, a, b));
 }
 
-bool all_on_one_side(const int a, const int b, const int c) {
+bool all_on_one_side(int a, int b, int c) {
   return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
 }
 
@@ -128,7 +126,7 @@ bool segment_meets_triangle(const Point& p, const Point& q, const CornerPoints& 
 }
 
 /// Turned so that corner k comes first.
-Triangle rotated(const Triangle& t, const std::size_t k) {
+Triangle rotated(const Triangle& t, std::size_t k) {
   return {t[k], t[(k + 1) % 3], t[(k + 2) % 3]};
 }
 

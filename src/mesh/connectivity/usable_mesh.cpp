@@ -1,14 +1,12 @@
 #include "mesh/connectivity/usable_mesh.h"
 
+#include <ist/types.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <atomic>
 #include <utility>
-
-#include <ist/types.h>
 
 #include "base/message_text.h"
 #include "mesh/connectivity/weld.h"
@@ -18,13 +16,13 @@ namespace {
 
 void check_indices_and_coordinates(const TriangleMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty()) throw Error(name + ": no triangles, so it does not bound a solid");
-  const auto unsound = [&](const std::size_t t) {
+  const auto unsound = [&](std::size_t t) {
     return std::any_of(mesh.triangles[t].begin(), mesh.triangles[t].end(), [&](const auto v) {
       return v >= mesh.vertices.size() || !mesh.vertices[v].allFinite();
     });
   };
   std::atomic<bool> sound = true;
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     if (unsound(t)) sound = false;
   });
   if (sound) return;

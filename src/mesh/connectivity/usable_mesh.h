@@ -1,11 +1,7 @@
 #pragma once
 
-#include <Eigen/Geometry>
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include <ist/mesh.h>
+#include <cmath>
 
 #include "mesh/connectivity/edge_table.h"
 
@@ -18,7 +14,6 @@ void weld_usable(TriangleMesh& mesh, const std::string& name);
 
 Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& points);
 
-/// The box around one triangle.
 inline Eigen::AlignedBox3d bounds_of(const std::vector<Eigen::Vector3d>& vertices,
                                      const Triangle& t) {
   Eigen::AlignedBox3d box(vertices[t[0]]);
@@ -38,7 +33,6 @@ inline double area_of(const std::vector<Eigen::Vector3d>& vertices, const Triang
   return (vertices[t[1]] - vertices[t[0]]).cross(vertices[t[2]] - vertices[t[0]]).norm() / 2;
 }
 
-/// The largest magnitude of a coordinate.
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 
 /// The spacing of doubles at `size`.

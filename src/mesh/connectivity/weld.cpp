@@ -1,7 +1,6 @@
 #include "mesh/connectivity/weld.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -20,8 +19,8 @@ struct WeldEntry {
 };
 
 /// The entries of a drawer come in the order of their points: the first of equal ones is kept.
-void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* const entries,
-                const std::size_t count, std::vector<std::uint32_t>& first) {
+void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* entries,
+                std::size_t count, std::vector<std::uint32_t>& first) {
   constexpr std::uint32_t kFree = UINT32_MAX;
   const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;
   std::vector<WeldEntry> table(mask + 1, WeldEntry{0, kFree});
@@ -36,54 +35,10 @@ void find_first(const std::vector<Eigen::Vector3d>& points, const WeldEntry* con
   }
 }
 
-}  // namespace
-
-std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
-                                       const std::vector<std::uint8_t>& used) {
-  // Chunks of points count what they have for each drawer, then put it there in order.
-  const std::size_t chunks = (points.size() + kWeldChunk - 1) / kWeldChunk;
-  std::vector<std::uint64_t> hashes(points.size());
-  std::vector<std::array<std::uint32_t, kDrawers>> place(chunks);
-  const auto for_each_used = [&](const auto& visit) {
-    tbb::parallel_for(std::size_t{0}, chunks, [&](const std::size_t c) {
-      for (std::size_t p = c * kWeldChunk; p < std::min((c + 1) * kWeldChunk, points.size()); ++p)
-        if (used[p] != 0) visit(c, p);
-    });
-  };
-  for (auto& counts : place) counts.fill(0);
-  for_each_used([&](const std::size_t c, const std::size_t p) {
-    hashes[p] = hash_of_bits(points[p]);
-    ++place[c][hashes[p] >> 56];
-  });
-  std::array<std::uint32_t, kDrawers + 1> begin{};
-  std::uint32_t sum = 0;
-  for (std::size_t d = 0; d < kDrawers; ++d) {
-    begin[d] = sum;
-    for (auto& counts : place) {
-      const std::uint32_t count = counts[d];
-      counts[d] = sum;
-      sum += count;
-    }
-  }
-  begin[kDrawers] = sum;
-  std::vector<WeldEntry> entries(sum);
-  for_each_used([&](const std::size_t c, const std::size_t p) {
-    entries[place[c][hashes[p] >> 56]++] = {static_cast<std::uint32_t>(hashes[p]),
-                                            static_cast<std::uint32_t>(p)};
-  });
-  std::vector<std::uint32_t> first(points.size());
-  tbb::parallel_for(std::size_t{0}, kDrawers, [&](const std::size_t d) {
-    find_first(points, entries.data() + begin[d], begin[d + 1] - begin[d], first);
-  });
-  return first;
-}
-
-namespace {
-
 /// [vertex] 1 where a triangle has it as a corner.
 std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
   std::vector<std::uint8_t> used(mesh.vertices.size(), 0);
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (const std::uint32_t v : mesh.triangles[t])
       std::atomic_ref<std::uint8_t>(used[v]).store(1, std::memory_order_relaxed);
   });
@@ -91,7 +46,7 @@ std::vector<std::uint8_t> referenced(const TriangleMesh& mesh) {
 }
 
 void rename_corners(TriangleMesh& mesh, const std::vector<std::uint32_t>& names) {
-  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](const std::size_t t) {
+  tbb::parallel_for(std::size_t{0}, mesh.triangles.size(), [&](std::size_t t) {
     for (std::uint32_t& v : mesh.triangles[t]) v = names[v];
   });
 }
@@ -101,7 +56,7 @@ void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
                 std::vector<std::uint32_t>& name) {
   std::atomic<bool> all{true};
   tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(name.size()),
-                    [&](const std::uint32_t v) {
+                    [&](std::uint32_t v) {
                       mesh.vertices[v] += Eigen::Vector3d::Zero();  // one zero only
                       if (used[v] == 0 || name[v] != v) all.store(false, std::memory_order_relaxed);
                     });
@@ -119,7 +74,47 @@ void keep_first(TriangleMesh& mesh, const std::vector<std::uint8_t>& used,
 
 }  // namespace
 
-TriangleMesh weld(TriangleMesh mesh, const double tolerance) {
+std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
+                                       const std::vector<std::uint8_t>& used) {
+  // Chunks of points count what they have for each drawer, then put it there in order.
+  const std::size_t chunks = (points.size() + kWeldChunk - 1) / kWeldChunk;
+  std::vector<std::uint64_t> hashes(points.size());
+  std::vector<std::array<std::uint32_t, kDrawers>> place(chunks);
+  const auto for_each_used = [&](const auto& visit) {
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t c) {
+      for (std::size_t p = c * kWeldChunk; p < std::min((c + 1) * kWeldChunk, points.size()); ++p)
+        if (used[p] != 0) visit(c, p);
+    });
+  };
+  for (auto& counts : place) counts.fill(0);
+  for_each_used([&](std::size_t c, std::size_t p) {
+    hashes[p] = hash_of_bits(points[p]);
+    ++place[c][hashes[p] >> 56];
+  });
+  std::array<std::uint32_t, kDrawers + 1> begin{};
+  std::uint32_t sum = 0;
+  for (std::size_t d = 0; d < kDrawers; ++d) {
+    begin[d] = sum;
+    for (auto& counts : place) {
+      const std::uint32_t count = counts[d];
+      counts[d] = sum;
+      sum += count;
+    }
+  }
+  begin[kDrawers] = sum;
+  std::vector<WeldEntry> entries(sum);
+  for_each_used([&](std::size_t c, std::size_t p) {
+    entries[place[c][hashes[p] >> 56]++] = {static_cast<std::uint32_t>(hashes[p]),
+                                            static_cast<std::uint32_t>(p)};
+  });
+  std::vector<std::uint32_t> first(points.size());
+  tbb::parallel_for(std::size_t{0}, kDrawers, [&](std::size_t d) {
+    find_first(points, entries.data() + begin[d], begin[d + 1] - begin[d], first);
+  });
+  return first;
+}
+
+TriangleMesh weld(TriangleMesh mesh, double tolerance) {
   if (tolerance > 0)
     return weld_among(mesh, tolerance, std::vector<bool>(mesh.vertices.size(), true));
   mesh.declared = {};
@@ -137,14 +132,13 @@ void drop_unused(TriangleMesh& mesh) {
   keep_first(mesh, used, name);
 }
 
-TriangleMesh weld_among(const TriangleMesh& mesh, const double tolerance,
+TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance,
                         const std::vector<bool>& among) {
   constexpr std::uint32_t kNone = UINT32_MAX;
   const std::vector<std::uint8_t> used = referenced(mesh);
   TriangleMesh result;
   std::vector<std::uint32_t> kept_as(mesh.vertices.size(), kNone);
-  // Kept vertices by the hash of their cell. Cells are so wide that what is near enough lies in one
-  // or two along each axis.
+  // Kept vertices by their cell's hash. What is near enough lies in one or two cells along an axis.
   const double width = 4 * tolerance;
   const auto count = static_cast<std::size_t>(std::count(among.begin(), among.end(), true));
   const std::size_t mask = std::bit_ceil(2 * count + 1) - 1;

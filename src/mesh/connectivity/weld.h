@@ -1,11 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <bit>
-#include <cstdint>
-#include <vector>
-
 #include <ist/mesh.h>
+#include <bit>
 
 #include "base/hashing.h"
 
@@ -19,9 +15,8 @@ inline std::uint64_t hash_of_bits(const Eigen::Vector3d& p) {
   return hash;
 }
 
-/// [point] the smallest index among those that are used and have equal coordinates (−0 = 0);
-/// anything for points that are not used. `used` [point]: 0 or 1. Used coordinates must be finite.
-/// On the caller's TBB threads.
+/// [point] the smallest index of a used point with equal coordinates (−0 = 0); anything for unused
+/// ones. `used` [point]: 0 or 1; those are finite. On the caller's TBB threads.
 std::vector<std::uint32_t> first_equal(const std::vector<Eigen::Vector3d>& points,
                                        const std::vector<std::uint8_t>& used);
 
@@ -33,8 +28,7 @@ TriangleMesh weld(TriangleMesh mesh, double tolerance);
 /// Drops unreferenced vertices, the last step of the two above.
 void drop_unused(TriangleMesh& mesh);
 
-/// Like weld() with a tolerance above 0, but keeps vertices that are not in `among` (by index)
-/// apart.
+/// Like weld() with a tolerance above 0, but only of the vertices in `among` (by index).
 TriangleMesh weld_among(const TriangleMesh& mesh, double tolerance, const std::vector<bool>& among);
 
 }  // namespace ist

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 #include "base/host_device.h"
 #include "mesh/geometry/closest_point.h"

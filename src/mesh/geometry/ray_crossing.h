@@ -61,8 +61,7 @@ IST_HD inline double crossing_x(const Corners& t, const double yz[2]) {
   return mean < x.low ? x.low : x.high < mean ? x.high : mean;
 }
 
-/// The ray for the winding number goes towards the nearer end: the signs on the other half of the
-/// line are the same, negated.
+/// The ray goes towards the nearer end: the signs on the other half of the line are negated.
 IST_HD inline bool ray_towards_plus(const double p[3]) { return p[0] >= 0; }
 
 /// Whether the line through p parallel to x meets a triangle that it pierces, which faces

@@ -2,10 +2,8 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <utility>
 
 #include "mesh/geometry/exact_triangle.h"
@@ -19,7 +17,7 @@ constexpr double kSlender = 32;
 /// `corners(t)`: of triangle t. About 4 for even triangles, twice the length over the width for
 /// needles. The same bits for any number of threads.
 template <class CornersOf>
-double mean_slenderness(const std::size_t count, const CornersOf& corners) {
+double mean_slenderness(std::size_t count, const CornersOf& corners) {
   using Sums = std::pair<double, double>;  // boxes, triangles
   constexpr std::size_t kGrain = 4096;
   const Sums sums = tbb::parallel_deterministic_reduce(

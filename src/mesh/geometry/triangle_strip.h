@@ -24,7 +24,7 @@ struct TriangleStrip {
     right = std::max(off, 0.0);
   }
 
-  double at(const double y) const { return at0 + slope * y; }
+  double at(double y) const { return at0 + slope * y; }
 };
 
 }  // namespace ist

@@ -2,13 +2,9 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cstddef>
-#include <limits>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -17,16 +13,14 @@
 #include "mesh/geometry/triangle_frame.h"
 #include "mesh/hierarchy/bvh.h"
 
-// Many triangles are sorted into cells of a coarse grid first; the tree over
-// the cells is cheap, and what hangs below a few of them is built by one thread
-// each.
+// Many triangles are sorted into cells of a coarse grid first; the tree over the cells is cheap,
+// and one thread each builds what is below a few of them.
 
 namespace ist {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-/// Below this depth ranges are halved, whatever it costs: traversal stacks are
-/// of fixed size.
+/// Below this depth ranges are halved, whatever it costs: stacks are of fixed size.
 constexpr int kHeuristicDepth = 40;
 // Deeper down numbers are halved: of the cells of one grid, then of the triangles of one cell.
 static_assert(kHeuristicDepth + 12 + 28 < kBvhLevels);
@@ -134,8 +128,7 @@ float blocks_of(std::uint32_t triangles) {
   return static_cast<float>((triangles + kBvhWidth - 1) / kBvhWidth);
 }
 
-/// Where a range is cut: items in slices before `bin` along `axis` go left.
-/// None: axis < 0.
+/// Where a range is cut: slices before `bin` along `axis` go left. None: axis < 0.
 struct Cut {
   int axis = -1, bin = 0;
 };
@@ -305,8 +298,7 @@ SortExtent extent_of_many(std::span<Item> items) {
 
 Tree tree_of(const Range& range);
 
-/// A range in the cells of a grid, and the tree over them down to groups of a
-/// few cells.
+/// A range in a grid's cells, and the tree over them down to groups of a few.
 class CellTree {
  public:
   explicit CellTree(const Range& range)

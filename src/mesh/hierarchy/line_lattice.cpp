@@ -1,7 +1,6 @@
 #include "mesh/hierarchy/line_lattice.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 
 #include "mesh/geometry/exact_triangle.h"
@@ -10,12 +9,12 @@ namespace ist {
 namespace {
 
 /// The crossings of rows [from, to): line (i, j) is group (j − from) ny + i.
-LatticeCrossings cross_rows(const MeshView& mesh, const LineLattice& lattice,
-                            const std::uint32_t from, const std::uint32_t to) {
+LatticeCrossings cross_rows(const MeshView& mesh, const LineLattice& lattice, std::uint32_t from,
+                            std::uint32_t to) {
   // Threads share the triangles; where these are few, also their rows.
   const bool is_few = mesh.triangle_count < 4096;
   const auto each = [&](const auto& visit) {
-    const auto here = [&](const std::size_t line, const Crossing& crossing) {
+    const auto here = [&](std::size_t line, const Crossing& crossing) {
       visit(line - std::size_t{from} * lattice.ny, crossing);
     };
     tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t triangle) {

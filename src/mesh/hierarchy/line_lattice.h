@@ -1,9 +1,6 @@
 #pragma once
 
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <functional>
 
 #include "base/host_device.h"
 #include "mesh/connectivity/item_groups.h"
@@ -83,8 +80,8 @@ inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
   return {y, z};
 }
 
-/// Whether a line of row j may lie within. Most rows of a needle have none, which this tells for
-/// less than lines_of() does.
+/// Whether a line of row j may lie within; cheaper than lines_of() for needles, where most have
+/// none.
 inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
   constexpr double kRoom = 2e-6;  // more than a LatticeRange's
   const double at = strip.at(j) - lattice.turned(j);

@@ -1,5 +1,4 @@
 #include <tbb/parallel_for.h>
-
 #include <vector>
 
 #include "mesh/geometry/exact_triangle.h"
@@ -43,7 +42,7 @@ WideOrientedBox box_around(const MeshView& mesh, const std::vector<std::uint32_t
 }  // namespace
 
 std::unique_ptr<OrientedBoxes<kBvhWidth>[]> oriented_boxes(const MeshView& mesh,
-                                                           const std::size_t nodes) {
+                                                           std::size_t nodes) {
   const auto corners = [&](std::size_t t) {
     return corners_of(mesh, static_cast<std::uint32_t>(t));
   };

@@ -7,9 +7,8 @@
 #include "mesh/geometry/exact_triangle.h"
 #include "mesh/hierarchy/wide_traversal.h"
 
-// Distance queries of a WideTree, by a team: one thread or a warp (base/team.h). The answers
-// are those of closest_point.h and exact_triangle.h, bit for bit. All lanes ask the same and
-// get the same.
+// Distance queries of a WideTree, by a team (base/team.h), whose lanes all ask and get the same.
+// The answers are those of closest_point.h and exact_triangle.h, bit for bit.
 
 namespace ist {
 
@@ -243,8 +242,7 @@ IST_HD WideExact exact_nearest(const Team& team, const WideTree& tree, const dou
                                double limit) {
   const ExactReach reach(p);
   WideExactQuery<Team> query(team, tree, p, reach, limit * limit);
-  // The float answer first. Its traversal visits all that may be closer in double, hardly ever more
-  // than one triangle a lane.
+  // The float answer first. Its traversal visits all that may be closer in double: few.
   WideNearestQuery<Team, true> coarse(team, tree, reach.p, reach.error, query.radius2);
   traverse(team, tree, coarse);
   const float candidate2 = coarse.reach2();

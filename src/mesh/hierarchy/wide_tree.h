@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include "base/host_device.h"
 #include "mesh/geometry/mesh_view.h"
 #include "mesh/geometry/triangle_frame.h"

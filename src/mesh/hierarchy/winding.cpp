@@ -2,7 +2,6 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -71,29 +70,6 @@ void visit_about_box(const MeshView& mesh, const float low[3], const float high[
   }
 }
 
-}  // namespace
-
-int winding_number(const MeshView& mesh, const double p[3]) {
-  int winding = 0;
-  const RayBox box = RayBox::ray(p);
-  visit_about_box(mesh, box.lower, box.upper,
-                  [&](const Corners& t) { winding += ray_winding(t, p); });
-  return winding;
-}
-
-void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out) {
-  out.clear();
-  const double yz[2] = {y, z};
-  const RayBox box = RayBox::line(y, z);
-  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
-    const int facing = pierced(t, yz);
-    if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
-  });
-  std::sort(out.begin(), out.end(), comes_before);
-}
-
-namespace {
-
 /// Lines (y, z) by the square cells that they lie in, as many cells as lines.
 class LinesInCells {
  public:
@@ -117,7 +93,7 @@ class LinesInCells {
 
  private:
   /// Never falls as the coordinate grows.
-  std::size_t cell_of(const double x) const {
+  std::size_t cell_of(double x) const {
     const auto n = static_cast<double>(cells_);
     return static_cast<std::size_t>(std::clamp((x + 1) / 2 * n, 0.0, n - 1));
   }
@@ -128,14 +104,33 @@ class LinesInCells {
 
 }  // namespace
 
+int winding_number(const MeshView& mesh, const double p[3]) {
+  int winding = 0;
+  const RayBox box = RayBox::ray(p);
+  visit_about_box(mesh, box.lower, box.upper,
+                  [&](const Corners& t) { winding += ray_winding(t, p); });
+  return winding;
+}
+
+void line_crossings(const MeshView& mesh, double y, double z, std::vector<Crossing>& out) {
+  out.clear();
+  const double yz[2] = {y, z};
+  const RayBox box = RayBox::line(y, z);
+  visit_about_box(mesh, box.lower, box.upper, [&](const Corners& t) {
+    const int facing = pierced(t, yz);
+    if (facing != 0) out.push_back({crossing_x(t, yz), -facing});
+  });
+  std::sort(out.begin(), out.end(), comes_before);
+}
+
 ItemGroups<std::uint32_t, Crossing> line_crossings(
     const MeshView& mesh, const std::vector<std::array<double, 2>>& lines) {
   const LinesInCells in_cells(lines);
   tbb::enumerable_thread_specific<std::vector<std::pair<std::uint32_t, Crossing>>> of_threads;
-  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](const std::uint32_t triangle) {
+  tbb::parallel_for(std::uint32_t{0}, mesh.triangle_count, [&](std::uint32_t triangle) {
     const Corners t = corners_of(mesh, triangle);
     const Extent y(t, 1), z(t, 2);
-    in_cells.for_each(y, z, [&](const std::uint32_t line) {
+    in_cells.for_each(y, z, [&](std::uint32_t line) {
       const double* const yz = lines[line].data();
       if (yz[0] < y.low || yz[0] > y.high || yz[1] < z.low || yz[1] > z.high) return;
       const int facing = pierced(t, yz);

@@ -1,6 +1,5 @@
-#include "mesh/hierarchy/winding_kernel.h"
+#include "mesh/hierarchy/winding.h"
 
-#include <cstdint>
 #include <numbers>
 
 #include "base/angle.h"

@@ -14,9 +14,8 @@ ColladaDocument::ColladaDocument(const SourceFile& file)
     if (const std::string_view id = xml_.attribute(i, "id"); !id.empty()) by_id_.emplace(id, i);
 }
 
-ColladaDocument::Index ColladaDocument::target(const Index element,
-                                               const std::string_view attribute,
-                                               const std::string_view name) const {
+ColladaDocument::Index ColladaDocument::target(Index element, std::string_view attribute,
+                                               std::string_view name) const {
   const std::string_view url = xml_.attribute(element, attribute);
   if (url.empty() || url[0] != '#')
     xml_.fail(element, "refers to " + in_quotes(url) + ", not to an element of this file");
@@ -27,7 +26,7 @@ ColladaDocument::Index ColladaDocument::target(const Index element,
   return found->second;
 }
 
-std::uint64_t ColladaDocument::whole(const Index element, const std::string_view attribute,
+std::uint64_t ColladaDocument::whole(Index element, std::string_view attribute,
                                      const std::optional<std::uint64_t> fallback) const {
   const std::string_view text = xml_.attribute(element, attribute);
   if (text.empty() && fallback) return *fallback;
@@ -38,9 +37,9 @@ std::uint64_t ColladaDocument::whole(const Index element, const std::string_view
   return *value;
 }
 
-std::vector<double> ColladaDocument::reals(const Index element) const {
+std::vector<double> ColladaDocument::reals(Index element) const {
   std::vector<double> values;
-  for_words(xml_[element].text, [&](const std::string_view word) {
+  for_words(xml_[element].text, [&](std::string_view word) {
     const std::optional<double> value = parse_real(word);
     if (!value) xml_.fail(element, in_quotes(word) + " is not a number");
     values.push_back(*value);
@@ -48,7 +47,7 @@ std::vector<double> ColladaDocument::reals(const Index element) const {
   return values;
 }
 
-std::vector<double> ColladaDocument::reals(const Index element, const std::size_t count) const {
+std::vector<double> ColladaDocument::reals(Index element, std::size_t count) const {
   std::vector<double> values = reals(element);
   if (values.size() != count)
     xml_.fail(element,
@@ -56,9 +55,9 @@ std::vector<double> ColladaDocument::reals(const Index element, const std::size_
   return values;
 }
 
-std::vector<std::uint64_t> ColladaDocument::wholes(const Index element) const {
+std::vector<std::uint64_t> ColladaDocument::wholes(Index element) const {
   std::vector<std::uint64_t> values;
-  for_words(xml_[element].text, [&](const std::string_view word) {
+  for_words(xml_[element].text, [&](std::string_view word) {
     const std::optional<std::uint64_t> value = parse_whole<std::uint64_t>(word);
     if (!value) xml_.fail(element, in_quotes(word) + " is not a whole number ≥ 0");
     values.push_back(*value);

@@ -1,10 +1,7 @@
 #pragma once
 
-#include <cstdint>
 #include <optional>
-#include <string_view>
 #include <unordered_map>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/xml_document.h"
@@ -28,7 +25,6 @@ class ColladaDocument {
   std::uint64_t whole(Index element, std::string_view attribute,
                       std::optional<std::uint64_t> fallback = std::nullopt) const;
 
-  /// The numbers of an element's text.
   std::vector<double> reals(Index element) const;
   std::vector<double> reals(Index element, std::size_t count) const;
   std::vector<std::uint64_t> wholes(Index element) const;

@@ -1,11 +1,8 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/collada_document.h"
 
@@ -15,13 +12,12 @@ namespace {
 using Index = ColladaDocument::Index;
 constexpr std::uint64_t kWidest = 255;  // inputs of a corner
 
-/// Reads one <geometry>.
 class GeometryReader {
  public:
   GeometryReader(const ColladaDocument& document, std::size_t& numbers_read)
       : document_(document), xml_(document.xml()), numbers_read_(numbers_read) {}
 
-  PolygonMesh read(const Index geometry) {
+  PolygonMesh read(Index geometry) {
     const Index source = xml_.child(geometry, "mesh");
     if (source == kNoElement) {  // a spline has no faces
       for (const char* const solid : {"convex_mesh", "brep"})
@@ -40,8 +36,7 @@ class GeometryReader {
   }
 
  private:
-  /// Positions of a <vertices>.
-  std::vector<Eigen::Vector3d> positions(const Index vertices) {
+  std::vector<Eigen::Vector3d> positions(Index vertices) {
     Index input = xml_[vertices].first_child;
     while (input != kNoElement && xml_.attribute(input, "semantic") != "POSITION")
       input = xml_[input].next_sibling;
@@ -84,7 +79,7 @@ class GeometryReader {
     return result;
   }
 
-  void append_primitive(const Index element) {
+  void append_primitive(Index element) {
     std::uint64_t width = 1;
     std::optional<std::uint64_t> vertex_at;
     Index vertices = kNoElement;
@@ -164,7 +159,7 @@ class GeometryReader {
     std::uint64_t vertex_count;
   };
 
-  std::vector<Index> corner_indices(const Index p, const Corners& corners) const {
+  std::vector<Index> corner_indices(Index p, const Corners& corners) const {
     const std::vector<std::uint64_t> all = document_.wholes(p);
     if (all.size() % corners.width != 0)
       xml_.fail(p, std::to_string(all.size()) + " indices for corners of " +
@@ -180,7 +175,7 @@ class GeometryReader {
     return result;
   }
 
-  void add_polygon(const std::vector<Index>& p, const std::size_t begin, const std::size_t size) {
+  void add_polygon(const std::vector<Index>& p, std::size_t begin, std::size_t size) {
     if (size < 3) return;  // points and lines
     mesh_.corners.insert(mesh_.corners.end(), p.begin() + static_cast<std::ptrdiff_t>(begin),
                          p.begin() + static_cast<std::ptrdiff_t>(begin + size));
@@ -201,7 +196,7 @@ class GeometryReader {
 
 }  // namespace
 
-const PolygonMesh& ColladaGeometries::operator[](const std::uint32_t geometry) {
+const PolygonMesh& ColladaGeometries::operator[](std::uint32_t geometry) {
   const auto found = read_.find(geometry);
   if (found != read_.end()) return found->second;
   return read_.emplace(geometry, GeometryReader(document_, numbers_read_).read(geometry))

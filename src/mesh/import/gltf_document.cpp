@@ -12,22 +12,21 @@
 namespace ist {
 namespace {
 
-std::uint32_t word_at(const std::string_view bytes, const std::size_t offset) {
+std::uint32_t word_at(std::string_view bytes, std::size_t offset) {
   std::uint32_t value = 0;
   std::memcpy(&value, bytes.data() + offset, sizeof value);
   return value;
 }
 
 template <std::size_t Count>
-bool starts_with_any(const std::string_view text,
-                     const std::array<std::string_view, Count>& starts) {
+bool starts_with_any(std::string_view text, const std::array<std::string_view, Count>& starts) {
   return std::any_of(starts.begin(), starts.end(),
-                     [&](const std::string_view start) { return text.starts_with(start); });
+                     [&](std::string_view start) { return text.starts_with(start); });
 }
 
 /// Extensions that change how a surface looks, not where it is; and those that are read: integer
 /// coordinates, like any others, and instances.
-bool is_harmless(const std::string_view extension) {
+bool is_harmless(std::string_view extension) {
   constexpr std::array<std::string_view, 6> kHarmless{
       "KHR_mesh_quantization", "EXT_mesh_gpu_instancing",
       "KHR_materials_",        "KHR_texture_",
@@ -36,13 +35,13 @@ bool is_harmless(const std::string_view extension) {
 }
 
 /// Where it is not required, a file contains the same numbers without it.
-bool is_compression(const std::string_view extension) {
+bool is_compression(std::string_view extension) {
   constexpr std::array<std::string_view, 3> kCompressions{
       "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"};
   return starts_with_any(extension, kCompressions);
 }
 
-std::optional<std::string> decode_base64(const std::string_view text) {
+std::optional<std::string> decode_base64(std::string_view text) {
   constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string bytes;
@@ -81,14 +80,14 @@ struct ComponentType {
 };
 
 template <class T>
-double read_as(const char* const bytes) {
+double read_as(const char* bytes) {
   T value;
   std::memcpy(&value, bytes, sizeof value);
   return static_cast<double>(value);
 }
 
 template <class T>
-constexpr ComponentType component(const std::size_t code) {
+constexpr ComponentType component(std::size_t code) {
   return {code, sizeof(T), static_cast<double>(std::numeric_limits<T>::max()), read_as<T>};
 }
 
@@ -96,7 +95,7 @@ constexpr std::array<ComponentType, 6> kComponentTypes = {
     component<std::int8_t>(5120),   component<std::uint8_t>(5121),  component<std::int16_t>(5122),
     component<std::uint16_t>(5123), component<std::uint32_t>(5125), {5126, 4, 1, read_as<float>}};
 
-std::size_t width_of(const std::string_view type) {
+std::size_t width_of(std::string_view type) {
   return type == "SCALAR" ? 1 : type == "VEC3" ? 3 : type == "VEC4" ? 4 : 16;
 }
 
@@ -220,7 +219,7 @@ std::string_view GltfDocument::external_buffer(const std::string& uri, const std
   return files_.emplace(path, read_source_file(path).bytes).first->second;
 }
 
-const GltfDocument::Json& GltfDocument::at(const std::string& name, const std::size_t index,
+const GltfDocument::Json& GltfDocument::at(const std::string& name, std::size_t index,
                                            const std::string& from) const {
   const bool exists = root_.contains(name) && root_.at(name).is_array();
   const std::size_t count = exists ? root_.at(name).size() : 0;
@@ -259,7 +258,7 @@ double GltfDocument::real(const Json& value, const std::string& where) const {
 }
 
 std::vector<double> GltfDocument::numbers(const Json& where, const Json& type_owner,
-                                          const std::string_view type, const std::size_t count,
+                                          std::string_view type, std::size_t count,
                                           const std::string& name) const {
   const std::size_t code = whole(type_owner, "componentType");
   const auto component = std::find_if(kComponentTypes.begin(), kComponentTypes.end(),
@@ -300,7 +299,7 @@ std::vector<double> GltfDocument::numbers(const Json& where, const Json& type_ow
   return values;
 }
 
-std::vector<double> GltfDocument::accessor(const std::size_t index, const std::string_view type,
+std::vector<double> GltfDocument::accessor(std::size_t index, std::string_view type,
                                            const std::string& from) const {
   const Json& accessor = at("accessors", index, from);
   const std::string name = "accessor " + std::to_string(index);
@@ -338,8 +337,7 @@ std::vector<double> GltfDocument::accessor(const std::size_t index, const std::s
   return values;
 }
 
-void GltfDocument::spend(const std::size_t width, const std::size_t count,
-                         const std::string& name) const {
+void GltfDocument::spend(std::size_t width, std::size_t count, const std::string& name) const {
   const std::size_t most = 32 * most_corners();
   if (count > (most - numbers_read_) / width)
     fail(name + ": the file asks for more than " + std::to_string(most) +

@@ -1,12 +1,9 @@
 #pragma once
 
-#include <cstddef>
 #include <deque>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "mesh/import/source_file.h"
@@ -29,8 +26,7 @@ class GltfDocument {
   std::vector<std::string> unread_extensions() const;
   /// A small file can ask for many copies of its meshes: more corners than this are no accident.
   std::size_t most_corners() const { return 12'000'000 + file_.bytes.size(); }
-  /// Member `index` of the array `name` at the top level; `from` is what refers to it, for
-  /// messages.
+  /// Member `index` of the array `name` at the top level; `from`: who refers to it.
   const Json& at(const std::string& name, std::size_t index, const std::string& from) const;
   /// A whole number ≥ 0 under `key`.
   std::size_t whole(const Json& object, const std::string& key,

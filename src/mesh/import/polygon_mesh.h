@@ -1,15 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <map>
-#include <string>
-#include <vector>
-
 #include <ist/mesh.h>
+#include <map>
 
 #include "mesh/import/source_file.h"
 
@@ -58,8 +50,8 @@ struct GltfParts {
 };
 GltfParts read_gltf_parts(const SourceFile& file);
 
-/// COLLADA: the visual scene with its node transforms, in metres and on the file's own axes; skins
-/// in their bind pose.
+/// COLLADA: the visual scene with its node transforms, in metres, on the file's axes; skins in bind
+/// pose.
 PolygonMesh read_collada(const SourceFile& file);
 
 /// Any other format that assimp reads, the transforms of root and nodes applied, on the file's own
@@ -67,8 +59,7 @@ PolygonMesh read_collada(const SourceFile& file);
 PolygonMesh read_with_assimp(const SourceFile& file);
 
 /// Polygons into triangles: a fan where it is valid, else ears cut off in the polygon's own plane
-/// (Newell normal), so that concave polygons come out right. What is triangles already is taken
-/// from the mesh.
+/// (Newell normal), so that concave polygons come out right. Triangles are moved out of the mesh.
 std::vector<std::array<std::uint32_t, 3>> triangulate(PolygonMesh& mesh);
 
 /// Appends the triangles of one polygon of three or more corners.

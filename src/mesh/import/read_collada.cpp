@@ -2,12 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <string>
-#include <string_view>
 #include <unordered_map>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/collada_document.h"
 #include "mesh/import/text_scanner.h"
@@ -18,9 +15,8 @@ namespace {
 using Transform = Eigen::Affine3d;
 using Index = ColladaDocument::Index;
 
-/// Sine and cosine of an angle in degrees from + − × ÷ alone, the same on every machine; exact at
-/// multiples of 90°.
-std::pair<double, double> sine_and_cosine(const double degrees) {
+/// Sine and cosine of degrees by + − × ÷ alone: alike on every machine; exact at multiples of 90°.
+std::pair<double, double> sine_and_cosine(double degrees) {
   const double turned = std::fmod(degrees, 360.0);  // exact
   const double quarter = std::round(turned / 90);
   const double x = (turned - 90 * quarter) * (std::numbers::pi / 180);  // |x| ≤ π/4
@@ -68,7 +64,7 @@ class SceneReader {
   }
 
  private:
-  void open_nodes_below(const Index element, const Transform& parent) {
+  void open_nodes_below(Index element, const Transform& parent) {
     for (Index child = xml_[element].first_child; child != kNoElement;
          child = xml_[child].next_sibling) {
       if (++steps_ > kMostInstances + xml_.size())
@@ -119,7 +115,7 @@ class SceneReader {
   }
 
   /// The transform of a node, read once however often the node is visited.
-  const Transform& local_transform(const Index node) {
+  const Transform& local_transform(Index node) {
     const auto [found, is_new] = transforms_.try_emplace(node, Transform::Identity());
     if (!is_new) return found->second;
     Transform& transform = found->second;
@@ -144,7 +140,7 @@ class SceneReader {
     return transform;
   }
 
-  Transform matrix(const Index element) const {
+  Transform matrix(Index element) const {
     const std::vector<double> m = document_.reals(element, 16);  // by rows
     if (m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1)
       xml_.fail(element, "a projection, not a transform");
@@ -153,7 +149,7 @@ class SceneReader {
     return result;
   }
 
-  Eigen::Matrix3d rotation(const Index element) const {
+  Eigen::Matrix3d rotation(Index element) const {
     const std::vector<double> r = document_.reals(element, 4);  // axis, degrees
     const Eigen::Vector3d axis(r.data());
     if (!(axis.norm() > 0) || !axis.allFinite() || !std::isfinite(r[3]))
@@ -166,7 +162,7 @@ class SceneReader {
   }
 
   /// A skinned mesh in its bind pose stands where its skin says, not its node.
-  void append_controller(const Index instance, const Transform& world) {
+  void append_controller(Index instance, const Transform& world) {
     const Index controller = document_.target(instance, "url", "controller");
     const auto [found, is_new] = controllers_.try_emplace(controller);
     Controlled& controlled = found->second;
@@ -188,7 +184,7 @@ class SceneReader {
     append(controlled.geometry, controlled.pose.value_or(world), instance);
   }
 
-  void append(const Index element, const Transform& world, const Index instance) {
+  void append(Index element, const Transform& world, Index instance) {
     const PolygonMesh& mesh = geometries_[element];
     out_.notes.insert(out_.notes.end(), mesh.notes.begin(), mesh.notes.end());
     if (out_.corners.size() + mesh.corners.size() > document_.most() ||

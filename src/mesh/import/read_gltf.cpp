@@ -1,14 +1,7 @@
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
-#include <map>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "mesh/import/gltf_document.h"
@@ -20,8 +13,8 @@ namespace {
 using Json = GltfDocument::Json;
 using Transform = Eigen::Affine3d;
 
-Transform placed(const GltfDocument& document, const double* const t, const double* const r,
-                 const double* const s, const std::string& name) {
+Transform placed(const GltfDocument& document, const double* t, const double* r, const double* s,
+                 const std::string& name) {
   const Eigen::Quaterniond rotation(r[3], r[0], r[1], r[2]);
   if (!(rotation.norm() > 0)) document.fail(name + ": its rotation is zero");
   Transform transform = Transform::Identity();
@@ -32,7 +25,7 @@ Transform placed(const GltfDocument& document, const double* const t, const doub
 }
 
 /// From 16 numbers by columns.
-Transform affine(const GltfDocument& document, const double* const m, const std::string& name) {
+Transform affine(const GltfDocument& document, const double* m, const std::string& name) {
   if (m[3] != 0 || m[7] != 0 || m[11] != 0 || m[15] != 1)
     document.fail(name + ": its matrix is a projection, not a transform");
   Transform transform;
@@ -63,7 +56,7 @@ Transform local_transform(const GltfDocument& document, const Json& node, const 
 }
 
 /// More digits than a float32 has when it is written as a decimal or as the double it is.
-bool is_certainly_double(const double x) {
+bool is_certainly_double(double x) {
   char text[32];
   const auto end = std::to_chars(text, text + sizeof text, x, std::chars_format::general, 9).ptr;
   double rounded = x;
@@ -79,14 +72,14 @@ std::vector<Transform> instances(const GltfDocument& document, const Json& node,
   if (!node.contains("extensions") || !node.at("extensions").contains(kExtension))
     return {Transform::Identity()};
   const Json& attributes = node.at("extensions").at(kExtension).at("attributes");
-  const auto read = [&](const char* key, const std::string_view type) {
+  const auto read = [&](const char* key, std::string_view type) {
     if (!attributes.contains(key)) return std::vector<double>();
     return document.accessor(document.whole(attributes, key), type, name);
   };
   const std::vector<double> t = read("TRANSLATION", "VEC3"), r = read("ROTATION", "VEC4"),
                             s = read("SCALE", "VEC3");
   const std::size_t count = std::max({t.size() / 3, r.size() / 4, s.size() / 3});
-  const auto fits = [&](const std::vector<double>& values, const std::size_t width) {
+  const auto fits = [&](const std::vector<double>& values, std::size_t width) {
     return values.empty() || values.size() == width * count;
   };
   if (count == 0 || !fits(t, 3) || !fits(r, 4) || !fits(s, 3))
@@ -103,7 +96,7 @@ std::vector<Transform> instances(const GltfDocument& document, const Json& node,
 }
 
 std::vector<std::uint32_t> corner_indices(const GltfDocument& document, const Json& primitive,
-                                          const std::size_t vertex_count, const std::string& name) {
+                                          std::size_t vertex_count, const std::string& name) {
   std::vector<std::uint32_t> indices;
   if (!primitive.contains("indices")) {
     for (std::size_t i = 0; i < vertex_count; ++i) indices.push_back(static_cast<std::uint32_t>(i));
@@ -153,8 +146,7 @@ Primitive read_primitive(const GltfDocument& document, const Json& json, const s
   return primitive;
 }
 
-/// Moves vertices by the morph targets: Σ weight · target. The node's weights come before its
-/// mesh's.
+/// Moves vertices by Σ weight · morph target. The node's weights come before its mesh's.
 void morph(const GltfDocument& document, const Json& json, const std::vector<double>& weights,
            const std::string& name, Primitive& primitive) {
   if (!json.contains("targets") || weights.empty()) return;
@@ -299,7 +291,7 @@ class GltfScene {
   }
 
  private:
-  bool has_mesh(const std::size_t index) const {
+  bool has_mesh(std::size_t index) const {
     return document_.root().at("nodes")[index].contains("mesh");
   }
 
@@ -330,7 +322,7 @@ class GltfScene {
   }
 
   /// Where a node's mesh stands, all its instances; the joints place a skinned one.
-  std::vector<Transform> world_places(const std::size_t index) const {
+  std::vector<Transform> world_places(std::size_t index) const {
     const Json& node = document_.root().at("nodes")[index];
     std::vector<Transform> places = instances(document_, node, "node " + std::to_string(index));
     for (Transform& place : places)
@@ -338,7 +330,7 @@ class GltfScene {
     return places;
   }
 
-  void append_node(const std::size_t index, const std::vector<Transform>& places,
+  void append_node(std::size_t index, const std::vector<Transform>& places,
                    PolygonMesh& out) const {
     const std::string name = "node " + std::to_string(index);
     const Json& node = document_.at("nodes", index, name);
@@ -361,7 +353,7 @@ class GltfScene {
   }
 
   /// From the frame in which the skin was modelled to where each of its joints stands.
-  std::vector<Transform> joints_of(const std::size_t index, const std::string& from) const {
+  std::vector<Transform> joints_of(std::size_t index, const std::string& from) const {
     const std::string name = "skin " + std::to_string(index);
     const Json& skin = document_.at("skins", index, from);
     const std::vector<std::size_t> nodes = document_.whole_list(skin, "joints");

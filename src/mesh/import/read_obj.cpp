@@ -1,6 +1,4 @@
 #include <set>
-#include <string>
-#include <string_view>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"
@@ -9,20 +7,19 @@ namespace ist {
 namespace {
 
 /// The vertex of a corner "v", "v/vt", "v//vn" or "v/vt/vn": counted from 1, or back from −1.
-std::int64_t vertex_of_corner(const TextScanner& scanner, const std::string_view corner) {
+std::int64_t vertex_of_corner(const TextScanner& scanner, std::string_view corner) {
   return scanner.integer(corner.substr(0, corner.find('/')));
 }
 
 /// Statements other than `f` that make or fetch a surface.
-bool is_surface(const std::string_view keyword) {
+bool is_surface(std::string_view keyword) {
   return keyword == "surf" || keyword == "bsp" || keyword == "bzp" || keyword == "cdp" ||
          keyword == "call";
 }
 
 }  // namespace
 
-/// Wavefront OBJ: `v` and `f`, lines continued by a backslash. Other surfaces are noted; all else
-/// is passed over.
+/// Wavefront OBJ: `v` and `f`, with backslashes at line ends. Notes other surfaces, skips all else.
 PolygonMesh read_obj(const SourceFile& file) {
   if (file.bytes.find('\0') != std::string::npos)
     fail(file, "holds binary data, so it is not an OBJ file. Give it the ending of its format");

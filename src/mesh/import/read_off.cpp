@@ -1,5 +1,3 @@
-#include <string>
-#include <string_view>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"
@@ -14,7 +12,7 @@ std::size_t count_lines_with_words(TextScanner scanner) {
   return count;
 }
 
-std::size_t read_count(TextScanner& scanner, const char* of_what, const std::size_t least_bytes) {
+std::size_t read_count(TextScanner& scanner, const char* of_what, std::size_t least_bytes) {
   const std::int64_t count = scanner.integer(scanner.word_anywhere());
   if (count < 0) scanner.fail(std::string("a negative number of ") + of_what);
   if (static_cast<std::uint64_t>(count) > scanner.bytes_left() / least_bytes + 1)
@@ -46,8 +44,7 @@ PolygonMesh read_off(const SourceFile& file) {
   PolygonMesh mesh;
   mesh.vertices.reserve(vertex_count);
   mesh.ends.reserve(face_count);
-  const auto first_word = [&](const char* of_what, const std::size_t index,
-                              const std::size_t count) {
+  const auto first_word = [&](const char* of_what, std::size_t index, std::size_t count) {
     if (line_a_record) scanner.next_line();
     const std::string_view word = scanner.word_anywhere();
     if (word.empty())

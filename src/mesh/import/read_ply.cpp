@@ -1,16 +1,10 @@
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 #include "mesh/import/text_scanner.h"
@@ -21,7 +15,7 @@ namespace {
 enum class Encoding { ascii, little_endian, big_endian };
 
 template <class T>
-double read_number(const char* const bytes, const Encoding encoding) {
+double read_number(const char* bytes, const Encoding encoding) {
   static_assert(std::endian::native == std::endian::little);
   std::array<char, sizeof(T)> raw;
   std::memcpy(raw.data(), bytes, sizeof(T));
@@ -37,7 +31,7 @@ struct NumberType {
 };
 
 template <class T>
-constexpr NumberType number_type(const std::string_view name, const std::string_view other_name) {
+constexpr NumberType number_type(std::string_view name, std::string_view other_name) {
   return {name, other_name, sizeof(T), read_number<T>};
 }
 
@@ -68,13 +62,13 @@ struct Header {
   std::size_t lines = 0;
 };
 
-NumberType parse_type(const TextScanner& scanner, const std::string_view word) {
+NumberType parse_type(const TextScanner& scanner, std::string_view word) {
   for (const NumberType& type : kNumberTypes)
     if (word == type.name || word == type.other_name) return type;
   scanner.fail("unknown property type " + in_quotes(word));
 }
 
-Encoding parse_encoding(const TextScanner& scanner, const std::string_view word) {
+Encoding parse_encoding(const TextScanner& scanner, std::string_view word) {
   if (word == "ascii") return Encoding::ascii;
   if (word == "binary_little_endian") return Encoding::little_endian;
   if (word == "binary_big_endian") return Encoding::big_endian;
@@ -146,7 +140,7 @@ class Body {
   }
 
   /// A value of a binary file that lies whole within it.
-  double value_at(const std::size_t position, const NumberType& type) const {
+  double value_at(std::size_t position, const NumberType& type) const {
     return type.read(file_.bytes.data() + position, encoding_);
   }
 
@@ -158,7 +152,7 @@ class Body {
   }
 
   /// Throws unless the file is long enough for `count` records of `bytes` each.
-  void require(const std::uint64_t count, const std::size_t bytes, const std::string& what) const {
+  void require(std::uint64_t count, std::size_t bytes, const std::string& what) const {
     const std::size_t left =
         encoding_ == Encoding::ascii ? text_.bytes_left() : file_.bytes.size() - position_;
     if (bytes > 0 && count > left / bytes)
@@ -178,7 +172,7 @@ class Body {
 
   /// Where so many records of a binary file begin, which are then passed over; nothing in a text or
   /// where the file is too short for them.
-  std::optional<std::size_t> pass_records(const std::uint64_t count, const std::size_t bytes) {
+  std::optional<std::size_t> pass_records(std::uint64_t count, std::size_t bytes) {
     if (is_text() || count > (file_.bytes.size() - position_) / bytes) return std::nullopt;
     return std::exchange(position_, position_ + count * bytes);
   }
@@ -219,7 +213,7 @@ void read_vertices(Body& body, const Element& element, PolygonMesh& mesh) {
     const std::size_t bytes = body.least_bytes(element);
     if (const auto start = body.pass_records(element.count, bytes)) {
       mesh.vertices.resize(element.count);
-      tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](const std::size_t i) {
+      tbb::parallel_for(std::size_t{0}, mesh.vertices.size(), [&](std::size_t i) {
         std::size_t position = *start + bytes * i;
         for (std::size_t p = 0; p < element.properties.size(); ++p) {
           const NumberType& type = element.properties[p].type;
@@ -253,7 +247,7 @@ bool is_corners(const Property& property) {
 
 /// Faces of a binary file that has nothing but triangles, all of them sound: records of one size.
 /// False, and nothing is read, where it is otherwise.
-bool read_triangles(Body& body, const Element& element, const std::uint64_t vertex_count,
+bool read_triangles(Body& body, const Element& element, std::uint64_t vertex_count,
                     PolygonMesh& mesh) {
   if (body.is_text() || element.properties.size() != 1 || !is_corners(element.properties[0]))
     return false;
@@ -265,7 +259,7 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
   if (!start) return false;
   std::vector<std::array<std::uint32_t, 3>> triangles(element.count);
   std::atomic<bool> sound{true};
-  tbb::parallel_for(std::uint64_t{0}, element.count, [&](const std::uint64_t i) {
+  tbb::parallel_for(std::uint64_t{0}, element.count, [&](std::uint64_t i) {
     const std::size_t position = *start + bytes * i;
     bool is_sound = body.value_at(position, list.count_type) == 3;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -283,9 +277,8 @@ bool read_triangles(Body& body, const Element& element, const std::uint64_t vert
 }
 
 /// Throws Error unless the value counts a vertex.
-std::uint32_t vertex_of(const Body& body, const double value, const std::uint64_t vertex_count,
-                        const char* const of_what, const std::uint64_t index,
-                        const std::uint64_t corner) {
+std::uint32_t vertex_of(const Body& body, double value, std::uint64_t vertex_count,
+                        const char* of_what, std::uint64_t index, std::uint64_t corner) {
   if (!(value >= 0) || value >= static_cast<double>(vertex_count) || value != std::floor(value))
     body.fail_here(of_what + std::to_string(index) + ": corner " + std::to_string(corner) +
                    " is not a vertex: the file has " + std::to_string(vertex_count) +
@@ -294,7 +287,7 @@ std::uint32_t vertex_of(const Body& body, const double value, const std::uint64_
 }
 
 /// Strips of triangles, each turned against the one before; −1 ends one.
-void read_strips(Body& body, const Element& element, const std::uint64_t vertex_count,
+void read_strips(Body& body, const Element& element, std::uint64_t vertex_count,
                  PolygonMesh& mesh) {
   for (std::uint64_t i = 0; i < element.count; ++i) {
     for (const Property& property : element.properties) {
@@ -316,8 +309,7 @@ void read_strips(Body& body, const Element& element, const std::uint64_t vertex_
   }
 }
 
-void read_faces(Body& body, const Element& element, const std::uint64_t vertex_count,
-                PolygonMesh& mesh) {
+void read_faces(Body& body, const Element& element, std::uint64_t vertex_count, PolygonMesh& mesh) {
   if (element.properties.empty()) return;  // any number of nothing
   if (read_triangles(body, element, vertex_count, mesh)) return;
   mesh.ends.reserve(element.count);

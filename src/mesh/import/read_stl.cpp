@@ -1,10 +1,7 @@
 #include <tbb/parallel_for.h>
-
 #include <bit>
 #include <cctype>
 #include <cstring>
-#include <string>
-#include <string_view>
 
 #include "base/message_text.h"
 #include "mesh/import/polygon_mesh.h"
@@ -49,7 +46,7 @@ PolygonMesh read_binary(const SourceFile& file) {
                          counted(count, "triangle") + " that the header announces are not read");
   mesh.vertices.resize(3 * count);
   mesh.triangles.resize(count);
-  tbb::parallel_for(std::uint64_t{0}, count, [&](const std::uint64_t i) {
+  tbb::parallel_for(std::uint64_t{0}, count, [&](std::uint64_t i) {
     float corners[9];
     std::memcpy(corners, file.bytes.data() + kHeaderBytes + kFacetBytes * i + 12, sizeof corners);
     const auto first = static_cast<std::uint32_t>(3 * i);
@@ -60,7 +57,7 @@ PolygonMesh read_binary(const SourceFile& file) {
   return mesh;
 }
 
-bool same_letters(const std::string_view word, const std::string_view lower) {
+bool same_letters(std::string_view word, std::string_view lower) {
   if (word.size() != lower.size()) return false;
   for (std::size_t i = 0; i < word.size(); ++i)
     if (std::tolower(static_cast<unsigned char>(word[i])) != lower[i]) return false;
@@ -74,7 +71,7 @@ PolygonMesh read_text(const SourceFile& file) {
     if (word.empty()) scanner.fail("the file ends early: a solid is not closed by endsolid");
     return word;
   };
-  const auto expect = [&](const std::string_view word, const char* keyword) {
+  const auto expect = [&](std::string_view word, const char* keyword) {
     if (same_letters(word, keyword)) return;
     if (scanner.bytes_left() == 0) scanner.fail("the file ends early, in " + in_quotes(word));
     scanner.fail("expected " + in_quotes(keyword) + ", found " + in_quotes(word));

@@ -1,20 +1,16 @@
+#include <ist/solid.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-
-#include <ist/solid.h>
-#include <ist/types.h>
 
 namespace ist {
 namespace {
 
 using openvdb::FloatGrid;
 
-/// The file's one grid. Throws Error.
 openvdb::GridBase::Ptr only_grid(const std::string& path) {
   openvdb::io::File file(path);
   file.open(/*delayLoad=*/false);

@@ -1,5 +1,4 @@
 #include <ist/solid.h>
-#include <ist/types.h>
 
 namespace ist {
 

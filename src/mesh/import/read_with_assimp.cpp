@@ -1,14 +1,9 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
-
 #include <algorithm>
-#include <array>
 #include <assimp/Importer.hpp>
-#include <cstdint>
-#include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 

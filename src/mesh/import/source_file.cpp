@@ -1,12 +1,11 @@
 #include "mesh/import/source_file.h"
 
+#include <ist/types.h>
 #include <array>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
-
-#include <ist/types.h>
 
 namespace ist {
 namespace {
@@ -62,7 +61,7 @@ bool looks_like_web_page(std::string_view bytes) {
 
 }  // namespace
 
-std::string_view without_byte_order_mark(const std::string_view text) {
+std::string_view without_byte_order_mark(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   return text.starts_with(kByteOrderMark) ? text.substr(kByteOrderMark.size()) : text;
 }
@@ -108,7 +107,7 @@ void refuse_other_format(const SourceFile& file) {
 
 void fail(const SourceFile& file, const std::string& what) { throw Error(file.path + ": " + what); }
 
-void fail_at_line(const SourceFile& file, const std::size_t line, const std::string& what) {
+void fail_at_line(const SourceFile& file, std::size_t line, const std::string& what) {
   fail(file, "line " + std::to_string(line) + ": " + what);
 }
 
@@ -116,7 +115,7 @@ std::string ending_of(const std::string& path) {
   return lower_case(std::filesystem::path(path).extension().string());
 }
 
-std::string in_quotes(const std::string_view word) {
+std::string in_quotes(std::string_view word) {
   constexpr std::size_t kLongest = 40;
   std::string text = "\"";
   for (const char c : word.substr(0, kLongest)) text += (c >= ' ' && c <= '~') ? c : '?';

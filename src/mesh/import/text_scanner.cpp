@@ -7,17 +7,16 @@
 namespace ist {
 namespace {
 
-bool is_space(const char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
+bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
-std::string_view without_plus(const std::string_view word) {
+std::string_view without_plus(std::string_view word) {
   const bool plus = word.size() > 1 && word[0] == '+' && word[1] != '-';
   return plus ? word.substr(1) : word;
 }
 
 }  // namespace
 
-TextScanner::TextScanner(const SourceFile& file, const char comment, const std::size_t start,
-                         const std::size_t line)
+TextScanner::TextScanner(const SourceFile& file, char comment, std::size_t start, std::size_t line)
     : file_(file), text_(file.bytes), position_(start), line_number_(line - 1), comment_(comment) {
   if (start == 0) position_ = text_.size() - without_byte_order_mark(text_).size();
   // All lines end like the first: in old files with a carriage return alone.
@@ -58,14 +57,14 @@ std::string_view TextScanner::word_anywhere() {
 
 void TextScanner::fail(const std::string& what) const { fail_at_line(file_, line_number_, what); }
 
-double TextScanner::real(const std::string_view word) const {
+double TextScanner::real(std::string_view word) const {
   if (word.empty()) fail("a number is missing");
   const std::optional<double> value = parse_real(word);
   if (!value) fail(in_quotes(word) + " is not a number");
   return *value;
 }
 
-std::int64_t TextScanner::integer(const std::string_view word) const {
+std::int64_t TextScanner::integer(std::string_view word) const {
   if (word.empty()) fail("a whole number is missing");
   const std::string_view digits = without_plus(word);
   std::int64_t value = 0;
@@ -76,7 +75,7 @@ std::int64_t TextScanner::integer(const std::string_view word) const {
   return value;
 }
 
-std::optional<double> parse_real(const std::string_view word) {
+std::optional<double> parse_real(std::string_view word) {
   const std::string_view digits = without_plus(word);
   const char* const last = digits.data() + digits.size();
   double value = 0;
@@ -84,8 +83,7 @@ std::optional<double> parse_real(const std::string_view word) {
   if (end != last) return std::nullopt;
   if (error == std::errc()) return value;
   if (error != std::errc::result_out_of_range) return std::nullopt;
-  // from_chars does not say whether a number is too large or too small. The exponent does, for the
-  // mantissas that people write.
+  // from_chars does not tell too large from too small. The exponent does, for usual mantissas.
   const std::size_t exponent = digits.find_first_of("eE");
   const bool tiny = exponent != std::string_view::npos && digits.substr(exponent + 1, 1) == "-";
   if (tiny) return 0.0;

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <string_view>
 
 #include "mesh/import/source_file.h"
 

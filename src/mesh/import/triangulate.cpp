@@ -1,5 +1,3 @@
-#include <Eigen/Geometry>
-#include <vector>
 
 #include "mesh/import/polygon_mesh.h"
 
@@ -69,13 +67,13 @@ class EarClipper {
     bool is_cut = false;
   };
 
-  double quality(const std::size_t k) const {
+  double quality(std::size_t k) const {
     const Corner& corner = corners_[k];
     return corner.blocked_by == kNobody ? corner.roundness : corner.roundness - 1;
   }
 
   /// The corner at place i has new neighbours.
-  void look_at(const std::size_t i) {
+  void look_at(std::size_t i) {
     const std::size_t n = left_.size(), k = left_[i];
     Corner& corner = corners_[k];
     corner.before = left_[(i + n - 1) % n];
@@ -87,7 +85,7 @@ class EarClipper {
   }
 
   /// Points before the blocker that was cut do not lie in the ear, so it goes on from there.
-  void find_blocker(const std::size_t k) {
+  void find_blocker(std::size_t k) {
     Corner& corner = corners_[k];
     const Eigen::Vector3d &a = points_[corner.before], &b = points_[k], &c = points_[corner.after];
     std::size_t i = corner.blocked_by == kNobody ? 0 : corner.blocked_by + 1;
@@ -111,9 +109,8 @@ class EarClipper {
 
 }  // namespace
 
-void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices,
-                         const std::uint32_t* const corners, const std::size_t count,
-                         Triangles& out) {
+void triangulate_polygon(const std::vector<Eigen::Vector3d>& vertices, const std::uint32_t* corners,
+                         std::size_t count, Triangles& out) {
   if (count == 3) {
     out.push_back({corners[0], corners[1], corners[2]});
     return;

@@ -32,8 +32,7 @@ XmlDocument::XmlDocument(const SourceFile& file) : file_(file), bytes_(file.byte
   if (elements_.empty()) ist::fail(file_, "contains no XML element");
 }
 
-std::string_view XmlDocument::attribute(const std::uint32_t element,
-                                        const std::string_view name) const {
+std::string_view XmlDocument::attribute(std::uint32_t element, std::string_view name) const {
   const auto first = attributes_.begin() + elements_[element].first_attribute;
   const auto last = first + elements_[element].attribute_count;
   const auto found =
@@ -41,18 +40,18 @@ std::string_view XmlDocument::attribute(const std::uint32_t element,
   return found == last ? std::string_view() : found->second;
 }
 
-std::uint32_t XmlDocument::child(const std::uint32_t element, const std::string_view name) const {
+std::uint32_t XmlDocument::child(std::uint32_t element, std::string_view name) const {
   std::uint32_t child = elements_[element].first_child;
   while (child != kNone && elements_[child].name != name) child = elements_[child].next_sibling;
   return child;
 }
 
-void XmlDocument::fail(const std::uint32_t element, const std::string& what) const {
+void XmlDocument::fail(std::uint32_t element, const std::string& what) const {
   fail_at(elements_[element].offset,
           "<" + std::string(elements_[element].name.substr(0, 40)) + ">: " + what);
 }
 
-void XmlDocument::fail_at(const std::size_t offset, const std::string& what) const {
+void XmlDocument::fail_at(std::size_t offset, const std::string& what) const {
   const auto lines =
       std::count(bytes_.begin(), bytes_.begin() + static_cast<std::ptrdiff_t>(offset), '\n');
   fail_at_line(file_, static_cast<std::size_t>(lines) + 1, what);
@@ -61,9 +60,7 @@ void XmlDocument::fail_at(const std::size_t offset, const std::string& what) con
 void XmlDocument::parse() {
   for (at_ = bytes_.find('<'); at_ != std::string_view::npos; at_ = bytes_.find('<', at_)) {
     const std::string_view rest = bytes_.substr(at_);
-    const auto begins = [&](const std::string_view text) {
-      return rest.substr(0, text.size()) == text;
-    };
+    const auto begins = [&](std::string_view text) { return rest.substr(0, text.size()) == text; };
     if (begins("<!--"))
       skip("-->", "a comment");
     else if (begins("<?"))
@@ -79,7 +76,7 @@ void XmlDocument::parse() {
   }
 }
 
-void XmlDocument::skip(const std::string_view end, const char* const what) {
+void XmlDocument::skip(std::string_view end, const char* what) {
   const std::size_t found = bytes_.find(end, at_ + 2);
   if (found == std::string_view::npos)
     fail_at(at_, "the file ends early: " + std::string(what) + " is not closed");
@@ -97,7 +94,7 @@ void XmlDocument::open_tag() {
   const std::size_t end = std::min(bytes_.find_first_of(" \t\r\n/><\"'", at_), bytes_.size());
   element.name = bytes_.substr(at_, end - at_);
   if (element.name.empty() || !std::all_of(element.name.begin(), element.name.end(),
-                                           [](const char c) { return c > ' ' && c <= '~'; }))
+                                           [](char c) { return c > ' ' && c <= '~'; }))
     fail_at(element.offset, "a tag without a readable name");
   at_ = end;
   read_attributes(element);

@@ -1,9 +1,6 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,14 +8,12 @@
 
 namespace ist {
 
-/// Escapes text for an XML or HTML file or attribute. Control characters, which XML lacks, become
-/// '?'.
+/// Escapes text for an XML or HTML file or attribute. Control characters become '?'.
 std::string xml_text(std::string_view text);
 
 /// The elements of an XML file, in the order they begin. Strict, and without what hostile files are
-/// made of: no document types (so no entities), no encoding but UTF-8, a bounded depth. Nothing
-/// here recurses, and memory is a small multiple of the file. Entities in attributes stay as they
-/// are.
+/// made of: no document types (so no entities), no encoding but UTF-8, a bounded depth. No
+/// recursion; memory is a small multiple of the file. Entities in attributes stay.
 class XmlDocument {
  public:
   static constexpr std::uint32_t kNone = UINT32_MAX;

@@ -1,12 +1,6 @@
 #include <ist/solid.h>
-#include <ist/types.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <functional>
-#include <memory>
 #include <mutex>
 #include <numbers>
 #include <utility>

@@ -1,12 +1,8 @@
-#include "mesh/level_set/dual_mesh.h"
+#include "mesh/level_set/polygonise.h"
 
-#include <ist/types.h>
 #include <tbb/parallel_for.h>
-
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "base/message_text.h"
 
@@ -161,8 +157,8 @@ Vector3d vertex_of(const CellField& field, const SurfaceCell& cell, int loop) {
 }
 
 /// The vertices of all cells' loops, [u]: each within its cell, off its walls, where the surface's
-/// tangent planes at the loop's edges meet, or on the surface where these are about one plane. Sets
-/// SurfaceCell::first_vertex.
+/// tangent planes at the loop's edges meet, or on the surface if these are nearly one plane. Sets
+/// first_vertex.
 std::vector<Vector3d> place_vertices(const Solid& solid, const CellGrid& grid,
                                      std::vector<SurfaceCell>& cells) {
   std::uint32_t count = 0;
@@ -263,6 +259,24 @@ Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<Surf
                           surface_to_mesh(solid, grid, cells, result.mesh));
   stage.step(0, 1);
   return result;
+}
+
+Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress) {
+  if (cells < kFewestCells || cells > kMostCells)
+    throw Error("polygonise: " + std::to_string(cells) + " cells requested; the number must be " +
+                std::to_string(kFewestCells) + " to " + std::to_string(kMostCells));
+  Stage stage("polygonise", progress);
+  stage.step(0, 0);
+  const CellGrid grid = grid_around(solid, cells);
+  std::vector<SurfaceCell> listed = find_surface_cells(
+      solid, grid, [&](int level, int levels) { stage.step(0, 0.2 * level / levels); });
+  const bool seen = std::any_of(listed.begin(), listed.end(),
+                                [](const SurfaceCell& cell) { return cell.loops > 0; });
+  if (!seen)
+    throw Error(
+        "solid: a grid of " + std::to_string(cells) +
+        " cells along the longest side does not resolve it. Use more cells, or tighter bounds");
+  return dual_mesh(solid, grid, std::move(listed), stage);
 }
 
 }  // namespace ist

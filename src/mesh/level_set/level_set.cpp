@@ -1,15 +1,10 @@
 #include <ist/solid.h>
-
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include <ist/types.h>
-
-#include "mesh/level_set/dual_mesh.h"
-#include "mesh/level_set/level_set_surface.h"
+#include "mesh/level_set/polygonise.h"
 #include "mesh/level_set/surface_cells.h"
 
 namespace ist {
@@ -74,8 +69,7 @@ std::vector<SurfaceCell> crossed_cells(const Lattice& lattice, std::int32_t k) {
   return cells;
 }
 
-/// Steepest slope within two cells of any of `cells`, times the spacing. Further from the surface
-/// no proof looks.
+/// Steepest slope within two cells of any of `cells`, times the spacing: proofs look no further.
 double steepest_near(const Lattice& lattice, const std::vector<SurfaceCell>& cells) {
   constexpr std::int32_t kReach = 2;
   std::vector<double> slopes(cells.size());
@@ -93,8 +87,8 @@ double steepest_near(const Lattice& lattice, const std::vector<SurfaceCell>& cel
   return *std::max_element(slopes.begin(), slopes.end());
 }
 
-/// The interpolation over its steepest slope: 1-Lipschitz near the surface. Beyond the lattice, as
-/// on its border.
+/// The interpolation over its steepest slope: 1-Lipschitz near the surface. Constant beyond the
+/// lattice.
 class Interpolation final : public Solid {
  public:
   Interpolation(const Lattice& lattice, const CellGrid& grid, double steepest)

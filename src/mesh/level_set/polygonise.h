@@ -2,7 +2,9 @@
 
 #include <ist/mesh.h>
 #include <ist/solid.h>
-#include <ist/types.h>
+
+#include "base/stage.h"
+#include "mesh/level_set/surface_cells.h"
 
 namespace ist {
 
@@ -35,5 +37,27 @@ constexpr unsigned kFewestCells = 8, kMostCells = 1024;
 /// bounds, where the signed distance is not 1-Lipschitz or not a number, as far as that is met, and
 /// if progress cancels (stage "polygonise").
 Polygonised polygonise(const Solid& solid, unsigned cells, const ProgressCallback& progress = {});
+
+/// The mesh of mesh_level_set(), without the proof of its distance from the level set, which would
+/// take most of the time. Throws Error likewise.
+ClosedMesh level_set_surface(const DistanceGrid& distances, const std::string& name);
+
+/// The mesh of a solid from the cells that its surface crosses, all of them listed by Morton code
+/// with their loops, and its error. Reports the second 60 % of the work. Throws Error as
+/// polygonise().
+Polygonised dual_mesh(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell> cells,
+                      Stage& stage);
+
+/// The same without the error, which takes most of the time. Numbers the cells' vertices.
+TriangleMesh dual_surface(const Solid& solid, const CellGrid& grid, std::vector<SurfaceCell>& cells,
+                          Stage& stage);
+
+/// [u] how far a triangle of the mesh is from the solid's surface anywhere: the largest over all.
+double mesh_to_surface(const Solid& solid, const CellGrid& grid, const TriangleMesh& mesh);
+
+/// [u] how far the surface is from the mesh that place_vertices() began, anywhere: the largest over
+/// all listed cells. In others there is none.
+double surface_to_mesh(const Solid& solid, const CellGrid& grid,
+                       const std::vector<SurfaceCell>& cells, const TriangleMesh& mesh);
 
 }  // namespace ist

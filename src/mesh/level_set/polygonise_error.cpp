@@ -1,15 +1,12 @@
-#include "mesh/level_set/dual_mesh.h"
-
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/exact_triangle.h"
+#include "mesh/level_set/polygonise.h"
 
 namespace ist {
 namespace {

@@ -1,11 +1,9 @@
 #include "mesh/level_set/surface_cells.h"
 
+#include <ist/types.h>
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
-
-#include <ist/types.h>
 
 #include "base/hashing.h"
 

@@ -1,11 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <vector>
-
 #include <ist/solid.h>
 
 namespace ist {

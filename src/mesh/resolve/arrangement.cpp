@@ -3,12 +3,10 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/surface_reduction.h"
 #include "mesh/resolve/planar_triangulation.h"
-#include "mesh/resolve/unresolvable.h"
 
 namespace ist {
 namespace {
@@ -33,7 +31,7 @@ class PairOfTriangles {
       : points_(points), triangles_(triangles), found_(found) {}
 
   /// Adds the ends of what two triangles have in common; false where they lie in one plane.
-  bool add_ends(const std::uint32_t a, const std::uint32_t b) {
+  bool add_ends(std::uint32_t a, std::uint32_t b) {
     const Sides of_a = sides(b, a), of_b = sides(a, b);
     if (of_a == Sides{0, 0, 0}) return false;
     add_crossings(a, of_a, b);
@@ -45,7 +43,7 @@ class PairOfTriangles {
   using Sides = std::array<int, 3>;
 
   /// On which sides of triangle `plane` the corners of t are.
-  Sides sides(const std::uint32_t plane, const std::uint32_t t) const {
+  Sides sides(std::uint32_t plane, std::uint32_t t) const {
     const Triangle& of = triangles_[plane];
     Sides result;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -56,7 +54,7 @@ class PairOfTriangles {
   }
 
   /// Corners and edges of t that meet the closed triangle `other` without lying along it.
-  void add_crossings(const std::uint32_t t, const Sides& side, const std::uint32_t other) {
+  void add_crossings(std::uint32_t t, const Sides& side, std::uint32_t other) {
     const Triangle &corner = triangles_[t], &of = triangles_[other];
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t p = corner[k], q = corner[(k + 1) % 3];
@@ -67,7 +65,7 @@ class PairOfTriangles {
   }
 
   /// Whether a closed triangle contains a vertex in its plane.
-  bool holds(const Triangle& t, const std::uint32_t p) const {
+  bool holds(const Triangle& t, std::uint32_t p) const {
     if (p == t[0] || p == t[1] || p == t[2]) return true;
     int k = 0;
     while (k < 2 && points_.turn(k, t[0], t[1], t[2]) == 0) ++k;
@@ -76,14 +74,14 @@ class PairOfTriangles {
   }
 
   /// Whether the line pq, which crosses the plane of t, meets the closed triangle.
-  bool is_pierced(const Triangle& t, const std::uint32_t p, const std::uint32_t q) const {
-    const auto around = [&](const std::uint32_t a, const std::uint32_t b) {
+  bool is_pierced(const Triangle& t, std::uint32_t p, std::uint32_t q) const {
+    const auto around = [&](std::uint32_t a, std::uint32_t b) {
       return a == p || a == q || b == p || b == q ? 0 : points_.side({p, q, a}, points_.view(b));
     };
     return same_turn(around(t[0], t[1]), around(t[1], t[2]), around(t[2], t[0]));
   }
 
-  static bool same_turn(const int a, const int b, const int c) {
+  static bool same_turn(int a, int b, int c) {
     return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
   }
 
@@ -95,10 +93,10 @@ class PairOfTriangles {
 /// Gives every name in `names` (sorted, none twice) its number.
 std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangle>& triangles,
                                   const std::vector<Named>& names, WatchedWork& work,
-                                  const double share) {
+                                  double share) {
   std::vector<ExactPoint> exact(names.size());
   std::vector<RoundedPoint> rounded(names.size());
-  work.for_each(names.size(), share, [&](const std::size_t i) {
+  work.for_each(names.size(), share, [&](std::size_t i) {
     const Named& name = names[i];
     if (name.triangle == kNoIndex) return;
     const ExactPlane plane = points.plane(triangles[name.triangle]);
@@ -118,10 +116,10 @@ std::vector<std::uint32_t> number(ExactPoints& points, const std::vector<Triangl
 /// as `work` does, of which this is `share`.
 std::vector<Meeting> find_meetings(ExactPoints& points, const std::vector<Triangle>& triangles,
                                    const std::span<const std::array<std::uint32_t, 2>> pairs,
-                                   WatchedWork& work, const double share) {
+                                   WatchedWork& work, double share) {
   std::vector<Meeting> meetings(pairs.size());
   std::vector<std::vector<Named>> ends(pairs.size());
-  work.for_each(pairs.size(), share / 2, [&](const std::size_t i) {
+  work.for_each(pairs.size(), share / 2, [&](std::size_t i) {
     const auto [a, b] = pairs[i];
     meetings[i].triangles = pairs[i];
     meetings[i].coplanar = !PairOfTriangles(points, triangles, ends[i]).add_ends(a, b);
@@ -206,15 +204,13 @@ class ClusterWork {
     std::vector<Segment>& segments = cluster_.segments;
     std::vector<std::size_t> order(segments.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    const auto ends = [&](const std::size_t i) {
-      return std::minmax(segments[i].from, segments[i].to);
-    };
+    const auto ends = [&](std::size_t i) { return std::minmax(segments[i].from, segments[i].to); };
     std::stable_sort(order.begin(), order.end(),
-                     [&](const std::size_t i, const std::size_t j) { return ends(i) < ends(j); });
+                     [&](std::size_t i, std::size_t j) { return ends(i) < ends(j); });
     for (std::size_t i = 0; i < order.size(); ++i)
       segments[order[i]].like =
           i > 0 && ends(order[i]) == ends(order[i - 1]) ? segments[order[i - 1]].like : order[i];
-    std::erase_if(order, [&](const std::size_t i) { return segments[i].like != i; });
+    std::erase_if(order, [&](std::size_t i) { return segments[i].like != i; });
     std::vector<Range> x(segments.size()), y(segments.size());
     for (const std::size_t i : order) {
       segments[i].on = {segments[i].from, segments[i].to};
@@ -222,10 +218,10 @@ class ClusterWork {
       y[i] = range(segments[i], second());
     }
     std::stable_sort(order.begin(), order.end(),
-                     [&](const std::size_t i, const std::size_t j) { return x[i].low < x[j].low; });
+                     [&](std::size_t i, std::size_t j) { return x[i].low < x[j].low; });
     std::vector<std::uint32_t>& touched = cluster_.touched;
-    const auto place_of = [&](const std::uint32_t p) { return points_.rounded(p)[first()]; };
-    std::sort(touched.begin(), touched.end(), [&](const std::uint32_t p, const std::uint32_t q) {
+    const auto place_of = [&](std::uint32_t p) { return points_.rounded(p)[first()]; };
+    std::sort(touched.begin(), touched.end(), [&](std::uint32_t p, std::uint32_t q) {
       return std::pair(place_of(p), p) < std::pair(place_of(q), q);
     });
     for (std::size_t place = 0; place < order.size(); ++place) {
@@ -247,7 +243,7 @@ class ClusterWork {
 
   void triangulate(const std::array<std::uint32_t, 3>& frame) {
     std::vector<std::uint32_t> inner = cluster_.touched;
-    const auto along = [&](const std::uint32_t p, const std::uint32_t q) {
+    const auto along = [&](std::uint32_t p, std::uint32_t q) {
       const int by_first = points_.compare(first(), p, q);
       return by_first != 0 ? by_first < 0 : points_.compare(second(), p, q) < 0;
     };
@@ -278,27 +274,27 @@ class ClusterWork {
   };
 
   /// 1 for sides of triangles that face away from the viewer.
-  std::size_t facing_of(const std::size_t side) const {
+  std::size_t facing_of(std::size_t side) const {
     const Triangle& t = triangles_[cluster_.triangles[side / 3]];
     return turn(t[0], t[1], t[2]) < 0 ? 1 : 0;
   }
   int first() const { return (cluster_.axis + 1) % 3; }
   int second() const { return (cluster_.axis + 2) % 3; }
-  int turn(const std::uint32_t a, const std::uint32_t b, const std::uint32_t c) const {
+  int turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     return points_.turn(cluster_.axis, a, b, c);
   }
-  Range range(const Segment& s, const int k) const {
+  Range range(const Segment& s, int k) const {
     const auto [low, high] = std::minmax(points_.rounded(s.from)[k], points_.rounded(s.to)[k]);
     return {low, high};
   }
 
   /// p lies on the line through s: does it lie on s?
-  bool within(const std::uint32_t p, const Segment& s) const {
+  bool within(std::uint32_t p, const Segment& s) const {
     for (const int k : {first(), second()})
       if (points_.compare(k, s.from, p) * points_.compare(k, p, s.to) < 0) return false;
     return true;
   }
-  void put(const std::uint32_t p, Segment& s) const {
+  void put(std::uint32_t p, Segment& s) const {
     for (const int k : {first(), second()}) {
       const Range r = range(s, k);
       if (points_.rounded(p)[k] < r.low || points_.rounded(p)[k] > r.high) return;
@@ -307,7 +303,7 @@ class ClusterWork {
   }
 
   /// Whether they cross between their ends.
-  bool meet(const std::size_t i, const std::size_t j) {
+  bool meet(std::size_t i, std::size_t j) {
     Segment &a = cluster_.segments[i], &b = cluster_.segments[j];
     for (const auto& [shared, end] : {std::pair(a.from, a.to), std::pair(a.to, a.from)})
       if ((shared == b.from || shared == b.to) &&
@@ -443,7 +439,7 @@ Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
     return ClusterWork(out.points, triangles, cluster, work);
   };
   std::atomic<std::size_t> crossings{0};
-  work.for_each(clusters.size(), kCuts, [&](const std::size_t c) {
+  work.for_each(clusters.size(), kCuts, [&](std::size_t c) {
     drop_copies(clusters[c]);
     on(clusters[c]).choose_axis();
     on(clusters[c]).meet(crossings);
@@ -453,15 +449,15 @@ Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
       const std::uint32_t p = out.points.add(std::move(crossing.exact), crossing.rounded);
       for (const std::size_t s : crossing.segments) cluster.segments[s].on.push_back(p);
     }
-  work.for_each(clusters.size(), kPieces, [&](const std::size_t c) {
+  work.for_each(clusters.size(), kPieces, [&](std::size_t c) {
     on(clusters[c]).triangulate(frames[static_cast<std::size_t>(clusters[c].axis)]);
   });
-  const auto add = [&](const Triangle& corners, const std::uint32_t source, const int step) {
+  const auto add = [&](const Triangle& corners, std::uint32_t source, int step) {
     out.pieces.push_back(step > 0 ? corners : Triangle{corners[0], corners[2], corners[1]});
     out.source.push_back(source);
     out.winding_step.push_back(std::abs(step));
   };
-  const auto add_pieces = [&](const Cluster& cluster, const std::uint32_t source) {
+  const auto add_pieces = [&](const Cluster& cluster, std::uint32_t source) {
     bool wall = false;
     for (const auto& [corners, winding] : cluster.pieces) {
       if (winding[0] + winding[1] != 0) add(corners, source, winding[0] + winding[1]);

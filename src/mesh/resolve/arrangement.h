@@ -2,15 +2,10 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
-#include <array>
 #include <atomic>
 #include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include "base/work_stop.h"
+#include "base/aside.h"
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/resolve/exact_points.h"
 
@@ -42,8 +37,7 @@ class WatchedWork : public WorkStop {
   std::atomic<double> done_ = 0;
 };
 
-/// A mesh's triangles, cut wherever they meet: pieces that have nothing in common but whole sides
-/// and corners.
+/// A mesh's triangles, cut where they meet: pieces share nothing but whole sides and corners.
 struct Arrangement {
   ExactPoints points;
   std::vector<Triangle> pieces;       ///< corners by the points' numbers
@@ -54,8 +48,7 @@ struct Arrangement {
 };
 
 /// Leaves out triangles on a line, and pieces that others cancel by facing the other side. `pairs`:
-/// the intersecting ones. Independent of the number of threads. Throws Unresolvable, and whatever
-/// `work` throws.
+/// the intersecting ones. Deterministic. Throws Unresolvable, and what `work` throws.
 Arrangement arrange(const std::vector<Eigen::Vector3d>& vertices,
                     const std::vector<Triangle>& triangles,
                     std::span<const std::array<std::uint32_t, 2>> pairs, WatchedWork& work);

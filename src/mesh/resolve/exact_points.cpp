@@ -15,8 +15,7 @@ constexpr double kHalfUlp = 0x1p-53;  ///< of a rounded coordinate, relative to 
 constexpr double kTiny = 1e-290;      ///< more than underflow costs
 
 /// numerator / denominator · 2^exponent as the nearest double, and the rest to 2^-50 of it.
-std::array<double, 2> quotient(const Whole& numerator, const Whole& denominator,
-                               const int exponent) {
+std::array<double, 2> quotient(const Whole& numerator, const Whole& denominator, int exponent) {
   if (numerator.is_zero()) return {0, 0};
   Whole above = abs(numerator), below = denominator, whole, remainder;
   const int shift = 130 - (static_cast<int>(msb(above)) - static_cast<int>(msb(below)));
@@ -41,7 +40,7 @@ struct Double2 {
 };
 
 /// a_k − b_k, to 2^-102 of their sizes.
-Double2 difference(const PointView& a, const PointView& b, const int k) {
+Double2 difference(const PointView& a, const PointView& b, int k) {
   const double p = a.at(k), q = b.at(k), high = p - q, back = high - p;
   const double lost = (p - (high - back)) - (q + back);  // Knuth's two-sum
   return {high, lost + (a.rounded->rest[k] - b.rounded->rest[k])};
@@ -51,7 +50,7 @@ Double2 difference(const PointView& a, const PointView& b, const int k) {
 double determinant(const Double2& a, const Double2& b, const Double2& c, const Double2& d) {
   const double left = a.high * b.high, right = c.high * d.high, high = left - right;
   const double back = high - left, lost = (left - (high - back)) - (right + back);
-  const auto rest = [](const Double2& p, const Double2& q, const double product) {
+  const auto rest = [](const Double2& p, const Double2& q, double product) {
     return std::fma(p.high, q.high, -product) + (p.high * q.low + p.low * (q.high + q.low));
   };
   const double low = rest(a, b, left) - rest(c, d, right);
@@ -65,8 +64,16 @@ bool equal(const ExactPoint& a, const ExactPoint& b) {
 }
 
 /// Bound on the error of p_k as it stands in double.
-double error_of(const PointView& p, const int k) {
+double error_of(const PointView& p, int k) {
   return p.exact == nullptr ? 0 : std::abs(p.at(k)) * kHalfUlp;
+}
+
+ExactPoint with_positive_w(WholeVector x, Whole w) {
+  if (w.sign() < 0) {
+    w = -w;
+    for (Whole& c : x) c = -c;
+  }
+  return {std::move(x), std::move(w)};
 }
 
 }  // namespace
@@ -86,18 +93,6 @@ WholeVector cross(const WholeVector& a, const WholeVector& b) {
 Whole dot(const WholeVector& a, const WholeVector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-
-namespace {
-
-ExactPoint with_positive_w(WholeVector x, Whole w) {
-  if (w.sign() < 0) {
-    w = -w;
-    for (Whole& c : x) c = -c;
-  }
-  return {std::move(x), std::move(w)};
-}
-
-}  // namespace
 
 ExactPoint common_point(const ExactPlane& a, const ExactPlane& b, const ExactPlane& c) {
   const WholeVector bc = cross(b.normal, c.normal), ca = cross(c.normal, a.normal),
@@ -150,7 +145,7 @@ std::uint32_t ExactPoints::add(ExactPoint point, const RoundedPoint& rounded) {
   return size() - 1;
 }
 
-Whole ExactPoints::whole(const double coordinate) const {
+Whole ExactPoints::whole(double coordinate) const {
   int exponent = 0;
   const auto mantissa =
       static_cast<std::int64_t>(std::ldexp(std::frexp(coordinate, &exponent), 53));
@@ -164,7 +159,7 @@ Whole ExactPoints::whole(const double coordinate) const {
   return mantissa < 0 ? Whole(-size) : size;
 }
 
-WholeVector ExactPoints::whole(const std::uint32_t given) const {
+WholeVector ExactPoints::whole(std::uint32_t given) const {
   const Eigen::Vector3d& p = at_[given].at;
   return {whole(p[0]), whole(p[1]), whole(p[2])};
 }
@@ -181,8 +176,7 @@ ExactPlane ExactPoints::plane(const Triangle& given) const {
   return {std::move(normal), std::move(offset)};
 }
 
-int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
-                      const PointView& c) const {
+int ExactPoints::turn(int k, const PointView& a, const PointView& b, const PointView& c) const {
   const int x = (k + 1) % 3, y = (k + 2) % 3;
   const double ax = a.at(x) - c.at(x), ay = a.at(y) - c.at(y);
   const double bx = b.at(x) - c.at(x), by = b.at(y) - c.at(y);
@@ -215,7 +209,7 @@ int ExactPoints::turn(const int k, const PointView& a, const PointView& b,
   return exact_area.sign();
 }
 
-int ExactPoints::compare(const int k, const std::uint32_t a, const std::uint32_t b) const {
+int ExactPoints::compare(int k, std::uint32_t a, std::uint32_t b) const {
   if (a == b) return 0;
   const double at_a = at_[a].at[k], at_b = at_[b].at[k];
   if (at_a != at_b) return at_a < at_b ? -1 : 1;  // rounding keeps the order

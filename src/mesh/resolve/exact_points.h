@@ -1,15 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <boost/multiprecision/cpp_int.hpp>
-#include <cstdint>
+#include <string>
 #include <unordered_map>
-#include <vector>
 
 #include "mesh/connectivity/edge_table.h"
 
 namespace ist {
+
+/// Why a mesh is not resolved. Thrown and caught within the unit.
+struct Unresolvable {
+  std::string reason;
+};
 
 /// Whole numbers of any size; up to 1,024 bits without an allocation.
 using Whole = boost::multiprecision::number<
@@ -30,8 +33,7 @@ struct ExactPoint {
   Whole w;
 };
 
-/// The plane through three points: normal · x = offset. Triangles that face the viewer have a
-/// normal towards the viewer.
+/// The plane through three points: normal · x = offset. The normal points to the front.
 struct ExactPlane {
   WholeVector normal;
   Whole offset;
@@ -74,8 +76,8 @@ class ExactPoints {
     return {&at_[p], is_given(p) ? nullptr : &made_[p - given_]};
   }
 
-  /// `at` is the nearest double of every coordinate, the same for equal points; `rest` is within
-  /// 2^-50 of itself.
+  /// `at`: each coordinate's nearest double, the same for equal points; `rest`: within 2^-50 of
+  /// itself.
   RoundedPoint round(const ExactPoint& point) const;
   /// The number of a point whose round() is `rounded`; that of a double on the lattice.
   std::uint32_t add(ExactPoint point, const RoundedPoint& rounded);

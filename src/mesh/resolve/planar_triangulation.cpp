@@ -4,17 +4,15 @@
 #include <cmath>
 #include <deque>
 
-#include "mesh/resolve/unresolvable.h"
-
 namespace ist {
 namespace {
 
-constexpr std::uint32_t after(const std::uint32_t k) { return k == 2 ? 0 : k + 1; }
-constexpr std::uint32_t before(const std::uint32_t k) { return k == 0 ? 2 : k - 1; }
+constexpr std::uint32_t after(std::uint32_t k) { return k == 2 ? 0 : k + 1; }
+constexpr std::uint32_t before(std::uint32_t k) { return k == 0 ? 2 : k - 1; }
 
 }  // namespace
 
-PlanarTriangulation::PlanarTriangulation(const ExactPoints& points, const int axis,
+PlanarTriangulation::PlanarTriangulation(const ExactPoints& points, int axis,
                                          const std::array<std::uint32_t, 3>& frame,
                                          const std::vector<std::uint32_t>& inner)
     : points_(points), axis_(axis), frame_(frame) {
@@ -23,20 +21,19 @@ PlanarTriangulation::PlanarTriangulation(const ExactPoints& points, const int ax
   for (const std::uint32_t p : inner) insert_point(p);
 }
 
-void PlanarTriangulation::set(const std::uint32_t cell, const Cell& value) {
+void PlanarTriangulation::set(std::uint32_t cell, const Cell& value) {
   cells_[cell] = value;
   for (const std::uint32_t p : value.corner) cell_at_[p] = cell;
 }
 
 /// Replaces the neighbour beyond one of the cell's sides.
-void PlanarTriangulation::hand_over(const std::uint32_t cell, const std::uint32_t from,
-                                    const std::uint32_t to) {
+void PlanarTriangulation::hand_over(std::uint32_t cell, std::uint32_t from, std::uint32_t to) {
   if (cell == kNoIndex) return;
   std::replace(cells_[cell].beyond.begin(), cells_[cell].beyond.end(), from, to);
 }
 
 /// The cell that contains p, by a walk that turns at random and so comes to an end.
-std::uint32_t PlanarTriangulation::cell_of(const std::uint32_t p) {
+std::uint32_t PlanarTriangulation::cell_of(std::uint32_t p) {
   for (auto at = static_cast<std::uint32_t>(cells_.size() - 1);;) {
     random_ = random_ * 6364136223846793005 + 1442695040888963407;
     std::uint32_t k = static_cast<std::uint32_t>(random_ >> 33) % 3, tried = 0;
@@ -50,7 +47,7 @@ std::uint32_t PlanarTriangulation::cell_of(const std::uint32_t p) {
   }
 }
 
-void PlanarTriangulation::insert_point(const std::uint32_t p) {
+void PlanarTriangulation::insert_point(std::uint32_t p) {
   const std::uint32_t at = cell_of(p);
   const auto [a, b, c] = cells_[at].corner;
   const auto [beyond_a, beyond_b, beyond_c] = cells_[at].beyond;
@@ -96,7 +93,7 @@ bool PlanarTriangulation::can_flip(const Place edge) const {
          turn(q, cell.corner[before(edge.corner)], p) > 0;
 }
 
-PlanarTriangulation::Place PlanarTriangulation::place_of(const std::uint32_t corner) const {
+PlanarTriangulation::Place PlanarTriangulation::place_of(std::uint32_t corner) const {
   const std::uint32_t cell = cell_at_.at(corner);
   const auto& corners = cells_[cell].corner;
   return {cell, corners[0] == corner ? 0u : corners[1] == corner ? 1u : 2u};
@@ -112,8 +109,8 @@ PlanarTriangulation::Place PlanarTriangulation::next_about(const Place place) co
 
 /// The edge ab; no cell where there is none. `a` is no point of the frame. About b, too, unless it
 /// is one: the end with fewer edges decides.
-PlanarTriangulation::Place PlanarTriangulation::edge_between(const std::uint32_t a,
-                                                             const std::uint32_t b) const {
+PlanarTriangulation::Place PlanarTriangulation::edge_between(std::uint32_t a,
+                                                             std::uint32_t b) const {
   const Place about_a = place_of(a), about_b = place_of(b);
   Place at = about_a, at_b = about_b;
   do {
@@ -127,8 +124,7 @@ PlanarTriangulation::Place PlanarTriangulation::edge_between(const std::uint32_t
   return {kNoIndex, 0};
 }
 
-void PlanarTriangulation::insert(const std::uint32_t from, const std::uint32_t to, const int step,
-                                 const std::size_t of) {
+void PlanarTriangulation::insert(std::uint32_t from, std::uint32_t to, int step, std::size_t of) {
   const bool up = from < to;
   const auto [known, fresh] = steps_.try_emplace(key(std::min(from, to), std::max(from, to)));
   known->second[of] += up ? step : -step;

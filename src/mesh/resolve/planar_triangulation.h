@@ -1,9 +1,6 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <unordered_map>
-#include <vector>
 
 #include "mesh/resolve/exact_points.h"
 

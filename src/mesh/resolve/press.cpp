@@ -1,10 +1,7 @@
 #include "mesh/resolve/press.h"
 
 #include <tbb/parallel_for.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "mesh/connectivity/disjoint_sets.h"
@@ -21,15 +18,14 @@ namespace {
 using Point = Eigen::Vector3d;
 using Polygon = std::vector<Point>;  ///< convex
 
-/// In units of the near distance: a face that touches another, and the part that does, is at least
-/// this large.
+/// In near distances: least size of a face that touches another, and of the part that does.
 constexpr double kNarrowest = 16;
 
 class Faces {
  public:
-  Faces(const TriangleMesh& mesh, const double near)
+  Faces(const TriangleMesh& mesh, double near)
       : mesh_(mesh), near_(near), normals_(mesh.triangles.size(), Point::Zero()) {
-    tbb::parallel_for(std::size_t{0}, normals_.size(), [&](const std::size_t t) {
+    tbb::parallel_for(std::size_t{0}, normals_.size(), [&](std::size_t t) {
       const auto [a, b, c] = corners(t);
       const Point normal = (b - a).cross(c - a);
       const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
@@ -38,10 +34,10 @@ class Faces {
   }
 
   /// Zero of needles.
-  const Point& normal(const std::size_t t) const { return normals_[t]; }
+  const Point& normal(std::size_t t) const { return normals_[t]; }
 
   /// Whether two triangles lie on each other from opposite sides.
-  bool touch(const std::size_t a, const std::size_t b) const {
+  bool touch(std::size_t a, std::size_t b) const {
     if (!(normals_[a].dot(normals_[b]) < -0.9)) return false;
     const auto of = corners(a), over = corners(b);
     Polygon common(over.begin(), over.end());
@@ -60,7 +56,7 @@ class Faces {
   }
 
   /// Whether they lie in one plane exactly.
-  bool coplanar(const std::size_t a, const std::size_t b) const {
+  bool coplanar(std::size_t a, std::size_t b) const {
     const auto of = corners(a), over = corners(b);
     return std::all_of(over.begin(), over.end(), [&](const Point& p) {
       return orient3d_sign(of[0].data(), of[1].data(), of[2].data(), p.data()) == 0;
@@ -68,7 +64,7 @@ class Faces {
   }
 
  private:
-  std::array<Point, 3> corners(const std::size_t t) const {
+  std::array<Point, 3> corners(std::size_t t) const {
     const Triangle& of = mesh_.triangles[t];
     return {mesh_.vertices[of[0]], mesh_.vertices[of[1]], mesh_.vertices[of[2]]};
   }
@@ -113,8 +109,7 @@ Point displacement_along(const std::vector<Point>& normals) {
 
 using Pairs = std::vector<std::array<std::uint32_t, 2>>;
 
-/// [vertex] those of faces that touch others, where some of the faces that hang together do so
-/// inexactly.
+/// [vertex] those of touching faces, where some of the connected faces touch inexactly.
 std::vector<bool> touching_vertices(const TriangleMesh& mesh, const Faces& faces,
                                     const Pairs& touching) {
   DisjointSets together(mesh.vertices.size());

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <vector>
-
 #include <ist/mesh.h>
 
 namespace ist {

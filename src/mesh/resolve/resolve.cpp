@@ -1,15 +1,9 @@
 #include "mesh/resolve/resolve.h"
 
 #include <tbb/task_arena.h>
-
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <mutex>
-#include <optional>
-#include <utility>
-#include <vector>
 
 #include "base/message_text.h"
 #include "base/stage.h"
@@ -21,8 +15,8 @@
 #include "mesh/connectivity/usable_mesh.h"
 #include "mesh/connectivity/weld.h"
 #include "mesh/resolve/arrangement.h"
+#include "mesh/resolve/exact_points.h"
 #include "mesh/resolve/press.h"
-#include "mesh/resolve/unresolvable.h"
 
 namespace ist {
 namespace {
@@ -34,9 +28,8 @@ class Rays {
   Rays(const std::vector<Triangle>& triangles, const Arrangement& arrangement)
       : triangles_(triangles), arrangement_(arrangement), points_(arrangement.points) {}
 
-  /// The winding number in front of a piece, by a line along an axis through a point of it that
-  /// meets no edge.
-  int in_front(const std::uint32_t piece) {
+  /// The winding number in front of a piece, by an axis-parallel line that meets no edge.
+  int in_front(std::uint32_t piece) {
     const Triangle& corners = arrangement_.pieces[piece];
     const Eigen::Vector3d a = points_.rounded(corners[0]);
     int axis = 0;
@@ -76,8 +69,7 @@ class Rays {
   }
 
   /// Nothing where the line meets an edge.
-  std::optional<int> count(const PointView& from, const std::uint32_t piece, const int axis,
-                           const int facing) {
+  std::optional<int> count(const PointView& from, std::uint32_t piece, int axis, int facing) {
     const std::uint32_t own = arrangement_.plane[arrangement_.source[piece]];
     int winding = 0;
     for (const std::uint32_t t : columns(axis).about(from.rounded->at)) {
@@ -102,11 +94,10 @@ class Rays {
     return winding;
   }
 
-  const TriangleColumns& columns(const int axis) {
+  const TriangleColumns& columns(int axis) {
     const auto k = static_cast<std::size_t>(axis);
     std::call_once(made_[k], [&] {
-      columns_[k].emplace(triangles_, axis,
-                          [&](const std::uint32_t v) { return points_.rounded(v); });
+      columns_[k].emplace(triangles_, axis, [&](std::uint32_t v) { return points_.rounded(v); });
     });
     return *columns_[k];
   }
@@ -162,7 +153,7 @@ Patches find_patches(const std::vector<Triangle>& triangles, const Arrangement& 
   }
   patches.in_front.resize(largest.size());
   Rays rays(triangles, arrangement);
-  work.for_each(largest.size(), kPatches, [&](const std::size_t patch) {
+  work.for_each(largest.size(), kPatches, [&](std::size_t patch) {
     patches.in_front[patch] = rays.in_front(largest[patch]);
   });
   return patches;
@@ -214,13 +205,13 @@ std::vector<std::uint32_t> groups_of(const std::vector<Triangle>& triangles, con
 }
 
 /// To the nearest multiples of a power of two.
-Eigen::Vector3d snapped(const Eigen::Vector3d& p, const double step) {
+Eigen::Vector3d snapped(const Eigen::Vector3d& p, double step) {
   return (p / step).array().rint() * step;
 }
 
 /// Drops pieces of a closed surface that are thinner than rounding: gaps between faces that have
 /// their corners in common, and what pressing left.
-void drop_flat_pieces(TriangleMesh& mesh, const double thinnest, const Eigen::Vector3d& from) {
+void drop_flat_pieces(TriangleMesh& mesh, double thinnest, const Eigen::Vector3d& from) {
   const SidePartners partners =
       nearest_partners(mesh.vertices, mesh.triangles, EdgeTable(mesh.triangles));
   DisjointSets pieces(mesh.triangles.size());
@@ -228,7 +219,7 @@ void drop_flat_pieces(TriangleMesh& mesh, const double thinnest, const Eigen::Ve
     if (partners[side] != kNoIndex) pieces.unite(side / 3, partners[side] / 3);
   std::vector<double> volume(mesh.triangles.size(), 0), area(mesh.triangles.size(), 0);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const auto corner = [&](const std::size_t k) { return mesh.vertices[mesh.triangles[t][k]]; };
+    const auto corner = [&](std::size_t k) { return mesh.vertices[mesh.triangles[t][k]]; };
     volume[pieces.find(t)] += volume_of(corner(0), corner(1), corner(2), from) / 6;
     area[pieces.find(t)] += (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm() / 2;
   }
@@ -260,7 +251,7 @@ class Resolver {
   std::optional<TriangleMesh> surface(Resolution& resolution) const {
     std::vector<bool> changed(triangles_.size(), false);  // by group
     const std::vector<std::uint32_t> groups = groups_of(triangles_, pairs_);
-    const auto group_of_piece = [&](const std::size_t p) { return groups[arrangement_.source[p]]; };
+    const auto group_of_piece = [&](std::size_t p) { return groups[arrangement_.source[p]]; };
     bool any = false;
     for (std::size_t p = 0; p < arrangement_.pieces.size(); ++p) {
       const int front = in_front(p), back = behind(p);
@@ -332,13 +323,9 @@ class Resolver {
   }
 
  private:
-  int in_front(const std::size_t piece) const {
-    return patches_.in_front[patches_.of_piece[piece]];
-  }
-  int behind(const std::size_t piece) const {
-    return in_front(piece) + arrangement_.winding_step[piece];
-  }
-  double volume_of(const std::size_t piece) const {
+  int in_front(std::size_t piece) const { return patches_.in_front[patches_.of_piece[piece]]; }
+  int behind(std::size_t piece) const { return in_front(piece) + arrangement_.winding_step[piece]; }
+  double volume_of(std::size_t piece) const {
     const Triangle& t = arrangement_.pieces[piece];
     const ExactPoints& points = arrangement_.points;
     return ist::volume_of(points.rounded(t[0]), points.rounded(t[1]), points.rounded(t[2]), from_);
@@ -354,11 +341,11 @@ class Resolver {
   Eigen::Vector3d from_;
 };
 
-std::string percent(const double part, const double of) {
+std::string percent(double part, double of) {
   return shortest(std::round(part / of * 1e6) / 1e4) + " %";
 }
 
-std::string describe(const Resolution& resolution, const double volume) {
+std::string describe(const Resolution& resolution, double volume) {
   if (resolution.counted_twice == 0 && resolution.counted_against == 0)
     return "parts of the mesh touch: the walls between them are no boundary and were removed";
   std::string text = "parts of the mesh overlap: " + percent(resolution.counted_twice, volume) +

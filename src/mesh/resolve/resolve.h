@@ -1,14 +1,10 @@
 #pragma once
 
-#include <string>
-
 #include <ist/mesh.h>
-#include <ist/types.h>
 
 namespace ist {
 
-/// The volume that a mesh counts more than once, and how that was resolved. w is its winding
-/// number.
+/// The volume that a mesh counts more than once, and how that was resolved; w: winding number.
 struct Resolution {
   enum class How {
     as_it_is,   ///< the mesh is the boundary of where w ≥ 1: nothing was changed
@@ -28,8 +24,7 @@ struct ResolvedMesh {
   Resolution resolution;
 };
 
-/// A mesh whose winding number is 0 or 1 almost everywhere, of the same solid and without walls in
-/// it.
+/// The same solid's mesh without inner walls: winding number 0 or 1 almost everywhere.
 ///
 /// Triangles are cut exactly where they meet, in whole numbers; pieces between winding numbers of
 /// 0 or less and 1 or more are kept, and new vertices are rounded to double at last. Up to that
@@ -40,8 +35,7 @@ struct ResolvedMesh {
 /// Same bytes for any number of threads, which are those of the current arena. Takes milliseconds
 /// for thousands of triangles that meet. Never throws for what a mesh looks like.
 ///
-/// Reports the stage "resolve" if there is something to be looked at; throws Error if `progress`
-/// cancels.
+/// Reports the stage "resolve" if there is work; throws Error if `progress` cancels.
 ResolvedMesh resolve(ClosedMesh closed, const ProgressCallback& progress = {});
 
 }  // namespace ist

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <cmath>
-#include <cstdint>
-#include <numbers>
-#include <vector>
-
 #include <ist/mesh.h>
+#include <cmath>
+#include <numbers>
 
 namespace ist {
 

@@ -1,9 +1,7 @@
 #include "mesh/samples/samples.h"
 
-#include <array>
-#include <string>
-
 #include <ist/types.h>
+#include <array>
 
 #include "mesh/samples/shapes.h"
 

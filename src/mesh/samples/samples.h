@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ist/mesh.h>
 #include <span>
 #include <string_view>
-
-#include <ist/mesh.h>
 
 namespace ist {
 

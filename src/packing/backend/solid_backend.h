@@ -1,11 +1,8 @@
 #pragma once
 
+#include <ist/bake.h>
 #include <functional>
 #include <memory>
-#include <span>
-#include <vector>
-
-#include <ist/bake.h>
 
 #include "packing/backend/tasks.h"
 
@@ -24,8 +21,7 @@ class SolidBackend {
   /// The first round of a grid packing, of a mesh. The settings have been checked.
   virtual std::vector<MedialNode> medial_nodes(const MedialSettings& settings) = 0;
 
-  /// Relaxes sites; none if the columns cannot measure the solid. `report(part)`: the part of it
-  /// that is done, [0, 1].
+  /// Relaxes sites; none if the columns cannot measure the solid. `report(part)`: done, [0, 1].
   virtual RelaxedSites relax_sites(const RelaxTask& task,
                                    const std::function<void(double)>& report) = 0;
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ist/types.h>
-
 #include "base/hashing.h"
 #include "base/roots.h"
 #include "packing/base/certificate.h"
@@ -136,8 +134,7 @@ struct BandSchedule {
     return static_cast<std::uint32_t>(std::uint64_t{point_hash(centre, 0)} * classes >> 32);
   }
 
-  /// After a class: more candidates than can be needed. What is left of the frontier waits for the
-  /// next band.
+  /// After a class: enough candidates. What is left of the frontier waits for the next band.
   IST_HD bool enough(std::uint64_t candidates) const { return candidates > plateau(); }
 
   /// After a level, before its cells are split: bounds do not separate, and the next band asks for

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <algorithm>
-#include <vector>
-
 #include <ist/bake.h>
+#include <algorithm>
 
 #include "base/stage.h"
 #include "base/thread_arena.h"
@@ -21,8 +19,7 @@ struct AsFound {
   static void arrange(std::vector<std::uint32_t>&) {}
 };
 
-/// Completes a packing of spheres in the order of insertion. `kept`: their radii over the largest
-/// bound there was.
+/// Completes a packing. `kept`: radii over the largest bound at insertion, in order.
 inline void finish(SpherePacking& packing, const BandSchedule& schedule, std::vector<float> kept) {
   packing.stop = schedule.reason;
   packing.coverage = schedule.coverage();
@@ -145,8 +142,8 @@ class BandedPacker {
     }
   }
 
-  /// Replaces each cell by those of its children that still count; appends the ones that reach the
-  /// margin to `unsettled`.
+  /// Replaces each cell by its children that still count; those that reach the margin go to
+  /// `unsettled`.
   void split(const Indices& parents, const Shape& field, Indices& unsettled) {
     std::vector<Cell> children(8 * std::min(parents.size(), kChunk));
     for (std::size_t from = 0; from < parents.size(); from += kChunk) {

@@ -14,15 +14,13 @@ struct Candidate {
   Float3 cell_centre;
 };
 
-/// Order of candidates: by radius, ties by a hash of the cell's centre bits and the seed, which no
-/// order of work can change.
+/// Order of candidates: by radius, then by a hash of the cell's centre and the seed.
 IST_HD inline std::uint64_t candidate_key(float radius, Float3 cell_centre, std::uint64_t seed) {
   // Positive floats order like their bits.
   return std::uint64_t{bits_of(radius)} << 32 | point_hash(cell_centre, seed);
 }
 
-/// A strict order of candidates from different cells: larger keys first, then by the cells'
-/// centres.
+/// A strict order of candidates of different cells: larger keys first, then centres.
 IST_HD inline bool goes_before(const Candidate& a, const Candidate& b) {
   if (a.key != b.key) return a.key > b.key;
   if (a.cell_centre.x != b.cell_centre.x) return a.cell_centre.x > b.cell_centre.x;

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "base/float3.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

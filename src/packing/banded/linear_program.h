@@ -74,8 +74,7 @@ IST_HD_ONCE ClearanceOptimum maximise_by_lanes(const Team& team, const SampleMem
 
   const float tolerance = kTolerance * a;
   IST_ROLLED for (int pivot = 0; pivot < kMostPivots; ++pivot) {
-    // Entering row: the most violated; the smallest tag among equals. Numbers that are not negative
-    // order as their bits do.
+    // Entering row: the most violated, then the smallest tag. Numbers ≥ 0 order as their bits do.
     const float slack = level + n0 * z1 + n1 * z2 + n2 * z3 - unit * z0;
     const std::uint32_t beyond = slack < 0 ? bits_of(-slack) : 0;
     const std::uint32_t most = team.max(beyond);
@@ -154,8 +153,7 @@ struct SimplexBasis {
     *this = at;
   }
 
-  /// Takes in the row `entering`, violated by `worst`, and drops the one that has to leave. False
-  /// if none can.
+  /// Takes in the row `entering`, violated by `worst`, and drops one. False if none can leave.
   IST_HD bool exchange(const SampleMemory& constraints, int entering, float worst) {
     float r[4] = {0, 0, 0, 0};
     if (entering >= 0) {

@@ -346,9 +346,8 @@ class PrototypeField {
     return view;
   }
 
-  /// Climbs from x by sequential linear programs in a trust box that never reaches the surface.
-  /// The linear model is a lower bound of the features it knows, so a step fails only over
-  /// features it does not.
+  /// Climbs from x by sequential linear programs in a trust box that never reaches the surface. The
+  /// linear model bounds the known features from below: a step fails only over others.
   template <class Team>
   IST_HD void ascend(const Team& team, Float3& x, float trust, float threshold, Cell& cell,
                      Scratch& scratch, View& view) const {

@@ -2,15 +2,12 @@
 
 #include <ist/types.h>
 
-#include <cstdint>
-
-#include "base/float3.h"
 #include "base/hashing.h"
 #include "base/team.h"
+#include "base/vec3.h"
 
 // Samples of the surroundings of a point. Written for a team (base/team.h) whose lanes share a
-// SampleMemory. Every result is a function of the *set* of features, in whatever order a team finds
-// them.
+// SampleMemory. Every result is a function of the *set* of features, not of their order.
 
 namespace ist::packing {
 

@@ -1,9 +1,8 @@
-#include "packing/banded/candidate.h"
-
 #include <algorithm>
 
 #include "base/thread_arena.h"
 #include "mesh/connectivity/item_groups.h"
+#include "packing/banded/candidate.h"
 #include "packing/base/certificate.h"
 
 namespace ist::packing {

@@ -88,8 +88,8 @@ IST_HD int convex_planes(const Team& team, const Surface& surface, Float3 x, flo
 }
 
 /// Base of MeshSurface and WideMeshSurface. Features are triangles, named by their places in the
-/// hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its functions,
-/// and all get the same answer.
+/// hierarchy's blocks; no answer depends on the hierarchy. All lanes of a team call its functions
+/// and get the same.
 template <class Surface>
 class TriangleSurface {
  public:
@@ -112,8 +112,7 @@ class TriangleSurface {
     return self().winding_number(team, x) == 1;
   }
 
-  /// Exact clearance of a point for certification: distance to the surface, `limit` if it is not
-  /// less, negative outside.
+  /// Exact clearance for certification: distance to the surface, at most `limit`, negative outside.
   template <class Team>
   IST_HD double clearance(const Team& team, Float3 x, double limit) const {
     return inside(team, x) ? self().exact_distance(team, x, limit) : -1.0;

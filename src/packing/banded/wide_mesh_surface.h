@@ -6,8 +6,7 @@
 
 namespace ist::packing {
 
-/// The surface of a mesh as the GPU asks it: MeshSurface over a WideTree, with the same answers bit
-/// for bit.
+/// The surface of a mesh on the GPU: MeshSurface over a WideTree, with the same bits.
 class WideMeshSurface : public TriangleSurface<WideMeshSurface> {
  public:
   IST_HD explicit WideMeshSurface(const WideTree& tree) : tree_(tree) {}

@@ -1,22 +1,19 @@
 #pragma once
 
 #include <ist/types.h>
-
 #include <cmath>
 
-#include "base/float3.h"
 #include "base/rounding.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 
-/// Gap that a certified sphere keeps to the surface and to other spheres, unit frame
-/// (docs/design.md 3.2).
+/// Gap of a certified sphere to the surface and to others, unit frame (docs/design.md 3.2).
 constexpr double kClearance = 1e-12;
 /// The same with what the square root and the sum round by: some 2⁻⁵³ of their size (≤ 4).
 constexpr double kGap = kClearance + 1e-14;
 
-/// Radius under which float noise wins: spheres stay certified, the greedy promise ends
-/// (docs/design.md 4.2).
+/// Below this radius spheres stay certified, but the greedy promise ends (docs/design.md 4.2).
 constexpr float kFloatNoise = 1e-4f;
 
 /// The largest radius that a sphere about `centre` may have next to another one, before rounding.
@@ -47,8 +44,7 @@ IST_HD float certified_radius(const Team& team, Float3 centre, float radius, dou
 }
 
 /// Volumes are summed as integers, so that no order changes a sum. Their unit [unit-frame³] is a
-/// power of two that the solid's volume is 2^60 to 2^61 of: a needle's spheres count as well as
-/// a ball's.
+/// power of two that the solid's volume is 2^60 to 2^61 of: a needle's spheres count too.
 inline double volume_unit_of(double solid_volume) {
   int exponent = 0;
   std::frexp(solid_volume, &exponent);

@@ -1,7 +1,6 @@
 #include "packing/base/packing_settings.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>

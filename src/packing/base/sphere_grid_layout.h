@@ -1,10 +1,8 @@
 #pragma once
 
-#include <cstdint>
-
 #include <ist/types.h>
 
-#include "base/float3.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 
@@ -65,8 +63,7 @@ struct GridRange {
   int lo[3], hi[3];
 };
 
-// Margins make up for rounding here and in grid_coordinate(): listing a sphere too often is
-// harmless.
+// Margins cover rounding here and in grid_coordinate(): listing a sphere too often is harmless.
 IST_HD inline float listed_radius(const SphereGridLayout& layout, const Sphere& s) {
   return (s.r + layout.reach) * 1.0001f + 1e-6f;
 }

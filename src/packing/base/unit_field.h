@@ -1,7 +1,6 @@
 #pragma once
 
 #include <ist/solid.h>
-
 #include <cmath>
 
 namespace ist::packing {

@@ -1,12 +1,10 @@
 #include "packing/calibrate/calibration.h"
 
 #include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
-#include <utility>
 
 #include "base/stage.h"
 #include "mesh/geometry/exact_triangle.h"
@@ -24,18 +22,14 @@ using Eigen::Vector3d;
 constexpr double kSmallShadow = 0.25;
 constexpr double kEmptyBox = 0.02;
 
-/// The surface's area seen along each axis, and its second moments.
+/// The surface's area, also as seen along each axis, and its moments.
 struct SurfaceMoments {
   Vector3d shadow = Vector3d::Zero();  // a point counts as often as a line enters the surface there
-  Matrix3d covariance = Matrix3d::Zero();
-};
-
-struct MomentSums {
-  Vector3d shadow = Vector3d::Zero(), first = Vector3d::Zero();
+  Vector3d first = Vector3d::Zero();
   double area = 0;
   Matrix3d second = Matrix3d::Zero();
 
-  void add(const MomentSums& other) {
+  void add(const SurfaceMoments& other) {
     shadow += other.shadow;
     first += other.first;
     area += other.area;
@@ -43,8 +37,8 @@ struct MomentSums {
   }
 };
 
-MomentSums moments_of(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) {
-  MomentSums sums;
+SurfaceMoments moments_of(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) {
+  SurfaceMoments sums;
   for (std::uint32_t t = begin; t < end; ++t) {
     const Corners corners = corners_of(mesh, t);
     const Vector3d p[3] = {Vector3d(corners.p[0]), Vector3d(corners.p[1]), Vector3d(corners.p[2])};
@@ -63,18 +57,14 @@ MomentSums moments_of(const MeshView& mesh, std::uint32_t begin, std::uint32_t e
 SurfaceMoments surface_moments(const MeshView& mesh) {
   // In parts of fixed size, added in their order: the same bits for any number of threads.
   constexpr std::uint32_t kPart = 1u << 13;
-  std::vector<MomentSums> parts((mesh.triangle_count + kPart - 1) / kPart);
+  std::vector<SurfaceMoments> parts((mesh.triangle_count + kPart - 1) / kPart);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t p) {
     const auto begin = static_cast<std::uint32_t>(p * kPart);
     parts[p] = moments_of(mesh, begin, std::min(begin + kPart, mesh.triangle_count));
   });
-  MomentSums sums;
-  for (const MomentSums& part : parts) sums.add(part);
-  sums.first /= sums.area;
-  SurfaceMoments moments;
-  moments.shadow = sums.shadow;
-  moments.covariance = sums.second / sums.area - sums.first * sums.first.transpose();
-  return moments;
+  SurfaceMoments sums;
+  for (const SurfaceMoments& part : parts) sums.add(part);
+  return sums;
 }
 
 /// Rows: the eigenvectors of a symmetric matrix by rising eigenvalue, right-handed. Jacobi's method
@@ -118,7 +108,8 @@ class TurnedSolid {
     if (moments.shadow.x() >= kSmallShadow * moments.shadow.maxCoeff() &&
         moments.shadow.x() >= kEmptyBox * size.y() * size.z())
       return;
-    axes_ = principal_axes(moments.covariance);
+    const Vector3d mean = moments.first / moments.area;
+    axes_ = principal_axes(moments.second / moments.area - mean * mean.transpose());
     ClosedMesh mesh;
     mesh.name = "turned mesh";
     mesh.report.closed = true;

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <functional>
-#include <span>
-#include <vector>
-
 #include <ist/types.h>
 
 #include "mesh/mesh_solid.h"
@@ -23,9 +19,8 @@ struct Calibration {
 
 /// Calibrates prefixes of a packing, each of `counts` by itself: relaxed power cells seeded by the
 /// inner spheres, integrated over columns of the solid. `backend`: the solid's. Same bytes for any
-/// backend and number of threads, which are those of the current arena. `take(i, calibration)` is
-/// given each as soon as it is ready, in their order. Throws Error if there are no spheres or
-/// progress cancels.
+/// backend and number of threads, which are those of the current arena. `take(i, calibration)` gets
+/// each when ready, in order. Throws Error without spheres or if progress cancels.
 void calibrate_prefixes(const MeshSolid& solid, SolidBackend& backend,
                         std::span<const Sphere> inner, std::span<const std::size_t> counts,
                         const ProgressCallback& progress,

@@ -1,8 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "mesh/mesh_solid.h"
 #include "packing/backend/tasks.h"
 #include "packing/calibrate/power_grid.h"

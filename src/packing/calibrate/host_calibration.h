@@ -2,10 +2,6 @@
 
 #include <ist/types.h>
 
-#include <functional>
-#include <span>
-#include <vector>
-
 #include "mesh/mesh_solid.h"
 #include "packing/backend/tasks.h"
 #include "packing/calibrate/column_lattice.h"
@@ -21,8 +17,7 @@ class PowerOctree {
   explicit PowerOctree(const ColumnLattice& solid);
   const PowerGrid& grid() const { return grid_; }
 
-  /// The sums of every site's power cell within the solid. Integers: the same bits for any number
-  /// of threads.
+  /// The sums of every site's power cell within the solid. Integers: deterministic.
   std::vector<PowerSums> cell_sums(std::span<const PowerSite> sites) const;
 
  private:

@@ -1,15 +1,12 @@
 #pragma once
 
-#include <cstdint>
-
 #include "base/host_device.h"
 #include "base/team.h"
 #include "mesh/hierarchy/line_lattice.h"
 #include "packing/backend/tasks.h"
 
 // The subdivision that cuts a solid's columns at the power cells of sites, for host and device. Its
-// cells, the sites that each is left with and the pieces that come out are functions of the columns
-// and the sites alone.
+// cells, their sites and the resulting pieces depend on columns and sites alone.
 
 namespace ist {
 
@@ -64,8 +61,7 @@ struct ColumnSpan {
   double x0 = 0, x1 = 0;  ///< unit frame, x0 < x1
 };
 
-/// Calls add(span) for the parts of a line where the winding number is ≥ 1, given its crossings in
-/// order.
+/// Calls add(span) for a line's parts with winding number ≥ 1, by its crossings in order.
 template <class Add>
 IST_HD void for_spans(const Crossing* crossings, std::uint32_t count, Add&& add) {
   int winding = 0;
@@ -79,8 +75,7 @@ IST_HD void for_spans(const Crossing* crossings, std::uint32_t count, Add&& add)
   }
 }
 
-/// Lengths of spans are summed in integers of 2^−38 unit-frame units: no order changes the sum, and
-/// 2^24 columns fit.
+/// Lengths are summed in integers of 2^−38: no order changes the sum, and 2^24 columns fit.
 constexpr double kLengthUnit = 0x1p-38;
 IST_HD inline std::uint64_t length_units(const ColumnSpan& span) {
   return static_cast<std::uint64_t>((span.x1 - span.x0) / kLengthUnit);
@@ -154,8 +149,7 @@ struct PowerBlock {
   IST_HD static std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
 };
 
-/// Whether no span meets the cell, for certain. Reads single columns below the finest level with
-/// flags.
+/// Whether certainly no span meets the cell. Reads columns below the finest level with flags.
 IST_HD inline bool is_empty(const PowerGrid& grid, const PowerGridCell& cell) {
   if (cell.s >= PowerGrid::cells(grid.nx, cell.level) ||
       cell.i >= PowerGrid::cells(grid.columns.ny, cell.level) ||
@@ -175,8 +169,7 @@ IST_HD inline bool is_empty(const PowerGrid& grid, const PowerGridCell& cell) {
   return true;
 }
 
-/// Calls visit(flag) for the cells of the finest level with flags that a span of column (i, j) may
-/// meet.
+/// Calls visit(flag) for the finest cells with flags that a span of column (i, j) may meet.
 template <class Visit>
 IST_HD void for_flags(const PowerGrid& grid, const ColumnSpan& span, std::uint32_t i,
                       std::uint32_t j, Visit&& visit) {
@@ -221,8 +214,7 @@ struct PowerBox {
 };
 
 /// The test which of a cell's sites may own a part of it: the others lose everywhere in it to the
-/// site that is best at its middle (the difference of two powers is affine). The host has it in
-/// vectors (power_kernel.h).
+/// best site at its middle (differences of powers are affine). Host vectors: power_kernel.h.
 struct PowerFilter {
   PowerBox box;
   double least = 0;  ///< power of the best site at the middle

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 #include "packing/calibrate/power_grid.h"
 
@@ -30,8 +29,7 @@ struct SiteArrays {
 std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t count,
                        const SiteArrays& kept, double* powers);
 
-/// Cuts the cell's columns at the power cells of 1 to kPowerLeafSites sites; sums[number] grows by
-/// a site's pieces.
+/// Cuts the cell's columns at 1 to kPowerLeafSites power cells; adds to sums[number].
 void walk_cell(const PowerGrid& grid, const PowerGridCell& cell, const SiteArrays& sites,
                std::size_t count, PowerSums* sums);
 

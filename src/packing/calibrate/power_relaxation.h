@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <numbers>
 
 #include "base/roots.h"
@@ -17,8 +16,7 @@ constexpr int kRelaxations = 16;
 /// `length`: Σ of the columns' lengths.
 PowerGrid plan_power_grid(const ColumnPlan& plan, double length);
 
-/// Whether columns that see so much of a volume can share it out: those of a sliver at a slant are
-/// too few.
+/// Whether columns that see so much of a volume can share it out: a slanted sliver's cannot.
 IST_HD inline bool columns_measure(double seen, double volume) {
   constexpr double kLargestMiss = 0.1;
   const double miss = seen > volume ? seen - volume : volume - seen;

@@ -2,10 +2,6 @@
 
 #include <ist/types.h>
 
-#include <functional>
-#include <span>
-#include <vector>
-
 #include "mesh/mesh_solid.h"
 #include "packing/backend/solid_backend.h"
 #include "packing/backend/tasks.h"
@@ -16,9 +12,8 @@ namespace ist {
 /// of the solid is within c_i of the centre of some inner sphere i. Subdivision proves it: a cell
 /// is dropped only if its middle is further outside than its corners reach, or if one ball contains
 /// all of it. Balls are enlarged level by level for points of the solid that are found, so that few
-/// cells reach the smallest size. `backend`: the solid's. Same bytes for any backend and any number
-/// of threads, which are those of the current arena. Throws Error if there are no spheres or
-/// progress cancels.
+/// cells reach the smallest size. `backend`: the solid's. Same bytes for any backend and number of
+/// threads (the arena's). Throws Error without spheres or if progress cancels.
 std::vector<float> cover_radii(const MeshSolid& solid, SolidBackend& backend,
                                std::span<const Sphere> inner, const ProgressCallback& progress);
 

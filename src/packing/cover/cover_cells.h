@@ -43,8 +43,7 @@ IST_HD inline double distance_to(const CoverBall& ball, double x, double y, doub
   return std::sqrt(dx * dx + dy * dy + dz * dz);
 }
 
-/// Largest distance of a point of the cube of half edge `half` around (x, y, z) from the ball's
-/// centre.
+/// Largest distance of the cube of half edge `half` around (x, y, z) from the ball's centre.
 IST_HD inline double farthest_from(const CoverBall& ball, double x, double y, double z,
                                    double half) {
   const auto across = [half](double d) { return (d < 0 ? -d : d) + half; };
@@ -60,7 +59,6 @@ struct CoverDemand {
   IST_HD bool asks() const { return ball != 0xFFFFFFFFu; }
 };
 
-/// The outcome for a cell.
 struct CoverVerdict {
   bool divide = false;  ///< it has to be divided; `count` balls were kept
   std::uint32_t count = 0;

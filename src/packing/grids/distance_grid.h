@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstdint>
-
 #include <ist/types.h>
 
 #include "mesh/geometry/triangle_frame.h"
@@ -22,8 +20,7 @@ struct CellRecord {
   std::int32_t winding = 0;  ///< with triangles: of the next cell without any towards −x
 };
 
-/// A triangle as the float distance formula wants it, made in double from the exact corners and
-/// rounded once.
+/// A triangle for the float distance formula, made in double and rounded once.
 struct alignas(64) GridTriangle {
   TriangleFrame<float> frame;
 };

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <cstdint>
-
-#include "base/float3.h"
 #include "base/hashing.h"
 #include "base/host_device.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 

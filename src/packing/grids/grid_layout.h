@@ -2,8 +2,8 @@
 
 #include <cstdint>
 
-#include "base/float3.h"
 #include "base/host_device.h"
+#include "base/vec3.h"
 
 namespace ist::packing {
 
@@ -58,7 +58,6 @@ struct GridLayout {
 GridLayout make_grid_layout(const double lower[3], const double upper[3], int start,
                             int refinements);
 
-/// Every cell split in 8.
 IST_HD inline GridLayout refined(const GridLayout& g) {
   GridLayout f = g;
   f.size = 0.5f * g.size;

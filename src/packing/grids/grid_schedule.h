@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstddef>
-
 #include <ist/bake.h>
 
 #include "packing/grids/grid_layout.h"
@@ -34,8 +32,8 @@ struct GridSchedule {
   }
 };
 
-/// Cells on the longest side of a distance grid that suits the triangles: a finer one costs more
-/// steps than it saves tests.
+/// Cells on the longest side of a distance grid that suits so many triangles: finer ones are
+/// slower.
 int distance_resolution(const GridFigures& solid);
 
 /// Throws Error if settings ask for more cells than there can be.

@@ -1,7 +1,6 @@
 #include "packing/grids/host_grid.h"
 
 #include <ist/types.h>
-
 #include <algorithm>
 #include <atomic>
 
@@ -36,11 +35,9 @@ void HostGrid::measure_distances() {
   };
   for_active([&](const CellRecord& r, std::uint32_t) { field[r.cell] = start_distance(r); });
   for (int axis = 0; axis < 3; ++axis)
-    oneapi::tbb::parallel_for(oneapi::tbb::blocked_range<int>(0, grid_lines(layout_, axis), 64),
-                              [&](const oneapi::tbb::blocked_range<int>& lines) {
-                                for (int n = lines.begin(); n != lines.end(); ++n)
-                                  sweep_line(field.data(), grid_line(layout_, axis, n));
-                              });
+    for_each_index(0, static_cast<std::size_t>(grid_lines(layout_, axis)), 64, [&](std::size_t n) {
+      sweep_line(field.data(), grid_line(layout_, axis, static_cast<int>(n)));
+    });
   for_active([&](const CellRecord& r, std::uint32_t& word) {
     word = DistanceGrid::slot(word) | std::uint32_t{field[r.cell]} << 24;
   });
@@ -111,8 +108,7 @@ void HostGrid::update(const std::vector<Sphere>& spheres, std::size_t first_new)
   measure_distances();
 }
 
-/// How many triangles meet each cell, and what they add to the winding number along its row's
-/// centre line.
+/// Triangles that meet each cell, and their terms of the winding number along its row's centre.
 void HostGrid::count_triangles(std::vector<std::uint32_t>& counts,
                                std::vector<std::int32_t>& crossings) const {
   const GridScene mesh = scene({});

@@ -16,8 +16,7 @@ class HostGrid {
 
   /// A new grid of that layout. Throws Error if more cells are active than a word can address.
   void build(const GridLayout& layout, const std::vector<Sphere>& spheres);
-  /// Lists spheres from `first_new` on: covered cells go inactive, lists and discrete distances
-  /// follow.
+  /// Takes in spheres from `first_new` on: inactive cells, lists and discrete distances.
   void update(const std::vector<Sphere>& spheres, std::size_t first_new);
 
   /// Valid until the next change of the grid or of `spheres`.

@@ -1,15 +1,13 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 #include "packing/grids/host_grid.h"
 
 namespace ist::packing {
 
-/// The work of a grid packing's rounds on the threads of the current arena (grid_rounds.h says what
-/// the calls do).
+/// The rounds of a grid packing on the threads of the current arena (ascent.h says which).
 class HostRounds {
  public:
   /// Keeps `mesh`.

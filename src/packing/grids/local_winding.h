@@ -35,8 +35,7 @@ IST_HD inline int row_crossing(const GridLayout& g, const Corners& t, int j, int
   return -pierced(t, yz);
 }
 
-/// The term in the winding number of crossing the triangle on the line through p towards +x,
-/// between −∞ and p.
+/// The term of a triangle in the winding number, on the line through p from −∞ to p.
 IST_HD inline int winding_before(const Corners& t, const double p[3]) {
   const int facing = pierced(t, p + 1);
   return facing == 0 || lies_beyond(t, facing, p) ? 0 : -facing;

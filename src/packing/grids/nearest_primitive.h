@@ -8,8 +8,7 @@
 // The closest point on surface ∪ spheres through the distance grid (paper §3): a cell's discrete
 // distance says that the Manhattan ball of that radius around it contains no primitive, and how far
 // a row of cells may be skipped. The answer is the minimum of one float formula over all
-// primitives, the smallest tag among equals; it depends neither on the grid nor on the order of the
-// search.
+// primitives, then the smallest tag, whatever the grid and the order of the search.
 
 namespace ist::packing {
 

@@ -1,7 +1,6 @@
 // The grid functions of a build without the paper's grids: all of them throw.
 #include <ist/types.h>
 
-#include "packing/grids/medial_grids.h"
 #include "packing/grids/pack_grids.h"
 
 namespace ist::packing {

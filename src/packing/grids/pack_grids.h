@@ -1,14 +1,13 @@
 #pragma once
 
 #include <ist/bake.h>
-
 #include <algorithm>
 
 #include "base/stage.h"
 #include "mesh/mesh_solid.h"
 #include "packing/base/certificate.h"
 #include "packing/base/packing_settings.h"
-#include "packing/grids/grid_rounds.h"
+#include "packing/grids/ascent.h"
 #include "packing/grids/grid_schedule.h"
 
 namespace ist::packing {
@@ -19,7 +18,7 @@ constexpr float kSmallestGridRadius = 0x1p-21f;
 constexpr int kIdleRounds = 3;  ///< without a sphere at the finest grids: nothing fits any more
 
 /// The paper's algorithm (§3, §4; docs/design.md 4.1), the same for all four schedules, on the host
-/// or a device: `Rounds` as grid_rounds.h says.
+/// or a device: `Rounds` as ascent.h says.
 template <class Rounds>
 class GridPacker {
  public:
@@ -136,8 +135,7 @@ class GridPacker {
 /// The data from which grid sizes are derived; `memory` [bytes] for the grids.
 GridFigures grid_figures(const MeshSolid& solid, std::size_t memory);
 
-/// Packs a mesh on the paper's grids (settings.grid, not banded) by the rounds of a host or a
-/// device (grid_rounds.h).
+/// Packs a mesh on the paper's grids (settings.grid, not banded) by a host's or a device's rounds.
 template <class Rounds>
 SpherePacking pack_grids_by(Rounds&& rounds, const MeshSolid& solid,
                             const PackingSettings& settings, std::size_t memory, Stage& stage) {
@@ -149,5 +147,31 @@ SpherePacking pack_grids_by(Rounds&& rounds, const MeshSolid& solid,
 
 /// The same with the threads of the current arena.
 SpherePacking pack_grids(const MeshSolid& solid, const PackingSettings& settings, Stage& stage);
+
+/// Grids of prototypes and distances of a medial axis. Automatic: for milliseconds on a GPU.
+struct MedialGrids {
+  GridLayout prototypes, distances;
+};
+MedialGrids medial_grids(const MeshSolid& mesh, unsigned resolution);
+
+/// The nodes among converged prototypes, in the mesh's frame, ordered by cell.
+std::vector<MedialNode> medial_nodes_of(std::vector<GridCandidate> converged,
+                                        const UnitFrame& frame);
+
+/// medial_nodes() with the rounds of a host or a device (ascent.h).
+template <class Rounds>
+std::vector<MedialNode> medial_nodes_by(Rounds&& rounds, const MeshSolid& mesh,
+                                        const MedialSettings& settings) {
+  const MedialGrids grids = medial_grids(mesh, settings.resolution);
+  AscentSettings ascent;
+  ascent.layout = grids.prototypes;
+  ascent.seed = settings.seed;
+  rounds.build(grids.distances);
+  rounds.place_prototypes(ascent.layout);
+  return medial_nodes_of(rounds.converged(ascent, [] { return true; }), mesh.frame());
+}
+
+/// The same with the threads of the current arena.
+std::vector<MedialNode> medial_nodes_on_host(const MeshSolid& mesh, const MedialSettings& settings);
 
 }  // namespace ist::packing
