@@ -1,4 +1,4 @@
-// Where balls stand over triangles: included once a target by what is compiled for each.
+// Heights and feet of ball centres over triangles. Included once per target.
 
 #if defined(IST_QUERY_PROBE_FEET_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_PROBE_FEET_INL_H_
@@ -13,14 +13,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// A vector of centres as triangles see them: height over their planes, and where the foot is.
+/// A vector of centres: their heights over triangles' planes, and their feet in these.
 template <class V>
 struct Feet {
   V height, x, y;
 };
 
-/// The lanes whose balls come near their triangles, which lie from `left` to `right` and from 0 to
-/// `top` of their planes; with kFeet the feet are kept, from `lane` on.
+/// A bit for each ball that comes near its triangle, which extends from `left` to `right` and from
+/// 0 to `top` in its plane. kFeet: stores the feet, from `lane` on.
 template <bool kFeet, class V>
 HWY_INLINE std::uint32_t near_lanes(const Feet<V>& feet, V left, V right, V top, V r,
                                     std::size_t lane, double* height, double* x, double* y) {
@@ -35,8 +35,7 @@ HWY_INLINE std::uint32_t near_lanes(const Feet<V>& feet, V left, V right, V top,
   return mask_bits(d, hn::And(hn::Abs(feet.height) < r, hn::And(beside, along)));
 }
 
-/// The balls that triangle t comes near; with kFeet, where their centres' feet in its plane are and
-/// how high they stand.
+/// A bit for each ball that comes near triangle t. kFeet: stores heights and feet of all balls.
 template <bool kFeet>
 HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
                                    const ProbeBalls& balls, double* height, double* x, double* y) {
@@ -65,7 +64,7 @@ HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
   return near;
 }
 
-/// The triangles that a ball comes near; with kFeet, as feet_near.
+/// A bit for each triangle that the ball comes near. kFeet: as for feet_near().
 template <bool kFeet>
 HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const double (&centre)[3],
                                  double radius, double* height, double* x, double* y) {

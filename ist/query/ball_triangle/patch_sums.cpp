@@ -16,32 +16,24 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 inline constexpr std::size_t kAtOnce = 64;
-inline constexpr std::size_t kRoom = kAtOnce + 8;
+inline constexpr std::size_t kCapacity = kAtOnce + 8;
 
-/// Volume between surface and sphere, solid angle, area and ∫ (ρ² − |y|²) dA of parts of discs.
+/// Members of DiscPart, for vectors of discs.
 struct alignas(64) Shares {
-  double cones[kRoom], angle[kRoom], area[kRoom], second[kRoom];
+  double cones[kCapacity], angle[kCapacity], area[kCapacity], second[kCapacity];
 };
 
-/// Discs that an edge cuts from side to side.
-struct alignas(64) Chords {
-  double h[kRoom], r[kRoom];  ///< height under the ball's centre and its radius
-  double m[kRoom];            ///< from the foot to the edge, > 0 if the foot is within
-  std::uint32_t ball[kRoom];
-  std::uint32_t triangle[kRoom];
-  double sign[kRoom];
-  Shares lost;  ///< beyond the edge
-  std::size_t size = 0;
-};
-
-/// Discs that contain a corner.
-struct alignas(64) Corners {
-  double h[kRoom], r[kRoom];
-  double x[kRoom], y[kRoom];  ///< the foot in the triangle's plane
-  std::int64_t triangle[kRoom];
-  std::uint32_t ball[kRoom];
-  double sign[kRoom];
-  Shares kept;  ///< within the triangle
+/// Discs that are computed a vector at a time: those that an edge cuts from side to side (chords),
+/// or those that contain a corner.
+struct alignas(64) DiscList {
+  double h[kCapacity], r[kCapacity];  ///< height under the ball's centre, and the ball's radius
+  /// Corners: the foot in the triangle's plane. Chords: x is the distance from the foot to the
+  /// edge, > 0 if the foot is within.
+  double x[kCapacity], y[kCapacity];
+  std::int64_t triangle[kCapacity];
+  std::uint32_t ball[kCapacity];
+  double sign[kCapacity];
+  Shares part;  ///< corners: within the triangle; chords: beyond the edge
   std::size_t size = 0;
 };
 
@@ -53,24 +45,24 @@ HWY_INLINE void store(const DiscPart& from, std::size_t i, Shares& to) {
   hn::Store(from.second, d, to.second + i);
 }
 
-/// The segments beyond the chords: the sector over a chord without its triangle.
-HWY_INLINE void measure_chords(Chords& chords) {
+/// The segment beyond a chord is the sector over it without its triangle.
+HWY_INLINE void measure_chords(DiscList& chords) {
   const DiscTag d;
   const Real zero = hn::Zero(d), two = hn::Set(d, 2.0);
   for (std::size_t i = 0; i < chords.size; i += hn::Lanes(d)) {
     const DiscShape disc = disc_shape(hn::Load(d, chords.h + i), hn::Load(d, chords.r + i));
-    const Real m = hn::Load(d, chords.m + i);
+    const Real m = hn::Load(d, chords.x + i);
     const Real half = hn::Sqrt(hn::Max(disc.rho2 - m * m, zero));
     const Real phi = two * angle_of(d, half, m);
     const Real omega = two * angle_of(d, m * half, (disc.h * disc.h + m * m) + disc.h * disc.r);
     DiscPart sums{zero, zero, zero, zero};
     add_triangle(disc, zero - omega, zero - m, zero - half, half, sums);
     add_sector(disc, phi, sums);
-    store(sums, i, chords.lost);
+    store(sums, i, chords.part);
   }
 }
 
-/// The part between the foot and an edge that goes from t1 to t2.
+/// Adds the part between the foot and an edge from t1 to t2.
 HWY_INLINE void add_edge(const DiscShape& disc, Real m, Real t1, Real t2, DiscPart& sums) {
   const DiscTag d;
   const EdgeInDisc in = edge_in_disc(disc, m, t1, t2);
@@ -78,7 +70,7 @@ HWY_INLINE void add_edge(const DiscShape& disc, Real m, Real t1, Real t2, DiscPa
   add_triangle(disc, hn::Set(d, 2.0) * angle_of(d, in.half_y, in.half_x), m, in.low, in.high, sums);
 }
 
-HWY_INLINE void measure_corners(const SurfacePatch& patch, Corners& corners) {
+HWY_INLINE void measure_corners(const SurfacePatch& patch, DiscList& corners) {
   const DiscTag d;
   const hn::RebindToSigned<DiscTag> di;
   const Real zero = hn::Zero(d);
@@ -88,72 +80,66 @@ HWY_INLINE void measure_corners(const SurfacePatch& patch, Corners& corners) {
     const DiscShape disc = disc_shape(hn::Load(d, corners.h + i), hn::Load(d, corners.r + i));
     const Real x = hn::Load(d, corners.x + i), y = hn::Load(d, corners.y + i);
     DiscPart sums{zero, zero, zero, zero};
-    const Real base = of(patch.length[0]);
-    add_edge(disc, y, zero - x, base - x, sums);
-    const auto other = [&](int k, Real px) {
-      const Real ex = of(patch.edge_x[k]), ey = of(patch.edge_y[k]);
-      const Real t = px * ex - y * ey;
-      add_edge(disc, px * ey + y * ex, t, t + of(patch.length[k]), sums);
-    };
-    other(1, base - x);
-    // The third edge ends in the first corner.
-    const Real ex = of(patch.edge_x[2]), ey = of(patch.edge_y[2]);
-    const Real t = zero - (x * ex + y * ey);
-    add_edge(disc, y * ex - x * ey, t - of(patch.length[2]), t, sums);
-    store(sums, i, corners.kept);
+    const Real px = of(patch.length[0]) - x;
+    add_edge(disc, y, zero - x, px, sums);
+    const Real ex1 = of(patch.edge_x[1]), ey1 = of(patch.edge_y[1]), t1 = px * ex1 - y * ey1;
+    add_edge(disc, px * ey1 + y * ex1, t1, t1 + of(patch.length[1]), sums);
+    const Real ex2 = of(patch.edge_x[2]), ey2 = of(patch.edge_y[2]),
+               t2 = zero - (x * ex2 + y * ey2);
+    add_edge(disc, y * ex2 - x * ey2, t2 - of(patch.length[2]), t2, sums);
+    store(sums, i, corners.part);
   }
 }
 
-/// Adds `share` of triangle t inside ball b.
-HWY_INLINE void add_share(const SurfacePatch& patch, std::size_t t, std::size_t b, double sign,
-                          double cones, double angle, double area, double second, ProbeSums& sums) {
-  sums.cones[b] += sign * cones;
-  sums.angle[b] += sign * angle;
-  sums.area[b] += area;
+/// Adds a part of triangle t's plane in ball b.
+HWY_INLINE void add_part(const SurfacePatch& patch, std::size_t t, std::size_t b, double sign,
+                         const disc::DiscPart& part, ProbeSums& sums) {
+  sums.cones[b] += sign * part.cones;
+  sums.angle[b] += sign * part.angle;
+  sums.area[b] += part.area;
   for (int k = 0; k < 3; ++k) {
-    sums.pull[k][b] += patch.n[k][t] * area;
-    sums.shift[k][b] += patch.n[k][t] * (0.5 * second);
+    sums.pull[k][b] += patch.n[k][t] * part.area;
+    sums.shift[k][b] += patch.n[k][t] * (0.5 * part.second);
   }
 }
 
 /// Lanes beyond the last must be numbers.
-template <class List>
-HWY_INLINE std::size_t fill_up(List& list) {
-  const std::size_t end = (list.size + 7) / 8 * 8;
-  for (std::size_t i = list.size; i < end; ++i) {
-    list.h[i] = 0;
+HWY_INLINE void fill_up(DiscList& list) {
+  for (std::size_t i = list.size; i < (list.size + 7) / 8 * 8; ++i) {
+    list.h[i] = list.x[i] = list.y[i] = 0;
     list.r[i] = 1;
     list.triangle[i] = 0;
   }
-  return end;
 }
 
-HWY_NOINLINE void take_chords(const SurfacePatch& patch, Chords& chords, ProbeSums& sums) {
-  const std::size_t end = fill_up(chords);
-  for (std::size_t i = chords.size; i < end; ++i) chords.m[i] = 0;
+/// Adds the computed parts, times `factor`, and empties the list.
+HWY_INLINE void add_parts(const SurfacePatch& patch, double factor, DiscList& list,
+                          ProbeSums& sums) {
+  const Shares& part = list.part;
+  for (std::size_t i = 0; i < list.size; ++i)
+    add_part(patch, static_cast<std::size_t>(list.triangle[i]), list.ball[i], list.sign[i],
+             {factor * part.cones[i], factor * part.angle[i], factor * part.area[i],
+              factor * part.second[i]},
+             sums);
+  list.size = 0;
+}
+
+HWY_NOINLINE void take_chords(const SurfacePatch& patch, DiscList& chords, ProbeSums& sums) {
+  fill_up(chords);
   measure_chords(chords);
-  const Shares& lost = chords.lost;
-  for (std::size_t i = 0; i < chords.size; ++i)
-    add_share(patch, chords.triangle[i], chords.ball[i], chords.sign[i], -lost.cones[i],
-              -lost.angle[i], -lost.area[i], -lost.second[i], sums);
-  chords.size = 0;
+  add_parts(patch, -1, chords, sums);
 }
 
-HWY_NOINLINE void take_corners(const SurfacePatch& patch, Corners& corners, ProbeSums& sums) {
-  const std::size_t end = fill_up(corners);
-  for (std::size_t i = corners.size; i < end; ++i) corners.x[i] = corners.y[i] = 0;
+HWY_NOINLINE void take_corners(const SurfacePatch& patch, DiscList& corners, ProbeSums& sums) {
+  fill_up(corners);
   measure_corners(patch, corners);
-  const Shares& kept = corners.kept;
-  for (std::size_t i = 0; i < corners.size; ++i)
-    add_share(patch, static_cast<std::size_t>(corners.triangle[i]), corners.ball[i],
-              corners.sign[i], kept.cones[i], kept.angle[i], kept.area[i], kept.second[i], sums);
-  corners.size = 0;
+  add_parts(patch, 1, corners, sums);
 }
 
-/// Sorts a ball that comes near a triangle: it misses it, its disc lies within, edges cut the disc
-/// from side to side, or it contains a corner.
+/// Classifies a ball near a triangle: it misses it, its disc lies within, edges cut the disc from
+/// side to side, or the disc contains a corner.
 HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t b, double height,
-                          double x, double y, double r, Chords& chords, Corners& corners,
+                          double x, double y, double r, DiscList& chords, DiscList& corners,
                           ProbeSums& sums) {
   double length[3], edge_x[3], edge_y[3];
   for (int k = 0; k < 3; ++k) {
@@ -167,37 +153,30 @@ HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t 
   if (found.is_apart) return;
   sums.meet(b);
   ++sums.pairs;
-  const double h = std::abs(height), sign = height > 0 ? 1 : -1;
+  const auto append = [&](DiscList& list, double at_x, double at_y) {
+    const std::size_t i = list.size++;
+    list.h[i] = std::abs(height), list.r[i] = r;
+    list.x[i] = at_x, list.y[i] = at_y;
+    list.triangle[i] = static_cast<std::int64_t>(t);
+    list.ball[i] = static_cast<std::uint32_t>(b);
+    list.sign[i] = height > 0 ? 1 : -1;
+    return list.size == kAtOnce;
+  };
   if (found.has_corner) {
-    const std::size_t i = corners.size++;
-    corners.h[i] = h, corners.r[i] = r;
-    corners.x[i] = x, corners.y[i] = y;
-    corners.triangle[i] = static_cast<std::int64_t>(t);
-    corners.ball[i] = static_cast<std::uint32_t>(b);
-    corners.sign[i] = sign;
-    if (corners.size == kAtOnce) take_corners(patch, corners, sums);
+    if (append(corners, x, y)) take_corners(patch, corners, sums);
     return;
   }
-  // No corner within: the disc is whole, but for the segments that are cut off; where the foot is
-  // outside and no edge cuts, there is nothing.
+  // The disc contains no corner: it is whole without the segments that edges cut off, or outside.
   if (found.through == 0 && found.is_outside) return;
-  const auto all = disc.whole();
-  add_share(patch, t, b, 1, all.cones, all.angle, all.area, all.second, sums);
-  for (int k = 0; k < 3; ++k) {
-    if ((found.through >> k & 1) == 0) continue;
-    const std::size_t i = chords.size++;
-    chords.h[i] = h, chords.r[i] = r, chords.m[i] = disc.distance(k);
-    chords.ball[i] = static_cast<std::uint32_t>(b);
-    chords.triangle[i] = static_cast<std::uint32_t>(t);
-    chords.sign[i] = sign;
-    if (chords.size == kAtOnce) take_chords(patch, chords, sums);
-  }
+  add_part(patch, t, b, 1, disc.whole(), sums);
+  for (int k = 0; k < 3; ++k)
+    if ((found.through >> k & 1) != 0 && append(chords, disc.distance(k), 0))
+      take_chords(patch, chords, sums);
 }
 
 void add_patch_to(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
                   std::uint32_t chosen, ProbeSums& sums) {
-  Chords chords;
-  Corners corners;
+  DiscList chords, corners;
   alignas(64) double height[kWidth], x[kWidth], y[kWidth];
   if (hwy::PopCount(triangles) <= hwy::PopCount(chosen)) {
     for (; triangles != 0; triangles &= triangles - 1) {

@@ -45,7 +45,7 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
   const Real zero = hn::Zero(d), never = hn::Set(d, -1e300);
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     Real e[3], f[3];
-    const auto take = [&](int k, const double(&of)[3][kWidth]) {
+    const auto load = [&](int k, const double(&of)[3][kWidth]) {
       const Real a = hn::Load(d, of[0] + lane);
       const Real b = hn::Load(d, of[1] + lane);
       const Real c = hn::Load(d, of[2] + lane);
@@ -55,7 +55,7 @@ void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
       hn::Store(b, d, patch.corner[1][k] + lane);
       hn::Store(c, d, patch.corner[2][k] + lane);
     };
-    take(0, corners.x), take(1, corners.y), take(2, corners.z);
+    load(0, corners.x), load(1, corners.y), load(2, corners.z);
     PlaneFrame frame;
     frame_of(e, f, frame);
     for (int k = 0; k < 3; ++k) {

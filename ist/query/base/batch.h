@@ -8,13 +8,13 @@
 
 namespace ist {
 
-/// Items that the workers of a pool answer: answer(i, worker) answers the i-th.
+/// Items that the workers of a pool answer, by answer(i, worker).
 template <class Answer>
 class Batch {
  public:
   Batch(std::size_t count, const Answer& answer) noexcept : count_(count), answer_(answer) {}
 
-  /// Answers items as long as there are any. Which worker answers one changes nothing of it.
+  /// Answers items until none is left. No answer depends on the worker that gives it.
   static void work(void* context, std::size_t worker) {
     Batch& batch = *static_cast<Batch*>(context);
     for (;;) {
@@ -26,7 +26,7 @@ class Batch {
   }
 
  private:
-  // Items that a worker takes at a time: enough that the counter is not what it waits for.
+  // Items that a worker takes at a time, so that workers do not wait for the counter.
   static constexpr std::size_t kTaken = 4;
 
   std::size_t count_;
@@ -34,7 +34,7 @@ class Batch {
   std::atomic<std::size_t> next_ = 0;
 };
 
-/// answer(i, worker) for each i in [0, count), by `workers` > 0 workers at most.
+/// Calls answer(i, worker) for each i in [0, count), on at most `workers` > 0 workers.
 template <class Answer>
 void answer_all(std::size_t count, std::size_t workers, const ParallelFor& parallel,
                 const Answer& answer) noexcept {
@@ -46,7 +46,7 @@ void answer_all(std::size_t count, std::size_t workers, const ParallelFor& paral
   }
 }
 
-/// The answer of a batch that had no workspace.
+/// The answers of a batch without workspaces.
 inline Penetration unknown_penetration() noexcept {
   Penetration unknown;
   unknown.volume_max = std::numeric_limits<double>::infinity();
