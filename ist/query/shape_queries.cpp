@@ -3,7 +3,7 @@
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/shape/gap_search.h"
-#include "query/shape/meeting_search.h"
+#include "query/shape/overlap_search.h"
 #include "query/shape/shape_descent.h"
 #include "query/shape/with_shape.h"
 #include "query/solid_queries.h"
@@ -58,7 +58,7 @@ YesNoAnswer find_overlap(const PlacedShape& a, const PlacedAsset& b,
   if (!pose || workspace.impl() == nullptr) return {YesNo::unknown, QueryStatus::invalid_input};
   const SphereTree tree = sphere_tree(b.asset, Measure::inner);
   const auto search = [&](auto& shape) {
-    return YesNoAnswer{ShapeMeetingSearch(shape, tree, *pose, *workspace.impl()).run(),
+    return YesNoAnswer{ShapeOverlapSearch(shape, tree, *pose, *workspace.impl()).run(),
                        QueryStatus::ok};
   };
   return with_shape(a.shape, search, [] {

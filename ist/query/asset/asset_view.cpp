@@ -97,8 +97,7 @@ bool sound_counts(const AssetHeader& header) noexcept {
          detail_spheres(header.sphere_count, header.detail_count) >= 1;
 }
 
-/// True if offsets and counts are those that follow from the counts of spheres, of levels of detail
-/// and of the mesh.
+/// True if offsets and counts follow from the counts of spheres, levels of detail and the mesh.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (!sound_counts(header)) return false;
   AssetHeader expected;

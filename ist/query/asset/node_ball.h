@@ -35,14 +35,12 @@ IST_HD inline NodeBall lane_ball(const BallBlock& b, const Origin& o, std::uint3
           static_cast<double>(b.r[lane])};
 }
 
-/// Cube of the typical radius of a level's nodes, up to a factor common to all trees: nodes tile
-/// the root ball.
+/// Cube of the typical radius of a level's nodes, up to a factor common to all trees.
 IST_HD inline double typical_cube(double root, std::uint32_t count) noexcept {
   return root * root * root / count;
 }
 
-/// True if A's node is opened next: the larger of the two by typical cubes. `scale`: of B in A's
-/// unit frame.
+/// True if A's node is the larger one, which is opened next. `scale`: of B in A's unit frame.
 IST_HD inline bool opens_a(int level_a, double cube_a, int level_b, double cube_b,
                            double scale) noexcept {
   return level_b == kSphereLevel ||

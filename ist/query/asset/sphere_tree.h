@@ -18,8 +18,13 @@ struct NodeSums {
   double overlap = 1;  ///< κ: no point lies in more spheres than this
 };
 
-/// One tree of an asset with its offsets resolved. A level and a block of it identify a *node*: the
-/// ball around the block's sixteen balls (spheres at level 0).
+/// The ball around the sixteen balls (spheres at level 0) of a block of a tree.
+struct TreeNode {
+  int level;
+  std::uint32_t block;
+};
+
+/// One tree of an asset with its offsets resolved.
 struct SphereTree {
   struct Level {
     const BallBlock* blocks = nullptr;
@@ -40,6 +45,7 @@ struct SphereTree {
   }
 
   /// Unit frame, at full precision.
+  NodeBall ball(TreeNode node) const noexcept { return ball(node.level, node.block); }
   NodeBall ball(int at_level, std::uint32_t block) const noexcept {
     if (at_level == top)
       return {{header->root[0], header->root[1], header->root[2]}, header->root[3]};

@@ -21,8 +21,7 @@ bool sound_block(const MeshBlock& block, std::uint32_t vertex_count) noexcept {
   return sound;
 }
 
-/// True if every block is sound and the counts add up: lists of neighbours are contiguous, and each
-/// shell begins with its first block.
+/// True if blocks are sound and in order: lists of neighbours are contiguous, shells ascend.
 bool sound_blocks(const MeshParts& mesh) noexcept {
   std::uint64_t triangles = 0;
   std::uint32_t listed = 0, shells = 0;
@@ -54,8 +53,7 @@ bool names(const MeshParts& mesh, const MeshBlock& from, std::uint32_t block) no
   return found != end && *found / kWidth == block;
 }
 
-/// True if each list is sorted without duplicates and its entries name another block of the same
-/// shell and a vertex of both.
+/// True if lists are sorted and name other blocks of the shell, once each, and shared vertices.
 bool sound_lists(const MeshParts& mesh) noexcept {
   for (std::uint32_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];

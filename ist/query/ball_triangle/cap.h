@@ -13,8 +13,7 @@ struct Cap {
   double moment = 0;      ///< of the volume about the centre, along the inward normal
 };
 
-/// `d`: distance of the centre from the plane, positive inside. No form cancels where it is small:
-/// relative error 1e-15 up to tangency.
+/// `d`: the centre's distance from the plane, positive inside. Relative error 1e-15 up to tangency.
 IST_HD inline Cap cap(double r, double d) {
   const double pi = std::numbers::pi;
   if (!(d > -r)) return {};

@@ -32,8 +32,7 @@ IST_HD inline double where_positive(double x, double y) { return x > 0 ? y : 1; 
 
 using disc::DiscPart;
 
-/// Bound on how far a ball whose centre lies on an edge is moved off it, as a fraction of its
-/// radius.
+/// Bound, in radii, on how far a ball whose centre lies on an edge is moved off it.
 inline constexpr double kMoved = 0x1p-10;
 
 IST_HD inline void move_away(double r, double (&at)[3]) {
@@ -80,7 +79,6 @@ class Disc {
     t.feet(x, height_, fx, fy);
     place(t.length, t.edge_x, t.edge_y, fx, fy);
   }
-  /// The same from the height, the foot (x, y), and the edges' lengths and directions.
   IST_HD Disc(double height, double x, double y, double r, const double (&length)[3],
               const double (&edge_x)[3], const double (&edge_y)[3])
       : r_(r), height_(height) {

@@ -42,8 +42,7 @@ IST_FORMULA void frame_of(const Real (&e)[3], const Real (&f)[3], PlaneFrame& ou
   }
 }
 
-/// The part of a triangle inside a ball: volume of the cones to the sphere, solid angle, area, and
-/// ∫ (r² − |y − centre|²) dA.
+/// A triangle inside a ball: volume of its cones, solid angle, area, and ∫ (r² − |y − centre|²) dA.
 struct DiscPart {
   Real cones, angle, area, second;
 };

@@ -10,10 +10,149 @@
 #include <hwy/foreach_target.h>
 
 #include "query/ball_triangle/disc_lanes-inl.h"
-#include "query/ball_triangle/feet-inl.h"
+#include "query/kernel/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
+
+/// A vector of centres: their heights over triangles' planes, and their feet in these.
+template <class V>
+struct Feet {
+  V height, x, y;
+};
+
+/// A bit for each ball that comes near its triangle, which extends from `left` to `right` and from
+/// 0 to `top` in its plane. kFeet: stores the feet, from `lane` on.
+template <bool kFeet, class V>
+HWY_INLINE std::uint32_t near_lanes(const Feet<V>& feet, V left, V right, V top, V r,
+                                    std::size_t lane, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  const auto beside = hn::And(feet.x > left - r, feet.x < right + r);
+  const auto along = hn::And(feet.y > hn::Zero(d) - r, feet.y < top + r);
+  if constexpr (kFeet) {
+    hn::Store(feet.height, d, height + lane);
+    hn::Store(feet.x, d, x + lane);
+    hn::Store(feet.y, d, y + lane);
+  }
+  return mask_bits(d, hn::And(hn::Abs(feet.height) < r, hn::And(beside, along)));
+}
+
+/// A bit for each ball that comes near triangle t. kFeet: stores heights and feet of all balls.
+template <bool kFeet>
+HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
+                                   const ProbeBalls& balls, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const auto of = [&](double value) -> V { return hn::Set(d, value); };
+  V from[3], u[3], v[3], n[3];
+  for (int k = 0; k < 3; ++k) {
+    from[k] = of(patch.corner[0][k][t] - balls.origin[k]);
+    u[k] = of(patch.u[k][t]), v[k] = of(patch.v[k][t]), n[k] = of(patch.n[k][t]);
+  }
+  const V left = of(patch.left[t]), right = of(patch.right[t]), top = of(patch.top[t]);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Load(d, balls.x + lane) - from[0];
+    const V py = hn::Load(d, balls.y + lane) - from[1];
+    const V pz = hn::Load(d, balls.z + lane) - from[2];
+    const V r = hn::Load(d, balls.r + lane);
+    const auto dot = [&](const V(&axis)[3]) -> V {
+      return (px * axis[0] + py * axis[1]) + pz * axis[2];
+    };
+    near |=
+        near_lanes<kFeet>(Feet<V>{dot(n), dot(u), dot(v)}, left, right, top, r, lane, height, x, y)
+        << lane;
+  }
+  return near;
+}
+
+/// A bit for each triangle that the ball comes near. kFeet: as for feet_near().
+template <bool kFeet>
+HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const double (&centre)[3],
+                                 double radius, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V r = hn::Set(d, radius);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Set(d, centre[0]) - hn::Load(d, patch.corner[0][0] + lane);
+    const V py = hn::Set(d, centre[1]) - hn::Load(d, patch.corner[0][1] + lane);
+    const V pz = hn::Set(d, centre[2]) - hn::Load(d, patch.corner[0][2] + lane);
+    const auto dot = [&](const double(&axis)[3][kWidth]) -> V {
+      return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
+             pz * hn::Load(d, axis[2] + lane);
+    };
+    near |= near_lanes<kFeet>(Feet<V>{dot(patch.n), dot(patch.u), dot(patch.v)},
+                              hn::Load(d, patch.left + lane), hn::Load(d, patch.right + lane),
+                              hn::Load(d, patch.top + lane), r, lane, height, x, y)
+            << lane;
+  }
+  return near;
+}
+
+std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], double radius) {
+  return feet_of<false>(patch, centre, radius, nullptr, nullptr, nullptr);
+}
+
+void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
+                     const Similarity& map, ProbeBalls& balls) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const NodeBall ball = probes.ball(level, block);
+  const BallBlock& from = probes.level[level].blocks[block];
+  const Origin& o = probes.level[level].origins[block];
+  map.apply(ball.centre, balls.origin);
+  balls.reach = ball.r * map.scale * (1 + 1e-12);
+  V m[9];
+  for (int k = 0; k < 9; ++k) m[k] = hn::Set(d, map.m[k]);
+  const V ox = hn::Set(d, o.x - ball.centre[0]);
+  const V oy = hn::Set(d, o.y - ball.centre[1]);
+  const V oz = hn::Set(d, o.z - ball.centre[2]);
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V x = ox + load_as<double>(d, from.x + lane);
+    const V y = oy + load_as<double>(d, from.y + lane);
+    const V z = oz + load_as<double>(d, from.z + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, balls.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, balls.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, balls.z + lane);
+    hn::Store(hn::Max(load_as<double>(d, from.r + lane), hn::Zero(d)) * scale, d, balls.r + lane);
+  }
+}
+
+void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
+  const DiscTag d;
+  const Real zero = hn::Zero(d), never = hn::Set(d, -1e300);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    Real e[3], f[3];
+    const auto load = [&](int k, const double(&of)[3][kWidth]) {
+      const Real a = hn::Load(d, of[0] + lane);
+      const Real b = hn::Load(d, of[1] + lane);
+      const Real c = hn::Load(d, of[2] + lane);
+      e[k] = b - a;
+      f[k] = c - a;
+      hn::Store(a, d, patch.corner[0][k] + lane);
+      hn::Store(b, d, patch.corner[1][k] + lane);
+      hn::Store(c, d, patch.corner[2][k] + lane);
+    };
+    load(0, corners.x), load(1, corners.y), load(2, corners.z);
+    PlaneFrame frame;
+    frame_of(e, f, frame);
+    for (int k = 0; k < 3; ++k) {
+      hn::Store(frame.u[k], d, patch.u[k] + lane);
+      hn::Store(frame.v[k], d, patch.v[k] + lane);
+      hn::Store(frame.n[k], d, patch.n[k] + lane);
+      hn::Store(frame.length[k], d, patch.length[k] + lane);
+      hn::Store(frame.edge_x[k], d, patch.edge_x[k] + lane);
+      hn::Store(frame.edge_y[k], d, patch.edge_y[k] + lane);
+    }
+    const auto flat = hn::Not(frame.area > zero);
+    hn::Store(hn::Min(zero, frame.apex_x), d, patch.left + lane);
+    hn::Store(hn::IfThenElse(flat, never, hn::Max(frame.length[0], frame.apex_x)), d,
+              patch.right + lane);
+    hn::Store(hn::IfThenElse(flat, never, frame.apex_y), d, patch.top + lane);
+  }
+}
 
 inline constexpr std::size_t kAtOnce = 64;
 inline constexpr std::size_t kCapacity = kAtOnce + 8;
@@ -23,8 +162,7 @@ struct alignas(64) Shares {
   double cones[kCapacity], angle[kCapacity], area[kCapacity], second[kCapacity];
 };
 
-/// Discs that are computed a vector at a time: those that an edge cuts from side to side (chords),
-/// or those that contain a corner.
+/// Discs that are computed in vectors: cut from side to side (chords), or with a corner inside.
 struct alignas(64) DiscList {
   double h[kCapacity], r[kCapacity];  ///< height under the ball's centre, and the ball's radius
   /// Corners: the foot in the triangle's plane. Chords: x is the distance from the foot to the
@@ -210,6 +348,23 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(add_patch_to);
+HWY_EXPORT(make_patch_of);
+HWY_EXPORT(near_of);
+HWY_EXPORT(place_probes_of);
+
+void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
+                  ProbeBalls& balls) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_probes_of)(probes, level, block, map, balls);
+}
+
+std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
+                             double radius) noexcept {
+  return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
+}
+
+void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
+  HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
+}
 
 ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexcept {
   ProbeBalls moved = balls;

@@ -43,8 +43,7 @@ struct alignas(64) ProbeBalls {
   }
 };
 
-/// The balls of a block, spheres at level 0, mapped and relative to the node's centre. Unused lanes
-/// get a radius of 0.
+/// The mapped balls of a block, relative to its node's centre. Unused lanes get a radius of 0.
 void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
                   ProbeBalls& balls) noexcept;
 

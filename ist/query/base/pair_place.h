@@ -12,8 +12,7 @@
 
 namespace ist {
 
-/// True if no coordinate of a pose, point or motion, in the other solid's unit frame, exceeds
-/// kFarthestPose.
+/// True if no coordinate exceeds kFarthestPose.
 IST_HD inline bool in_pose_range(const Vec3& x) noexcept {
   for (int k = 0; k < 3; ++k)
     if (!(x[k] <= kFarthestPose) || !(x[k] >= -kFarthestPose)) return false;

@@ -8,8 +8,7 @@
 
 namespace ist {
 
-/// A direct-mapped cache of placed blocks: block n is stored in slot n % kPlaces. Call forget()
-/// before the first use.
+/// A direct-mapped cache of placed blocks. Call forget() before the first use.
 template <class T, std::uint32_t kPlaces>
 struct PlacedCache {
   std::uint32_t number[kPlaces];

@@ -7,8 +7,7 @@
 
 namespace ist {
 
-/// The precision of arithmetic inside a block: float unless one solid is far smaller than the
-/// other.
+/// Arithmetic inside a block is in float unless one solid is far smaller than the other.
 enum class Precision { float32, float64 };
 
 /// Bound on the rounding of a distance between points with coordinates of this magnitude: each
@@ -38,8 +37,7 @@ IST_HD inline double span(const RootBall& a, const RootBall& b,
   return sum + 2 * (a.reach() + a_from_b.scale * b.reach());
 }
 
-/// The rounding of a gap grows with the distance of the blocks: float serves up to a few sizes of
-/// the solids.
+/// A gap's rounding grows with the distance of blocks: float serves up to a few sizes of solids.
 IST_HD inline Precision precision_for_gap(const RootBall& a, const RootBall& b,
                                           const Similarity& a_from_b) noexcept {
   const double sizes = a.r + a_from_b.scale * b.r;

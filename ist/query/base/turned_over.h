@@ -7,12 +7,9 @@
 #include "query/base/relative_pose.h"
 #include "query/base/world_sums.h"
 
-// turn_over() makes gradients by motions of one solid, which is at `moved`, about its origin those
-// by motions of the other solid, at `other`, about its own.
-
 namespace ist {
 
-/// `answer`: with a force and a torque, as Penetration and ContactPatch.
+/// Converts forces and torques on the solid at `moved` to those on the one at `other`.
 template <class Answer>
 void turn_over(const Pose& moved, const Pose& other, Answer& answer) noexcept {
   const Vec3 arm = vec3(moved.t) - vec3(other.t);

@@ -4,8 +4,7 @@
 
 namespace ist {
 
-/// The gradient by rotations about another origin, of A instead of B. `arm`: [u] from that origin
-/// to this.
+/// The gradient by rotations of A about another origin. `arm`: [u] from that origin to this.
 IST_HD inline Vec3 turned_over(const Vec3& arm, const Vec3& push, const Vec3& turn) noexcept {
   return -(turn + cross(arm, push));
 }

@@ -26,8 +26,7 @@ inline constexpr std::uint32_t kFewContactBlocks = 16;
 inline constexpr double kPushRounding = 1e-9;
 
 /// True if contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
-/// corners while it slides, or the only one fine enough. Does not depend on the pose. `blocks_…`:
-/// leaf blocks.
+/// corners while it slides, or the only one that is fine enough by its leaf blocks.
 IST_HD inline bool divides_b(std::uint32_t blocks_a, double radius_a, std::uint32_t blocks_b,
                              double radius_b) noexcept {
   const std::uint32_t fewer = blocks_a < blocks_b ? blocks_a : blocks_b;

@@ -121,8 +121,7 @@ class TreeCuts {
     return best_side != 0 ? best_side : region.members & -region.members;
   }
 
-  /// The first leaf block of the members and their number of leaf blocks: unique among regions, any
-  /// two of which are nested or disjoint.
+  /// The first leaf block and their number: unique, as any two regions are nested or disjoint.
   std::uint64_t id(const TreeRegion& region) const noexcept {
     std::uint64_t first = ~std::uint64_t{0}, size = 0;
     for (std::uint64_t left = region.members; left != 0; left &= left - 1) {
@@ -136,8 +135,7 @@ class TreeCuts {
   }
 
  private:
-  // A node with fewer children than this is divided among its grandchildren, at most kMembers, for
-  // a better choice of cuts.
+  // For better cuts, nodes with fewer children than this are divided among their grandchildren.
   static constexpr std::uint32_t kFewChildren = 5;
   static constexpr std::uint32_t kMembers = 64;
 

@@ -30,8 +30,7 @@ class ContactDivision {
     size_ = 1;
   }
 
-  /// Divides until there are `wanted` parts or none is worth it. Sorts the parts by their place in
-  /// the tree.
+  /// Divides until there are `wanted` parts or none is worth it; sorts by place in the tree.
   void run(std::size_t wanted) noexcept {
     wanted = std::min<std::size_t>(wanted, ContactBins::kBins);
     const auto less = [](const ContactPart& l, const ContactPart& r) {

@@ -15,9 +15,8 @@ struct Binned {
   double radius;  ///< of the binned tree's root, A's unit frame
 };
 
-/// Makes the first `count` patches, which sum to `part` of a blend, sum to the blend: spreads the
-/// difference by volume. Without patches, as of a stopped query, one becomes the whole. Returns the
-/// number of patches.
+/// Makes `count` patches of a `part` of a blend sum to the blend, by volume. Without patches, as of
+/// a stopped query, one becomes the whole. Returns their number.
 std::size_t spread(const Penetration& part, const Penetration& whole, std::size_t count,
                    std::span<ContactPatch> patches) noexcept;
 
