@@ -56,6 +56,7 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedAsset& a, const 
   return answer;
 }
 
+/// The settings for the spheres' answer, which replaces an exact one that a limit stopped.
 template <class Settings>
 Settings settings_of_spheres(Settings settings) {
   settings.measure = Measure::matched;
@@ -64,14 +65,10 @@ Settings settings_of_spheres(Settings settings) {
   return settings;
 }
 
-/// The spheres' answer, for an exact query that a limit stopped.
-template <class Answer, class Spheres>
-Answer stopped(const PlacedAsset& a, const PlacedAsset& b, Answer answer, const Spheres& by_spheres,
-               Penetration& (*whole)(Answer&)) {
-  if (a.asset.sphere_count() > 0 && b.asset.sphere_count() > 0) answer = by_spheres();
-  bound_by_solids(a, b, whole(answer));
-  whole(answer).status = QueryStatus::budget_exhausted;
-  return answer;
+Penetration stopped(const PlacedAsset& a, const PlacedAsset& b, Penetration by_spheres) {
+  bound_by_solids(a, b, by_spheres);
+  by_spheres.status = QueryStatus::budget_exhausted;
+  return by_spheres;
 }
 
 /// Writes the kept parts in their order; `kept` becomes the patch.
@@ -103,11 +100,9 @@ Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (found.complete) return whole_answer(found, a, b, pose);
-  const auto by_spheres = [&] {
-    return penetration(a, b, settings_of_spheres(settings), workspace);
-  };
-  return stopped<Penetration>(a, b, missing_data<Penetration>(), by_spheres,
-                              [](Penetration& answer) -> Penetration& { return answer; });
+  return stopped(a, b,
+                 lack_spheres(a, b) ? missing_data<Penetration>()
+                                    : penetration(a, b, settings_of_spheres(settings), workspace));
 }
 
 OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
@@ -124,12 +119,10 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
   auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (!found.complete || !query.holds_crossings()) {
-    const auto by_spheres = [&] {
-      return find_patches(a, b, settings_of_spheres(settings), workspace, patches);
-    };
-    answer.contact = stopped<ContactPatches>(
-        a, b, missing_data<ContactPatches>(), by_spheres,
-        [](ContactPatches& stopped) -> Penetration& { return stopped.penetration; });
+    answer.contact = lack_spheres(a, b)
+                         ? missing_data<ContactPatches>()
+                         : find_patches(a, b, settings_of_spheres(settings), workspace, patches);
+    answer.contact.penetration = stopped(a, b, answer.contact.penetration);
     return answer;
   }
   answer.contact.penetration = whole_answer(found, a, b, *pose);

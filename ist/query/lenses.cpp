@@ -36,30 +36,25 @@ struct Place {
 };
 
 /// Descends both trees together, by recursion, and opens the larger node first.
-class LensSearch {
- public:
-  LensSearch(const PlacedAsset& a, const SphereTree& tree_a, const PlacedAsset& b,
-             const SphereTree& tree_b, const RelativePose& pose, std::span<OverlapLens> lenses)
-      : tree_a_(tree_a),
-        tree_b_(tree_b),
-        index_a_(at<std::uint32_t>(a.asset.header(), tree_a.header->sphere_index)),
-        index_b_(at<std::uint32_t>(b.asset.header(), tree_b.header->sphere_index)),
-        pose_(pose),
-        lenses_(lenses) {}
+struct LensSearch {
+  const SphereTree tree_a, tree_b;
+  const RelativePose& pose;
+  const std::uint32_t *const index_a, *const index_b;
+  const std::span<OverlapLens> lenses;
+  OverlapLenses result = {};
 
   OverlapLenses find() {
-    visit(place_a(tree_a_.top, 0), place_b(tree_b_.top, 0));
-    return result_;
+    visit(place_a(tree_a.top, 0), place_b(tree_b.top, 0));
+    return result;
   }
 
- private:
   Place place_a(int level, std::uint32_t index) const {
-    const NodeBall ball = tree_a_.ball(level, index);
+    const NodeBall ball = tree_a.ball(level, index);
     return {level, index, vector(ball.centre), ball.r};
   }
   Place place_b(int level, std::uint32_t index) const {
-    const NodeBall ball = tree_b_.ball(level, index);
-    return {level, index, mapped(pose_.a_from_b, ball.centre), ball.r * pose_.a_from_b.scale};
+    const NodeBall ball = tree_b.ball(level, index);
+    return {level, index, mapped(pose.a_from_b, ball.centre), ball.r * pose.a_from_b.scale};
   }
 
   void visit(const Place& a, const Place& b) {
@@ -68,7 +63,7 @@ class LensSearch {
     if (a.level == kSphereLevel && b.level == kSphereLevel) return add_lens(a, b);
     const bool open_a = a.level != kSphereLevel && (b.level == kSphereLevel || a.r >= b.r);
     const Place& opened = open_a ? a : b;
-    const SphereTree& tree = open_a ? tree_a_ : tree_b_;
+    const SphereTree& tree = open_a ? tree_a : tree_b;
     const std::uint32_t first = opened.index * kWidth;
     const std::uint32_t end = std::min(first + kWidth, tree.count(opened.level - 1));
     for (std::uint32_t i = first; i < end; ++i) {
@@ -80,31 +75,25 @@ class LensSearch {
   }
 
   void add_lens(const Place& a, const Place& b) {
-    ++result_.total;
-    if (result_.count == lenses_.size()) return;
+    ++result.total;
+    if (result.count == lenses.size()) return;
     const Vector3d between = b.centre - a.centre;
     const double d = between.norm();
     // The lens and its rim, along the line from A's centre.
     const double begin = std::max(d - b.r, -a.r), end = std::min(a.r, d + b.r);
     const double rim = d > 0 ? (d * d + (a.r - b.r) * (a.r + b.r)) / (2 * d) : 0;
-    OverlapLens& lens = lenses_[result_.count++];
+    OverlapLens& lens = lenses[result.count++];
     // With the rim beyond a centre the lens is as wide as the smaller ball.
     lens.radius = rim > 0 && rim < d ? std::sqrt(std::max(0.0, (a.r - rim) * (a.r + rim)))
                                      : std::min(a.r, b.r);
-    lens.radius *= pose_.unit_a;
-    lens.thickness = (end - begin) * pose_.unit_a;
+    lens.radius *= pose.unit_a;
+    lens.thickness = (end - begin) * pose.unit_a;
     const Vector3d axis = d > 0 ? Vector3d(between / d) : Vector3d::UnitZ();
-    lens.axis = pose_.rotation() * axis;
-    lens.centre = pose_.to_world(a.centre + 0.5 * (begin + end) * axis);
-    lens.sphere_a = index_a_[a.index];
-    lens.sphere_b = index_b_[b.index];
+    lens.axis = pose.rotation() * axis;
+    lens.centre = pose.to_world(a.centre + 0.5 * (begin + end) * axis);
+    lens.sphere_a = index_a[a.index];
+    lens.sphere_b = index_b[b.index];
   }
-
-  SphereTree tree_a_, tree_b_;
-  const std::uint32_t *index_a_, *index_b_;
-  const RelativePose& pose_;
-  std::span<OverlapLens> lenses_;
-  OverlapLenses result_;
 };
 
 }  // namespace
@@ -117,7 +106,10 @@ OverlapLenses overlap_lenses(const PlacedAsset& a, const PlacedAsset& b,
   const auto tree_a = tree_of(a.asset, settings.measure, settings.detail_a);
   const auto tree_b = tree_of(b.asset, settings.measure, settings.detail_b);
   if (!tree_a || !tree_b) return {QueryStatus::invalid_input, 0, 0};
-  return LensSearch(a, *tree_a, b, *tree_b, *pose, lenses).find();
+  const auto index = [](const PlacedAsset& placed, const SphereTree& tree) {
+    return at<std::uint32_t>(placed.asset.header(), tree.header->sphere_index);
+  };
+  return LensSearch{*tree_a, *tree_b, *pose, index(a, *tree_a), index(b, *tree_b), lenses}.find();
 }
 
 }  // namespace ist

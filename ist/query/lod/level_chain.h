@@ -22,11 +22,7 @@ class LevelChain {
 
   LevelChain() = default;  ///< not planned
   /// `scale`: of B in A's unit frame.
-  LevelChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept {
-    plan(
-        a.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(a, i)); },
-        b.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(b, i)); }, scale);
-  }
+  LevelChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept;
 
   /// `level_…(i)`: level i of an asset, which has `coarser_…` levels after the finest.
   template <class LevelA, class LevelB>
@@ -72,13 +68,7 @@ class LevelChain {
   }
 
   Weights weights(double coarse, double budget,
-                  const Weights& wanted = {LevelWeight{1, 0}}) const noexcept {
-    Weights weights = {};
-    share(
-        coarse, budget, [&](std::size_t i) { return wanted[i]; },
-        [&](std::size_t i, const LevelWeight& weight) { weights[i] = weight; });
-    return weights;
-  }
+                  const Weights& wanted = {LevelWeight{1, 0}}) const noexcept;
 
  private:
   LevelPair pairs_[kMost];

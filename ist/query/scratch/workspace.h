@@ -71,7 +71,7 @@ class GapStack {
   }
 
   /// Adds a child of the pair that open() opens.
-  void add(const WaitingPair& child) noexcept {
+  [[gnu::always_inline]] void add(const WaitingPair& child) noexcept {
     std::size_t place = size_++;
     for (; place > first_ && stack_[place - 1].order < child.order; --place)
       stack_[place] = stack_[place - 1];

@@ -35,7 +35,7 @@ class GapSearch : GapStack {
  private:
   static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  void open(const WaitingPair& pair) noexcept {
+  [[gnu::noinline]] void open(const WaitingPair& pair) noexcept {
     const int level = pair.level_a;
     const std::uint32_t below = tree_.count(level - 1);
     for (std::uint32_t lane = 0; lane < kWidth && kWidth * pair.a + lane < below; ++lane) {
