@@ -91,7 +91,7 @@ class AssetView {
   double coverage() const noexcept;    ///< [0, 1] share of the volume in inner spheres
   double protrusion() const noexcept;  ///< [u] bound on how far matched spheres stick out of the
                                        ///< solid
-  /// Whether the asset stores the solid's mesh, which Measure::exact needs. An asset with a mesh
+  /// True if the asset stores the solid's mesh, which Measure::exact needs. An asset with a mesh
   /// and no spheres is a mesh alone: queries of spheres return QueryStatus::missing_data.
   bool has_mesh() const noexcept;
   std::uint32_t mesh_triangles() const noexcept;  ///< 0 without a mesh

@@ -15,7 +15,7 @@
 
 namespace IST_API ist {
 
-/// How space is searched for the next spheres. All modes except `banded` are the paper's.
+/// The search for the next spheres. All modes except `banded` are the paper's.
 enum class GridMode : std::uint32_t {
   banded = 0,               ///< ours: a greedy packing with a guarantee
   uniform = 1,              ///< original ProtoSphere: one fixed, fine grid
@@ -43,7 +43,7 @@ struct GridSettings {
   unsigned rounds_per_level = 0;  ///< rounds before a refinement; 2 if automatic
 };
 
-/// Where packing and baking run. The result is the same, bit for bit.
+/// The device for packing and baking. The result is the same, bit for bit.
 enum class Device : std::uint32_t {
   automatic,  ///< the GPU if there is one, else the CPU
   cpu,

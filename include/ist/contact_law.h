@@ -54,7 +54,7 @@ inline Wrenches wrenches(const Penetration& contact, const Pose& b, const Eigen:
   return both_wrenches({contact.force, contact.torque}, Eigen::Vector3d(b.t), point_a, point_b);
 }
 
-/// Of one patch of a contact. Those of all patches sum to the whole contact's.
+/// The wrenches of one patch of a contact. Those of all patches sum to the whole contact's.
 inline Wrenches wrenches(const ContactPatch& patch, const Pose& b, const Eigen::Vector3d& point_a,
                          const Eigen::Vector3d& point_b) noexcept {
   return both_wrenches({patch.force, patch.torque}, Eigen::Vector3d(b.t), point_a, point_b);
@@ -364,14 +364,14 @@ class SupportPolygon {
   /// A face without end. `normal`: unit, outward.
   void add_plane(bool of_b, const Eigen::Vector3d& normal, const Eigen::Vector3d& point) noexcept;
 
-  /// Whether the faces given so far of that side may be part of a polygon. Where not, corners()
-  /// answers nothing, whatever the other side has.
+  /// True if the faces given so far of that side may be part of a polygon. Otherwise corners()
+  /// returns nothing, whatever the other side has.
   bool has_faces(bool of_b) const noexcept {
     return flat_ && (sides_[of_b].endless || sides_[of_b].count > 0);
   }
 
   /// Writes the corners, those of the true hull if they fit and of as many directions as fit if
-  /// not. Returns how many, or nothing if the contact is not flat or if there is no room for three:
+  /// not. Returns how many, or nothing if the contact is not flat or if three do not fit:
   /// then use the patches. Where the faces are apart, and spheres alone reach from one to the
   /// other, the depths are negative, the gaps, and no corner has a volume or a force. Ids are those
   /// of directions in `axes`, with the highest bit set: patches have others.
@@ -382,7 +382,7 @@ class SupportPolygon {
     double u, v, z;  // [u] from the middle along the polygon's axes and the normal
   };
   using Face = std::array<Corner, 3>;
-  /// Of the plane of one side's faces: z = height + u · slope[0] + v · slope[1].
+  /// The plane of one side's faces: z = height + u · slope[0] + v · slope[1].
   struct Plane {
     double height = 0, slope[2] = {0, 0};
     double at(const Corner& x) const { return height + x.u * slope[0] + x.v * slope[1]; }
@@ -405,7 +405,7 @@ class SupportPolygon {
   Eigen::Vector3d origin_b_, middle_, normal_, axis_[2];
   double area_ = 0, torsion_ = 0, reach_ = 0, near_ = 0;
   bool blurred_ = false;
-  bool flat_ = true;  // as far as is known
+  bool flat_ = true;  // so far
   std::array<Side, 2> sides_;
 };
 

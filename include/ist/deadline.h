@@ -39,7 +39,7 @@ class Deadline {
   /// and a time that is not positive and finite, are ignored.
   void record(const Penetration& answer, double microseconds) noexcept;
 
-  /// Whether more than an eighth of the last queries in contact were late at the smallest budget.
+  /// True if more than an eighth of the last queries in contact were late at the smallest budget.
   /// Then the coarsest levels take longer than the deadline: query less often, or bake fewer
   /// spheres. False again once recorded queries are in time.
   bool too_slow() const noexcept;

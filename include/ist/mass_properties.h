@@ -52,12 +52,12 @@ MassProperties mass_properties(const PlacedAsset& placed) noexcept;
 /// Rounding is not added. All NaN as above.
 Bounds bounds(const PlacedAsset& placed) noexcept;
 
-/// Whether the sizes of two assets suit each other, independent of their poses.
+/// The feature sizes of two assets, compared independently of their poses.
 struct SizeMatch {
   /// [u] under the objects' scales: mean radius of the matched spheres, over the share of the solid
   /// that inner spheres cover. The spheres do not resolve finer features.
   double feature_size_a = 0, feature_size_b = 0;
-  double ratio = 1;          ///< ≥ 1, coarser grain over the finer
+  double ratio = 1;          ///< ≥ 1, coarser feature size over the finer
   bool a_is_coarser = true;  ///< or both are equal
   bool has_mesh = true;      ///< both assets store their meshes (AssetView::has_mesh)
   /// The ratio is 4 or more: volumes and forces by spheres alone are misleading. With both meshes

@@ -24,7 +24,7 @@ struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;                ///< [u]
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside
   DeclaredFrame declared = {};                          ///< as loaded; nothing later reads it
-  /// What the file holds and its reader left out though it may change the shape: one printable
+  /// Content of the file that its reader left out though it may change the shape: one printable
   /// sentence each. close_mesh() and wrap_mesh() take them into their report.
   std::vector<std::string> notes = {};
 };
@@ -100,7 +100,7 @@ struct ClosedMesh {
   std::optional<std::vector<std::array<std::uint32_t, 2>>> meeting_pairs = {};
 };
 
-/// What to do with a mesh that does not bound a solid.
+/// The treatment of a mesh that does not bound a solid.
 enum class OpenMeshPolicy {
   refuse,  ///< throw OpenMeshError with the place of the first open edge
   /// Weld cracks, fill holes, drop open sheets and fins; report and judge the result. Throw
@@ -113,7 +113,7 @@ enum class OpenMeshPolicy {
 ///
 /// The file's own node transforms are applied; in glTF also skins, morph weights and instances.
 /// Axes and units are not converted, except that COLLADA is scaled to metres. Vertices are welded.
-/// What was left out and may change the shape is in TriangleMesh::notes.
+/// TriangleMesh::notes lists what was left out and may change the shape.
 ///
 /// Throws Error (file, place, remedy). Thread-safe.
 TriangleMesh load_mesh(const std::string& path, const ImportSettings& settings = {});

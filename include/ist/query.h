@@ -81,7 +81,7 @@ struct SeparationSettings {
   /// is ok. That is certified, and takes a few microseconds unless the distance is near it.
   double max_distance = 0;
 
-  /// As PenetrationSettings::pair_id, for distances of surfaces: the nearest triangles are kept,
+  /// Like PenetrationSettings::pair_id, for distances of surfaces: the nearest triangles are kept,
   /// and bound the next distance. It changes no bit of an answer except node_visits and
   /// sphere_pairs. One pair of solids may have the same id in both settings.
   std::uint32_t pair_id = 0;
@@ -435,20 +435,20 @@ void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSetti
                            std::span<ContactPatch> patches,
                            const ParallelFor& parallel = {}) noexcept;
 
-/// Whether two placed solids share a point.
+/// Tests two placed solids for a common point.
 ///
 /// Yes: two inner spheres meet, and these lie in the solids. No: no two cover balls meet, and these
 /// contain the solids. Unknown: the solids are near each other or hardly touch, or 256 pairs of
 /// nodes have been opened.
 ///
-/// Where an asset has no spheres the surfaces decide, as with a margin of 0.
+/// For assets without spheres the surfaces decide, as with a margin of 0.
 ///
 /// Stops at the first meeting pair of inner spheres: a fraction of the time of a penetration. With
 /// a shape, it is certain as far as the shape's distances are: see each shape. Two shapes:
 /// missing_data.
 YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace) noexcept;
 
-/// Whether two placed solids come within `margin` [u] ≥ 0 of each other. Yes and no are certain.
+/// Tests if two placed solids come within `margin` [u] ≥ 0 of each other. Yes and no are certain.
 ///
 /// If both assets keep a mesh, `unknown` is left only where the distance is the margin to rounding
 /// and the meshes' errors. Otherwise inner spheres and their covers decide, as above. Takes about

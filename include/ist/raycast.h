@@ -15,7 +15,7 @@
 // missing_data; an invalid pose, scale, ray or point returns invalid_input. All numbers of these
 // answers are NaN.
 //
-// Of shapes the half-space, box, ball, capsule and cylinder are exact. Terrains, distance grids and
+// Half-space, box, ball, capsule and cylinder are exact. Terrains, distance grids and
 // functions support points only, by the distances that queries of solids use; a ray returns
 // missing_data.
 //
@@ -30,13 +30,13 @@ struct Ray {
   double max_distance = std::numeric_limits<double>::infinity();  ///< [u] > 0, its length
 };
 
-/// Where a ray meets a solid's surface first. One that starts inside meets it on its way out:
-/// direction · normal > 0 there. One that starts on the surface may meet it at once.
+/// A ray's first hit of a solid's surface. A ray that starts inside hits it as it leaves:
+/// direction · normal > 0 there. One that starts on the surface may hit it at distance 0.
 struct RayHit {
   double distance = std::numeric_limits<double>::infinity();  ///< [u] ≥ 0; infinite: no hit
   Eigen::Vector3d point = Eigen::Vector3d::Zero();            ///< zero without a hit
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();           ///< unit, outward; likewise
-  /// Of the kept mesh: 16 · MeshBlock + lane, the same in every answer. ~0: no hit, or a shape.
+  /// In the stored mesh: 16 · MeshBlock + lane, the same in every answer. ~0: no hit, or a shape.
   std::uint32_t triangle = ~0u;
   QueryStatus status = QueryStatus::ok;
 
@@ -59,7 +59,7 @@ RayHit raycast(const PlacedSolid& solid, const Ray& ray) noexcept;
 /// Signed distance, nearest point and gradient. Returns one of several equally near points.
 SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
-/// Whether a point is inside. For a point on the surface yes or no, always the same one.
+/// Yes if a point is inside. On the surface the answer is yes or no, always the same one.
 YesNoAnswer contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
 /// answers[i] is that of rays[i] or points[i], bit for bit, for i < answers.size().

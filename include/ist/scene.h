@@ -15,17 +15,17 @@
 
 namespace IST_API ist {
 
-/// What a scene answers of two bodies.
+/// The query that a scene makes for two bodies.
 enum class SceneAnswer : std::uint32_t {
   nothing = 0,      ///< they do not meet
   boxes = 1,        ///< they meet where their boxes do, each half the margin wider
   overlap = 2,      ///< overlap(), within the margin: yes, no or unknown
   penetration = 3,  ///< penetration(), and separation() where a margin is set
   patches = 4,      ///< contact_patches(), likewise
-  impact = 5,       ///< time_of_impact() over their motions; boxes hold the ways of bodies
+  impact = 5,       ///< time_of_impact() over their motions; boxes contain their paths
 };
 
-/// How bodies of two groups are asked.
+/// The query for bodies of two groups.
 struct SceneRule {
   SceneAnswer answer = SceneAnswer::penetration;
   /// Measure and limits. The scene sets no pair_id.
@@ -48,7 +48,7 @@ struct SceneBody {
 };
 inline constexpr std::uint32_t kSceneGroups = 8;
 
-/// Whether two bodies met in the step before.
+/// A pair is new, or it met in the step before.
 enum class SceneEvent : std::uint32_t { begins = 0, stays = 1 };
 
 /// Two bodies that meet: their volume is positive, or they touch, or they come within the margin,
@@ -74,7 +74,7 @@ struct SceneSettings {
   std::size_t workspace_capacity = 1u << 20;  ///< as Workspace has it
 };
 
-/// What a step found. The spans stay until the next call of a function that is not const.
+/// The results of a step. The spans stay until the next call of a function that is not const.
 struct SceneStep {
   std::span<const ScenePair> pairs;      ///< that meet, by (a, b)
   std::span<const ScenePairName> ended;  ///< met in the step before, by (a, b)
@@ -125,7 +125,7 @@ class Scene {
   /// Returns how many there are.
   std::size_t set_poses(std::span<const std::uint32_t> numbers,
                         std::span<const Pose> poses) noexcept;
-  /// As set_poses(), of motions.
+  /// Like set_poses(), for motions.
   std::size_t set_motions(std::span<const std::uint32_t> numbers,
                           std::span<const Motion> motions) noexcept;
   std::size_t size() const noexcept;
@@ -154,8 +154,8 @@ class Scene {
   TimeOfImpact impact(const ScenePair& pair) const noexcept;
   std::span<const ContactPatch> patches(const ScenePair& pair) const noexcept;
 
-  /// What decides the next step: bodies, rules, exclusions and the pairs that met, with the content
-  /// hashes of assets. Of a filter it holds what it refuses now. Throws Error for a FunctionShape.
+  /// The state of the next step: bodies, rules, exclusions and the pairs that met, with the content
+  /// hashes of assets. Filters store what they refuse now. Throws Error for a FunctionShape.
   std::vector<std::byte> record() const;
   /// The scene that was recorded, of which the next step has the same bits. Throws Error where the
   /// record is none or an asset is missing, naming its hash, whatever the bytes.

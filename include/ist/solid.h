@@ -117,7 +117,7 @@ LevelSetMesh mesh_level_set(const DistanceGrid& grid, const std::string& name,
 /// The same as a Solid, by its mesh.
 std::unique_ptr<Solid> make_grid_solid(const DistanceGrid& grid);
 
-/// Whether this library was built with OpenVDB.
+/// True if this library was built with OpenVDB.
 bool vdb_available() noexcept;
 
 /// The level set of an OpenVDB file: its one grid, of floats and marked as a level set, with any

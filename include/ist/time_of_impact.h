@@ -28,7 +28,7 @@ struct Motions {
   Motion a, b;
 };
 
-/// What two moving solids do. With a status other than ok it is no_impact.
+/// The outcome for two moving solids. With a status other than ok it is no_impact.
 enum class ImpactKind : std::uint32_t {
   no_impact = 0,  ///< they stay clear of each other over the whole interval
   /// At `time` they are no further apart than the tolerance, and approaching.
@@ -38,7 +38,7 @@ enum class ImpactKind : std::uint32_t {
   /// AssetView::mesh_error; without a mesh it is how far cover balls stick out, 1 to 10 % of
   /// the size.
   unresolved = 2,
-  /// They meet at the start: surfaces cross, or one solid contains the other.
+  /// They overlap at the start: surfaces cross, or one solid contains the other.
   overlapping = 3,
 };
 
@@ -77,7 +77,7 @@ struct TimeOfImpact {
   Eigen::Vector3d point_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< likewise: unit, from A to B, world
   std::uint32_t node_visits = 0;                     ///< node pairs visited
-  /// Of which pairs of triangles or spheres, or of one of these and a shape.
+  /// Visited pairs of triangles or spheres, or of one of these and a shape.
   std::uint32_t surface_pairs = 0;
 };
 

@@ -92,7 +92,7 @@ enum class QueryStatus : std::uint32_t {
   error_exceeded = 4,
 };
 
-/// What represents the solid.
+/// The representation of solids.
 enum class Measure : std::uint32_t {
   /// Matched spheres, whose volumes sum to the solid's. Where they are too coarse for the contact
   /// of two solids of unlike sizes, the meshes answer as for `exact`, if both assets keep theirs
@@ -125,7 +125,7 @@ struct Sphere {
   float r = 0;                ///< radius, unit frame; rounded down for an inner sphere
 };
 
-/// What ended a packing.
+/// The reason for the end of a packing.
 enum class StopReason : std::uint32_t {
   sphere_count,
   coverage,

@@ -27,7 +27,7 @@ namespace IST_API ist {
 /// those it was built with.
 std::uint32_t version() noexcept;
 
-/// Whether a program compiled with headers of version `headers` may call this library: the same
+/// True if a program compiled with headers of version `headers` may call this library: the same
 /// major number, before 1.0 also the same minor one, and a library that is no older.
 bool serves(std::uint32_t headers = IST_VERSION) noexcept;
 

@@ -11,7 +11,6 @@
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
 #include "query/exact/keep_largest.h"
-#include "query/exact_penetration.h"
 #include "query/lod/level_blend.h"
 #include "query/lod/unlike_sizes.h"
 #include "query/lod/wanted_error.h"
@@ -22,7 +21,7 @@
 namespace ist {
 namespace {
 
-/// Contact patches of two trees by lenses.
+/// Contact patches of two trees, by lenses.
 class LensPatches {
  public:
   LensPatches(const PlacedAsset& a, const TreeHeader& tree_a, const PlacedAsset& b,
@@ -34,7 +33,7 @@ class LensPatches {
         of_b_(divides_b(tree_a_.level[0].count, tree_a_.header->root[3], tree_b_.level[0].count,
                         tree_b_.header->root[3] * pose.a_from_b.scale)) {}
 
-  /// The whole contact, sorted into the workspace's bins.
+  /// Sums the whole contact, and sorts it into the workspace's bins.
   Penetration sum(const DescentLimits& limits) {
     ContactBins& bins = scratch_.contact;
     bins.start(of_b_ ? tree_b_ : tree_a_, of_b_);
@@ -46,7 +45,6 @@ class LensPatches {
 
   const Penetration& whole() const { return whole_; }
 
-  /// The patches of what was summed, which add up to it.
   std::size_t write(std::span<ContactPatch> patches) {
     const double radius =
         of_b_ ? tree_b_.header->root[3] * pose_.a_from_b.scale : tree_a_.header->root[3];
@@ -67,8 +65,7 @@ class LensPatches {
   std::uint32_t filled_ = 0;
 };
 
-/// The patches of the part of a blend with the largest weight: a pair of levels, or the exact
-/// measure.
+/// The part of a blend with the largest weight: a pair of levels, or the exact measure.
 class ChosenPart final : public LargestPart {
  public:
   ChosenPart(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose, bool inner,
@@ -85,7 +82,7 @@ class ChosenPart final : public LargestPart {
     return parts->penetration;
   }
 
-  // One of these at most:
+  // At most one of these:
   std::optional<LensPatches> levels;
   std::optional<ContactPatches> parts;  ///< of the exact measure
 
@@ -145,7 +142,7 @@ ContactPatches find_patches(const PlacedAsset& a, const PlacedAsset& b,
   const Penetration& part = chosen.parts ? chosen.parts->penetration : chosen.levels->whole();
   if (blends || result.count == 0)
     result.count = spread(part, result.penetration, result.count, patches);
-  // A stopped exact query has the spheres' patches.
+  // A stopped exact query returns the spheres' patches.
   const bool by_parts = chosen.parts && part.status == QueryStatus::ok;
   finish_patches(patches.first(result.count), b.pose,
                  by_parts        ? exact_deepest(part.volume)

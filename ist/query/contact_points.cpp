@@ -20,26 +20,26 @@ using Eigen::Vector3d;
 constexpr int kDirections = 32;
 constexpr std::uint64_t kName = std::uint64_t{1} << 63;
 
-/// Faces that are turned further from the contact's normal are no part of it: 1.1°.
+/// The cosine of 1.1°: faces at a larger angle to the contact's normal do not belong to it.
 constexpr double kFacing = 0.9998;
-constexpr double kTurned = 0.021;  // the sine of that, and some more
-/// Less than this, 8°, and a face of a round surface that touches.
+constexpr double kTurned = 0.021;  // the sine of that, with a margin
+/// The cosine of 8°: faces between the two angles are those of a round surface.
 constexpr double kRound = 0.99;
-constexpr double kTurnedAgainst = 1e-3;  // [rad] of two faces: not one plane
-/// Depths away from each other: faces further from the middle of a contact than this are others.
+constexpr double kTurnedAgainst = 1e-3;  // [rad] two faces at a larger angle are not coplanar
+/// Faces further than this many depths from the middle of a contact do not belong to it.
 constexpr double kNearMiddle = 2;
-/// Of that distance: what is nearer to the plane of the outermost face lies in it.
+/// A face is in the plane of the outermost one within this fraction of that distance.
 constexpr double kInPlane = 0.05;
-/// The area of a contact over that of its faces: else not all of it is flat.
+/// The largest area of a contact over that of its faces: beyond it a part is not flat.
 constexpr double kMostArea = 1.5, kMostExactArea = 1.1;
-constexpr double kAlike = 5e-3;              // of the width of the polygon
+constexpr double kAlike = 5e-3;              // fraction of the polygon's width
 constexpr std::size_t kMostPairs = 1 << 14;  // of faces
 
 double cross(double u, double v, double s, double t) { return u * t - v * s; }
 
 }  // namespace
 
-/// What the faces share: its area, and its outermost corner in each direction.
+/// The common part of the faces: its area, and its outermost corner in each direction.
 struct SupportPolygon::Hull {
   struct Polygon {
     std::array<Corner, 8> corner;
@@ -50,11 +50,11 @@ struct SupportPolygon::Hull {
   };
 
   Hull() {
-    // Between the axes, where a box would have two corners that are outermost.
+    // Directions between the axes, along which a box would have two outermost corners.
     double u = kHalfCos, v = kHalfSin;
     for (int k = 0; k < kDirections; ++k) {
-      way[k][0] = u;
-      way[k][1] = v;
+      direction[k][0] = u;
+      direction[k][1] = v;
       const double next = u * kCos - v * kSin;
       v = u * kSin + v * kCos;
       u = next;
@@ -62,7 +62,7 @@ struct SupportPolygon::Hull {
     }
   }
 
-  /// Keeps what has `depth` ≥ 0, a function that is linear.
+  /// The part with `depth` ≥ 0, a linear function.
   template <class Depth>
   static Polygon clipped(const Polygon& from, const Depth& depth) {
     Polygon to;
@@ -85,7 +85,7 @@ struct SupportPolygon::Hull {
       moment[0] += half * (x.u + y.u) / 3;
       moment[1] += half * (x.v + y.v) / 3;
       for (int k = 0; k < kDirections; ++k) {
-        const double along = way[k][0] * x.u + way[k][1] * x.v;
+        const double along = direction[k][0] * x.u + direction[k][1] * x.v;
         if (!(along > most[k])) continue;
         most[k] = along;
         outermost[k] = x;
@@ -95,7 +95,7 @@ struct SupportPolygon::Hull {
 
   static constexpr double kCos = 0.98078528040323043, kSin = 0.19509032201612825;  // of π/16
   static constexpr double kHalfCos = 0.99518472667219693, kHalfSin = 0.098017140329560604;  // π/32
-  double way[kDirections][2], most[kDirections];
+  double direction[kDirections][2], most[kDirections];
   Corner outermost[kDirections];
   double area = 0, moment[2] = {0, 0};
 };
@@ -209,7 +209,7 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
   const double unit = solid.scale * std::ldexp(1.0, asset.exponent);
   const Matrix3d turn = unit * pose.linear();
   const Vector3d shift = pose * (solid.scale * Vector3d(asset.centre));
-  // The normal and the middle in the mesh's frame, lengths there.
+  // The normal and the middle in the mesh's frame.
   const Vector3d normal = turn.transpose() * normal_ / unit;
   const Vector3d middle = turn.transpose() * (middle_ - shift) / (unit * unit);
   const double near = near_ / unit;
@@ -235,7 +235,7 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
       const BoxBlock& boxes = at<BoxBlock>(asset, mesh.level[level].blocks)[block];
       const std::uint32_t below = mesh.level[level - 1].count;
       for (std::uint32_t lane = 0; lane < kWidth && kWidth * block + lane < below; ++lane) {
-        // The sum of a vector's coordinates bounds its length.
+        // The sum of a vector's absolute coordinates bounds its length.
         double along = 0, half_along = 0, furthest = 0, apart = 0;
         for (int k = 0; k < 3; ++k) {
           const double low = boxes.low[k][lane], high = boxes.high[k][lane];
@@ -250,13 +250,13 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
       }
     }
   };
-  // Most round surfaces show in the middle that they are.
+  // The middle suffices to reject most round surfaces.
   visit(near);
   sides_[of_b].count = 0;
   visit(reach_ / unit);
 }
 
-/// That of the outermost face, under the middle.
+/// The plane of the face that is outermost under the middle.
 bool SupportPolygon::choose_plane(bool of_b, Plane& plane) const {
   const Side& side = sides_[of_b];
   plane = side.plane;
@@ -282,7 +282,7 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
   const bool first = sides_[0].endless;
   const Side &one = sides_[first], &other = sides_[!first];
   if (one.count * other.count > kMostPairs) return std::nullopt;
-  Hull meeting, facing;  // facing each other, apart or not
+  Hull overlapping, facing;  // the part that overlaps, and all that face each other
   for (std::size_t i = 0; i < one.count; ++i) {
     if (!is_near(one.faces[i], plane[first])) continue;
     Hull::Polygon own;
@@ -297,15 +297,15 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
         });
       }
       facing.add(shared);
-      meeting.add(Hull::clipped(shared, depth));
+      overlapping.add(Hull::clipped(shared, depth));
     }
   }
   if (!(area_ < kMostArea * facing.area)) return std::nullopt;
-  const bool apart = blurred_ && !(meeting.area > 0);
-  const Hull& hull = apart ? facing : meeting;
+  const bool apart = blurred_ && !(overlapping.area > 0);
+  const Hull& hull = apart ? facing : overlapping;
   if (!blurred_ && !(area_ < kMostExactArea * hull.area && hull.area < kMostExactArea * area_))
     return std::nullopt;
-  // Where the force acts, and how it is directed.
+  // The point and direction of the force.
   const double mean[2] = {0.5 * (plane[0].slope[0] + plane[1].slope[0]),
                           0.5 * (plane[0].slope[1] + plane[1].slope[1])};
   const double middle[2] = {blurred_ ? hull.moment[0] / hull.area : 0,
@@ -314,7 +314,7 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
   const Vector3d normal =
       blurred_ ? Vector3d(normal_ - mean[0] * axis_[0] - mean[1] * axis_[1]).normalized() : normal_;
 
-  // Corners that hardly differ are one, or they would come and go.
+  // Merges corners that hardly differ, which would come and go.
   double alike = 0;
   for (int k = 0; k < kDirections / 2; ++k)
     alike = std::max(alike, kAlike * (hull.most[k] + hull.most[k + kDirections / 2]));
@@ -344,7 +344,7 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
     const double sine = cross(ring[i].u, ring[i].v, ring[j].u, ring[j].v);
     const double both = length[i] * length[j];
     if (!(sine > 1e-6 * both)) return std::nullopt;  // the middle is on the border, or outside
-    half[i] = sine / (both + ring[i].u * ring[j].u + ring[i].v * ring[j].v);  // tan of half of it
+    half[i] = sine / (both + ring[i].u * ring[j].u + ring[i].v * ring[j].v);  // tan(angle / 2)
   }
   double volume = 0;
   for (int i = 0; i < count; ++i) {
@@ -397,7 +397,7 @@ ContactPatches contact_points(const PlacedSolid& a, const PlacedSolid& b,
                          to_isometry((by_b ? tree_b : tree_a)->pose).linear(),
                          2 * std::min(radius(tree_a), radius(tree_b)),
                          settings.measure == Measure::exact ? 0 : blur(tree_a) + blur(tree_b));
-  // First the side with fewer triangles: in most contacts nothing of it is flat.
+  // The side with fewer triangles first: in most contacts it is not flat.
   const auto triangles = [](const PlacedAsset* tree) {
     return tree != nullptr ? tree->asset.mesh_triangles() : 0;
   };

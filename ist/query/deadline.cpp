@@ -9,19 +9,18 @@ namespace {
 // Sphere pairs per µs of a first contact. A core does 40 to 100 in deep contacts, and 10 in shallow
 // ones. A nut in its thread, which is never apart, gains 1 % with this, 2 % with 8 or 10.
 constexpr double kFirst = 7;
-// Fraction of the deadline that the percentile of the times is to meet. A ring and a torus knot of
-// 16,000 spheres, budgets of 200 to 1,600: p99 is 1.2 to 1.3 times p95, as the budget is a target.
+// Fraction of the deadline at which the percentile of the times is aimed. For a ring and a torus
+// knot of 16,000 spheres and budgets of 200 to 1,600, p99 is 1.2 to 1.3 times p95.
 constexpr double kAim = 0.8;
-// A cost above the estimate raises it by this part of a step, one below lowers it by the rest. A
-// stall of the thread counts as one step, however long.
+// A cost above the estimate raises it by this fraction of a step, one below lowers it by the rest.
+// A stall of the thread counts as one step.
 constexpr double kPercentile = 0.95;
-// Steps begin large, as nothing is known, and end small.
 constexpr double kFirstStep = 0.5, kLastStep = 1.0 / 32;
-constexpr double kHalved = 16;  ///< samples until steps are half as large
-// The budget stays while it is between these parts of the wanted one.
+constexpr double kHalved = 16;  ///< samples after which steps are half as large
+// The budget does not change while it is within these multiples of the wanted one.
 constexpr double kLow = 0.75, kHigh = 1.1;
-// Parts by which a budget rises and falls per query in contact. The potential changes with it:
-// coarser levels read more volume in narrow gaps, so a fall may add energy and a rise takes it.
+// Fractions by which a budget rises and falls per query in contact. The potential changes with it:
+// coarser levels report more volume in narrow gaps, so a fall may add energy and a rise removes it.
 constexpr double kRise = 1.0 / 1024, kFall = 1.0 / 8192;
 // The coarsest levels, of 250 to 999 spheres, answer below this.
 constexpr double kLeast = 64;
@@ -51,7 +50,7 @@ void Deadline::record(const Penetration& answer, double microseconds) noexcept {
   if (!apart) {
     const bool slow = microseconds > deadline_ && budget_ <= kHigh * kLeast;
     slow_ += ((slow ? 1 : 0) - slow_) / kSlowQueries;
-    // A smaller contact's time says little of a full budget's, unless it is late.
+    // The time of a smaller contact says little about a full budget's, unless it is late.
     if (2 * pairs >= budget_ || microseconds > deadline_) {
       const double step = std::max(kLastStep, kFirstStep * kHalved / (kHalved + samples_));
       if (samples_ < ~0u) ++samples_;

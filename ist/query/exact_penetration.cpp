@@ -1,5 +1,3 @@
-#include "query/exact_penetration.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -49,7 +47,7 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedAsset& a, const 
   answer.torque = -vector(sums.torque);
   answer.touching = found.contact.touching;
   answer.contact_area = found.contact.area * (pose.unit_a * pose.unit_a);
-  // Normals that cancel leave what areas round.
+  // Normals that cancel leave the rounding of areas.
   const Eigen::Vector3d normal = vector(found.contact.normal);
   if (normal.norm() > 1e-9 * found.contact.area)
     answer.contact_normal = pose.rotation() * normal.normalized();
@@ -58,14 +56,19 @@ Penetration whole_answer(const ExactOverlap& found, const PlacedAsset& a, const 
   return answer;
 }
 
-/// What spheres say, where a limit stops the exact query.
-template <class Answer, class Spheres>
-Answer stopped(const PlacedAsset& a, const PlacedAsset& b, Answer answer, const Spheres& by_spheres,
-               Penetration& (*whole)(Answer&)) {
-  if (a.asset.sphere_count() > 0 && b.asset.sphere_count() > 0) answer = by_spheres();
-  bound_by_solids(a, b, whole(answer));
-  whole(answer).status = QueryStatus::budget_exhausted;
-  return answer;
+/// The settings for the spheres' answer, which replaces an exact one that a limit stopped.
+template <class Settings>
+Settings settings_of_spheres(Settings settings) {
+  settings.measure = Measure::matched;
+  settings.spheres_only = true;
+  settings.relative_error = 0;
+  return settings;
+}
+
+Penetration stopped(const PlacedAsset& a, const PlacedAsset& b, Penetration by_spheres) {
+  bound_by_solids(a, b, by_spheres);
+  by_spheres.status = QueryStatus::budget_exhausted;
+  return by_spheres;
 }
 
 /// Writes the kept parts in their order; `kept` becomes the patch.
@@ -97,15 +100,9 @@ Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
   auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (found.complete) return whole_answer(found, a, b, pose);
-  const auto by_spheres = [&] {
-    PenetrationSettings others = settings;
-    others.measure = Measure::matched;
-    others.spheres_only = true;
-    others.relative_error = 0;
-    return penetration(a, b, others, workspace);
-  };
-  return stopped<Penetration>(a, b, missing_data<Penetration>(), by_spheres,
-                              [](Penetration& answer) -> Penetration& { return answer; });
+  return stopped(a, b,
+                 lack_spheres(a, b) ? missing_data<Penetration>()
+                                    : penetration(a, b, settings_of_spheres(settings), workspace));
 }
 
 OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
@@ -122,34 +119,29 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
   auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (!found.complete || !query.holds_crossings()) {
-    const auto by_spheres = [&] {
-      ContactSettings others = settings;
-      others.measure = Measure::matched;
-      others.spheres_only = true;
-      others.relative_error = 0;
-      return find_patches(a, b, others, workspace, patches);
-    };
-    answer.contact = stopped<ContactPatches>(
-        a, b, missing_data<ContactPatches>(), by_spheres,
-        [](ContactPatches& stopped) -> Penetration& { return stopped.penetration; });
+    answer.contact = lack_spheres(a, b)
+                         ? missing_data<ContactPatches>()
+                         : find_patches(a, b, settings_of_spheres(settings), workspace, patches);
+    answer.contact.penetration = stopped(a, b, answer.contact.penetration);
     return answer;
   }
   answer.contact.penetration = whole_answer(found, a, b, *pose);
   answer.segments = found.crossings;
   if (!patches.empty()) {
     std::span<ExactPart> parts(scratch.parts.get(), query.divide());
-    const auto room = static_cast<std::uint32_t>(std::min<std::size_t>(patches.size(), ~0u));
+    const auto capacity = static_cast<std::uint32_t>(std::min<std::size_t>(patches.size(), ~0u));
     const auto keep = [&](bool octants) {
-      return keep_largest(parts.data(), static_cast<std::uint32_t>(parts.size()), room, octants);
+      return keep_largest(parts.data(), static_cast<std::uint32_t>(parts.size()), capacity,
+                          octants);
     };
     const std::uint32_t kept = keep(false);
-    if (divides && kept <= PartMemory::kMostSplit && room > 1) {
+    if (divides && kept <= PartMemory::kMostSplit && capacity > 1) {
       join_parts(parts.data(), static_cast<std::uint32_t>(parts.size()));
       const bool by_b = volume_of(b) <= volume_of(a);
       const PlacedAsset& smaller = by_b ? b : a;
       const double radius = smaller.scale * smaller.asset.header().ball_radius / pose->unit_a;
       parts = {scratch.octants.get(), query.split(static_cast<std::uint32_t>(parts.size()), by_b,
-                                                  kNearOctants * radius, room)};
+                                                  kNearOctants * radius, capacity)};
       keep(true);
     } else if (divides) {
       for (ExactPart& part : parts) part.id *= 8;

@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The tree that settings name; none if there is no such level of detail or measure.
+/// The tree of a measure and a level of detail; empty if there is none.
 std::optional<SphereTree> tree_of(const AssetView& view, Measure measure,
                                   std::uint32_t detail) noexcept {
   const AssetHeader& asset = view.header();
@@ -27,7 +27,7 @@ std::optional<SphereTree> tree_of(const AssetView& view, Measure measure,
   return SphereTree(asset, matched_tree(asset, detail));
 }
 
-/// A node or a sphere of a tree, seen from A's unit frame.
+/// A node or a sphere of a tree, A's unit frame.
 struct Place {
   int level;
   std::uint32_t index;
@@ -35,42 +35,35 @@ struct Place {
   double r;
 };
 
-/// Both trees gone down together, the larger node opened first. As deep as both are high.
-class LensSearch {
- public:
-  LensSearch(const PlacedAsset& a, const SphereTree& tree_a, const PlacedAsset& b,
-             const SphereTree& tree_b, const RelativePose& pose, std::span<OverlapLens> room)
-      : tree_a_(tree_a),
-        tree_b_(tree_b),
-        index_a_(at<std::uint32_t>(a.asset.header(), tree_a.header->sphere_index)),
-        index_b_(at<std::uint32_t>(b.asset.header(), tree_b.header->sphere_index)),
-        pose_(pose),
-        room_(room) {}
+/// Descends both trees together, by recursion, and opens the larger node first.
+struct LensSearch {
+  const SphereTree tree_a, tree_b;
+  const RelativePose& pose;
+  const std::uint32_t *const index_a, *const index_b;
+  const std::span<OverlapLens> lenses;
+  OverlapLenses result = {};
 
   OverlapLenses find() {
-    visit(place_a(tree_a_.top, 0), place_b(tree_b_.top, 0));
-    return result_;
+    visit(place_a(tree_a.top, 0), place_b(tree_b.top, 0));
+    return result;
   }
 
- private:
   Place place_a(int level, std::uint32_t index) const {
-    const NodeBall ball = tree_a_.ball(level, index);
+    const NodeBall ball = tree_a.ball(level, index);
     return {level, index, vector(ball.centre), ball.r};
   }
   Place place_b(int level, std::uint32_t index) const {
-    const NodeBall ball = tree_b_.ball(level, index);
-    double centre[3];
-    pose_.a_from_b.apply(ball.centre, centre);
-    return {level, index, vector(centre), ball.r * pose_.a_from_b.scale};
+    const NodeBall ball = tree_b.ball(level, index);
+    return {level, index, mapped(pose.a_from_b, ball.centre), ball.r * pose.a_from_b.scale};
   }
 
   void visit(const Place& a, const Place& b) {
     const double reach = a.r + b.r;
     if (!(reach > 0 && (b.centre - a.centre).squaredNorm() < reach * reach)) return;
-    if (a.level == kSphereLevel && b.level == kSphereLevel) return note(a, b);
+    if (a.level == kSphereLevel && b.level == kSphereLevel) return add_lens(a, b);
     const bool open_a = a.level != kSphereLevel && (b.level == kSphereLevel || a.r >= b.r);
     const Place& opened = open_a ? a : b;
-    const SphereTree& tree = open_a ? tree_a_ : tree_b_;
+    const SphereTree& tree = open_a ? tree_a : tree_b;
     const std::uint32_t first = opened.index * kWidth;
     const std::uint32_t end = std::min(first + kWidth, tree.count(opened.level - 1));
     for (std::uint32_t i = first; i < end; ++i) {
@@ -81,32 +74,26 @@ class LensSearch {
     }
   }
 
-  void note(const Place& a, const Place& b) {
-    ++result_.total;
-    if (result_.count == room_.size()) return;
+  void add_lens(const Place& a, const Place& b) {
+    ++result.total;
+    if (result.count == lenses.size()) return;
     const Vector3d between = b.centre - a.centre;
     const double d = between.norm();
-    // Along the line from A's centre: begin and end of the lens, and its rim.
+    // The lens and its rim, along the line from A's centre.
     const double begin = std::max(d - b.r, -a.r), end = std::min(a.r, d + b.r);
     const double rim = d > 0 ? (d * d + (a.r - b.r) * (a.r + b.r)) / (2 * d) : 0;
-    OverlapLens& lens = room_[result_.count++];
-    // Past a centre the rim is not where the lens is widest: that is the smaller ball itself.
+    OverlapLens& lens = lenses[result.count++];
+    // With the rim beyond a centre the lens is as wide as the smaller ball.
     lens.radius = rim > 0 && rim < d ? std::sqrt(std::max(0.0, (a.r - rim) * (a.r + rim)))
                                      : std::min(a.r, b.r);
-    lens.radius *= pose_.unit_a;
-    lens.thickness = (end - begin) * pose_.unit_a;
+    lens.radius *= pose.unit_a;
+    lens.thickness = (end - begin) * pose.unit_a;
     const Vector3d axis = d > 0 ? Vector3d(between / d) : Vector3d::UnitZ();
-    lens.axis = pose_.rotation() * axis;
-    lens.centre = pose_.to_world(a.centre + 0.5 * (begin + end) * axis);
-    lens.sphere_a = index_a_[a.index];
-    lens.sphere_b = index_b_[b.index];
+    lens.axis = pose.rotation() * axis;
+    lens.centre = pose.to_world(a.centre + 0.5 * (begin + end) * axis);
+    lens.sphere_a = index_a[a.index];
+    lens.sphere_b = index_b[b.index];
   }
-
-  SphereTree tree_a_, tree_b_;
-  const std::uint32_t *index_a_, *index_b_;
-  const RelativePose& pose_;
-  std::span<OverlapLens> room_;
-  OverlapLenses result_;
 };
 
 }  // namespace
@@ -119,7 +106,10 @@ OverlapLenses overlap_lenses(const PlacedAsset& a, const PlacedAsset& b,
   const auto tree_a = tree_of(a.asset, settings.measure, settings.detail_a);
   const auto tree_b = tree_of(b.asset, settings.measure, settings.detail_b);
   if (!tree_a || !tree_b) return {QueryStatus::invalid_input, 0, 0};
-  return LensSearch(a, *tree_a, b, *tree_b, *pose, lenses).find();
+  const auto index = [](const PlacedAsset& placed, const SphereTree& tree) {
+    return at<std::uint32_t>(placed.asset.header(), tree.header->sphere_index);
+  };
+  return LensSearch{*tree_a, *tree_b, *pose, index(a, *tree_a), index(b, *tree_b), lenses}.find();
 }
 
 }  // namespace ist

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// x_world = rotation (scale · x) + translation; nothing for what a query would call invalid.
+/// The rotation of a pose; empty for an invalid pose or an empty asset.
 std::optional<Matrix3d> rotation_of(const PlacedAsset& placed) noexcept {
   if (placed.asset.empty()) return std::nullopt;
   const std::optional<Eigen::Quaterniond> q = usable_rotation(placed.pose, placed.scale);
@@ -30,7 +30,7 @@ MassProperties mass_properties(const AssetView& tree) noexcept {
   result.volume = std::ldexp(h.volume, 3 * h.exponent);
   result.volume_error = std::ldexp(h.volume_error, 3 * h.exponent);
   result.centre_of_mass = vector(h.centre_of_mass) * unit + vector(h.centre);
-  // Far from the origin a double tells less.
+  // Far from the origin doubles are coarser.
   result.centre_of_mass_error =
       h.centre_of_mass_error * unit + 0x1p-53 * result.centre_of_mass.cwiseAbs().maxCoeff();
   const double* m = h.inertia;
@@ -55,7 +55,7 @@ MassProperties mass_properties(const PlacedAsset& placed) noexcept {
   result.volume *= cube;
   result.volume_error *= cube;
   result.centre_of_mass = *rotation * (s * result.centre_of_mass) + vector(placed.pose.t);
-  // A component is now of all three.
+  // Rotation mixes the three components.
   result.centre_of_mass_error *= std::sqrt(3.0) * s;
   const Matrix3d turned = *rotation * result.inertia * rotation->transpose();
   result.inertia = s * s * cube * (turned + turned.transpose()) / 2;

@@ -17,41 +17,39 @@
 namespace ist {
 namespace {
 
-/// Best first: the pair of nodes whose balls share most, for their size, is opened next. All in A's
-/// unit frame.
-class MeetingSearch {
+/// Best-first search: opens the nodes whose balls overlap most for their size. A's unit frame.
+class OverlapSearch {
  public:
-  MeetingSearch(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
+  OverlapSearch(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
                 Workspace::Impl& scratch)
       : a_(a),
         b_(b),
-        a_side_(a, b, pose.a_from_b),
-        b_side_(b, a, pose.b_from_a),
+        a_side_(a, b, pose.a_from_b, precision_for_gap(a.root(), b.root(), pose.a_from_b)),
+        b_side_(b, a, pose.b_from_a, a_side_.precision),
         scale_(pose.a_from_b.scale),
-        precision_(precision_for_gap(a.root(), b.root(), pose.a_from_b)),
         waiting_(scratch) {
     const double length = span(a.root(), b.root(), pose.a_from_b);
-    error_ = distance_error(precision_, length) + distance_error(Precision::float64, length) +
-             pose.rounding_of_world();
+    error_ = distance_error(a_side_.precision, length) +
+             distance_error(Precision::float64, length) + pose.rounding_of_world();
   }
 
   YesNo run() {
     if (root_cover_gap() > error_) return YesNo::no;
-    return waiting_.search({0, 0, a_.top, b_.top}, covers_meet_, [&](const NodePair& pair) {
+    return waiting_.search({0, 0, a_.top, b_.top}, covers_touch_, [&](const NodePair& pair) {
       if (pair.level_a > 0 || pair.level_b > 0) {
         open(pair);
         return false;
       }
-      const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit(), precision_);
-      covers_meet_ |= leaf.cover <= error_;
+      const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, error_, cover_limit());
+      covers_touch_ |= leaf.cover <= error_;
       return leaf.gap < -error_;
     });
   }
 
  private:
-  /// Covers are looked at until some meet: from then on the answer is not `no`.
+  /// Covers are tested until some overlap: from then on the answer is not `no`.
   double cover_limit() const {
-    return covers_meet_ ? -std::numeric_limits<double>::infinity() : error_;
+    return covers_touch_ ? -std::numeric_limits<double>::infinity() : error_;
   }
 
   double root_cover_gap() const {
@@ -72,23 +70,22 @@ class MeetingSearch {
     const bool open_a = pair.level_b == 0 || (pair.level_a > 0 && radius_a >= radius_b);
     // In the unit frame of the side that is opened.
     const GapSide& side = open_a ? a_side_ : b_side_;
-    const int level = open_a ? pair.level_a : pair.level_b;
-    const std::uint32_t block = open_a ? pair.a : pair.b;
+    const TreeNode node_a{pair.level_a, pair.a}, node_b{pair.level_b, pair.b};
+    const TreeNode opened = open_a ? node_a : node_b;
     const double unit = open_a ? 1 : scale_;
-    const double still = (open_a ? radius_b : radius_a) / unit;
+    const double other_radius = (open_a ? radius_b : radius_a) / unit;
     ChildGaps gaps;
-    child_gaps(side, level, block, open_a ? pair.level_b : pair.level_a, open_a ? pair.b : pair.a,
-               error_ / unit, cover_limit() / unit, precision_, gaps);
-    const std::uint32_t below = side.x->count(level - 1) - kWidth * block;
+    child_gaps(side, opened, open_a ? node_b : node_a, error_ / unit, cover_limit() / unit, gaps);
+    const std::uint32_t below = side.x->count(opened.level - 1) - kWidth * opened.block;
     const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
-    const float* radii = side.x->level[level].blocks[block].r;
+    const float* radii = side.x->level[opened.level].blocks[opened.block].r;
     waiting_.start(pair, open_a);
     for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
       const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
       if (unit * gaps.gap[lane] <= error_) {
         // Distance over the sum of radii.
-        waiting_.add(lane, 1 + gaps.gap[lane] / (radii[lane] + still), true);
-      } else if (!covers_meet_ && unit * gaps.cover[lane] <= error_) {
+        waiting_.add(lane, 1 + gaps.gap[lane] / (radii[lane] + other_radius), true);
+      } else if (!covers_touch_ && unit * gaps.cover[lane] <= error_) {
         waiting_.add(lane, unit * gaps.cover[lane], false);
       }
     }
@@ -99,10 +96,9 @@ class MeetingSearch {
   const SphereTree& b_;
   const GapSide a_side_, b_side_;
   const double scale_;
-  const Precision precision_;
-  double error_;  ///< of a gap, by rounding
+  double error_;  ///< rounding of a gap
   OpenRuns waiting_;
-  bool covers_meet_ = false;
+  bool covers_touch_ = false;
 };
 
 }  // namespace
@@ -114,7 +110,7 @@ YesNoAnswer find_overlap(const PlacedAsset& a, const PlacedAsset& b,
   if (!pose || workspace.impl() == nullptr) return {YesNo::unknown, QueryStatus::invalid_input};
   const SphereTree tree_a = sphere_tree(a.asset, Measure::inner);
   const SphereTree tree_b = sphere_tree(b.asset, Measure::inner);
-  return {MeetingSearch(tree_a, tree_b, *pose, *workspace.impl()).run(), QueryStatus::ok};
+  return {OverlapSearch(tree_a, tree_b, *pose, *workspace.impl()).run(), QueryStatus::ok};
 }
 
 }  // namespace ist

@@ -1,7 +1,6 @@
 #include <ist/query.h>
 
 #include "query/base/no_answer.h"
-#include "query/exact_penetration.h"
 #include "query/lod/level_blend.h"
 #include "query/lod/unlike_sizes.h"
 #include "query/solid_queries.h"

@@ -10,13 +10,13 @@
 #include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 
-// Every query of two solids: as they come, or turned over where the second is the shape.
+// Every query of two solids: in their order, or swapped if the second is a shape.
 
 namespace ist {
 namespace {
 
-/// ask(a, b) of assets, or of a shape and an asset. Its answer comes back by turn(answer), if the
-/// order was the other one; two shapes get `none`.
+/// Returns ask(a, b) of two assets, or of a shape and an asset. turn(answer) converts the answer if
+/// the solids were swapped. Returns `none` for two shapes.
 template <class Answer, class Ask, class Turn>
 Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace,
                 const Answer& none, const Ask& ask, const Turn& turn) noexcept {
@@ -32,7 +32,6 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace
   return answer;
 }
 
-/// C's functions refuse other numbers too.
 bool are_known(const PenetrationSettings& settings) noexcept {
   return settings.measure <= Measure::exact;
 }
@@ -41,7 +40,7 @@ const Pose& pose_of(const PlacedSolid& solid) noexcept {
   return std::visit([](const auto& placed) -> const Pose& { return placed.pose; }, solid.placed);
 }
 
-/// answers[i] = ask(pairs[i], workspace), or `unknown` where there is no workspace.
+/// answers[i] = ask(pairs[i], workspace, i), or `unknown` without a workspace.
 template <class Answer, class Ask>
 void answer_each(std::span<const PlacedPair> pairs, std::span<Workspace> workspaces,
                  std::span<Answer> answers, const Answer& unknown, const ParallelFor& parallel,
@@ -52,13 +51,13 @@ void answer_each(std::span<const PlacedPair> pairs, std::span<Workspace> workspa
     return;
   }
   answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
-    answers[i] = ask(pairs[i], workspaces[worker]);
+    answers[i] = ask(pairs[i], workspaces[worker], i);
   });
 }
 
-/// Witnesses of a separation or an impact.
+/// Swaps the witnesses of a separation or an impact.
 template <class Answer>
-void turn_witnesses(Answer& answer) noexcept {
+void swap_witnesses(Answer& answer) noexcept {
   std::swap(answer.point_a, answer.point_b);
   answer.normal = -answer.normal;
 }
@@ -83,14 +82,14 @@ Separation separation(const PlacedSolid& a, const PlacedSolid& b,
       [&](const auto& x, const PlacedAsset& y) {
         return find_separation(x, y, settings, workspace);
       },
-      [](Separation& answer) { turn_witnesses(answer); });
+      [](Separation& answer) { swap_witnesses(answer); });
 }
 
 PenetrationAndSeparation query(const PlacedSolid& a, const PlacedSolid& b,
                                const QuerySettings& settings, Workspace& workspace) noexcept {
   PenetrationAndSeparation both{penetration(a, b, settings.penetration, workspace), {}};
-  // A certified overlap leaves no gap to look for. Matched spheres certify none, but show where
-  // inner spheres may share a point.
+  // Without a gap there is nothing to search for. Matched spheres do not prove an overlap, but show
+  // where inner spheres may.
   const Measure measure = settings.penetration.measure;
   const auto* const tree_a = std::get_if<PlacedAsset>(&a.placed);
   const auto* const tree_b = std::get_if<PlacedAsset>(&b.placed);
@@ -156,14 +155,14 @@ TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Mo
       [&](const auto& x, const PlacedAsset& y) {
         return find_impact(x, y, ordered, settings, workspace);
       },
-      [](TimeOfImpact& answer) { turn_witnesses(answer); });
+      [](TimeOfImpact& answer) { swap_witnesses(answer); });
 }
 
 void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSettings& settings,
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel) noexcept {
   answer_each(pairs, workspaces, answers, unknown_penetration(), parallel,
-              [&](const PlacedPair& pair, Workspace& workspace) {
+              [&](const PlacedPair& pair, Workspace& workspace, std::size_t) {
                 return penetration(pair.a, pair.b, settings, workspace);
               });
 }
@@ -172,7 +171,7 @@ void separation_batch(std::span<const PlacedPair> pairs, const SeparationSetting
                       std::span<Workspace> workspaces, std::span<Separation> answers,
                       const ParallelFor& parallel) noexcept {
   answer_each(pairs, workspaces, answers, unknown_separation(), parallel,
-              [&](const PlacedPair& pair, Workspace& workspace) {
+              [&](const PlacedPair& pair, Workspace& workspace, std::size_t) {
                 return separation(pair.a, pair.b, settings, workspace);
               });
 }
@@ -182,15 +181,12 @@ void contact_patches_batch(std::span<const PlacedPair> pairs, const ContactSetti
                            std::span<ContactPatch> patches, const ParallelFor& parallel) noexcept {
   const std::size_t count = std::min(pairs.size(), answers.size());
   if (count == 0) return;
-  if (workspaces.empty()) {
-    std::fill_n(answers.begin(), count, ContactPatches{unknown_penetration(), 0});
-    return;
-  }
   const std::size_t each = patches.size() / count;
-  answer_all(count, workspaces.size(), parallel, [&](std::size_t i, std::size_t worker) {
-    answers[i] = contact_patches(pairs[i].a, pairs[i].b, settings, workspaces[worker],
-                                 patches.subspan(i * each, each));
-  });
+  answer_each(pairs, workspaces, answers, ContactPatches{unknown_penetration(), 0}, parallel,
+              [&](const PlacedPair& pair, Workspace& workspace, std::size_t i) {
+                return contact_patches(pair.a, pair.b, settings, workspace,
+                                       patches.subspan(i * each, each));
+              });
 }
 
 }  // namespace ist

@@ -21,131 +21,94 @@
 namespace ist {
 namespace {
 
-/// Depth-first branch and bound, nearest child first, for two minima at once: the gap of the inner
-/// spheres and, if asked, that of their cover balls; what is beyond the limit is not looked at. All
-/// in A's unit frame.
-class GapDescent {
+/// A pair of spheres, A's unit frame.
+struct SpherePair {
+  double gap = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d centre_a = Eigen::Vector3d::Zero(), centre_b = Eigen::Vector3d::Zero();
+  double radius_a = 0, radius_b = 0;
+};
+
+/// The gap between the inner spheres of two trees and, if `covers`, that of their cover balls.
+/// Prunes pairs beyond the limit. All in A's unit frame, gap_ in the kernel's precision.
+class GapDescent : GapStack {
  public:
   GapDescent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
              std::uint32_t most_visits, double limit, bool covers, Workspace::Impl& scratch)
-      : a_(a),
+      : GapStack(scratch, most_visits, limit, covers ? limit : 0),
+        a_(a),
         b_(b),
-        a_side_(a, b, pose.a_from_b),
-        b_side_(b, a, pose.b_from_a),
-        scale_(pose.a_from_b.scale),
-        precision_(precision_for_gap(a.root(), b.root(), pose.a_from_b)),
-        stack_(scratch.waiting.get()),
-        budget_(most_visits),
-        gap_(limit),
-        cover_(covers ? limit : 0) {}
+        a_side_(a, b, pose.a_from_b, precision_for_gap(a.root(), b.root(), pose.a_from_b)),
+        b_side_(b, a, pose.b_from_a, a_side_.precision),
+        scale_(pose.a_from_b.scale) {}
 
   void run() {
     measure(a_.sphere(0, 0), b_.sphere(0, 0));
     if (root_gap() > gap_) return;
-    gap_ = std::min(gap_, exact_gap_);
-    push({0, 0, 0, 0, a_.top, b_.top});
-    while (size_ > 0 && !overlap_) {
-      const WaitingPair pair = stack_[size_ - 1];
-      if (!wanted(pair.gap, pair.cover)) {
-        --size_;
-        continue;
-      }
-      if (budget_.grant(1) == 0) break;
-      --size_;
-      if (pair.level_a == 0 && pair.level_b == 0) {
-        open_leaves(pair);
-      } else {
-        open_node(pair);
-      }
-    }
-    // What still waits has gaps of at least these.
-    stopped_ = size_ > 0 && !overlap_;
-    for (std::size_t i = 0; stopped_ && i < size_; ++i) cover_ = std::min(cover_, stack_[i].cover);
+    gap_ = std::min(gap_, nearest_.gap);
+    stopped_ = search(
+        {0, 0, 0, 0, a_.top, b_.top},
+        [&](const WaitingPair& pair) {
+          pair.level_a == 0 && pair.level_b == 0 ? open_leaves(pair) : open_node(pair);
+        },
+        [&] { return overlap_; });
   }
 
   bool overlap() const { return overlap_; }
   bool stopped() const { return stopped_; }
-  double gap() const { return exact_gap_; }
+  const SpherePair& nearest() const { return nearest_; }
   double cover() const { return cover_; }
-  Precision precision() const { return precision_; }
+  Precision precision() const { return a_side_.precision; }
   std::uint32_t visits() const { return budget_.visits(); }
   std::uint32_t pairs() const { return pairs_; }
-  const Eigen::Vector3d& centre_a() const { return centre_a_; }
-  const Eigen::Vector3d& centre_b() const { return centre_b_; }
-  double radius_a() const { return radius_a_; }
-  double radius_b() const { return radius_b_; }
 
  private:
-  /// Of all that counts; in double.
+  /// The gap of the roots, of the balls that count.
   double root_gap() const {
     const auto root_a = a_.root(), root_b = b_.root();
-    double moved[3];
-    a_side_.x_from_y->apply(root_b.centre, moved);
-    const double between = (vector(moved) - vector(root_a.centre)).norm();
+    const double between =
+        (mapped(*a_side_.x_from_y, root_b.centre) - vector(root_a.centre)).norm();
     return between -
            (cover_ > 0 ? root_a.reach() + scale_ * root_b.reach() : root_a.r + scale_ * root_b.r);
-  }
-
-  bool wanted(double gap, double cover) const {
-    return gap < gap_ || (cover_ > 0 && cover < cover_);
   }
 
   double cover_limit() const {
     return cover_ > 0 ? cover_ : -std::numeric_limits<double>::infinity();
   }
 
-  void push(const WaitingPair& pair) { stack_[size_++] = pair; }
-
   void open_node(const WaitingPair& pair) {
-    const bool open_a =
-        pair.level_b == 0 || (pair.level_a > 0 && a_.ball(pair.level_a, pair.a).r >=
-                                                      scale_ * b_.ball(pair.level_b, pair.b).r);
-    const double factor = open_a ? 1 : scale_;
+    const TreeNode node_a{pair.level_a, pair.a}, node_b{pair.level_b, pair.b};
+    const double radius_a = a_.ball(node_a).r, radius_b = scale_ * b_.ball(node_b).r;
+    const bool open_a = pair.level_b == 0 || (pair.level_a > 0 && radius_a >= radius_b);
+    // In the unit frame of the side that is opened.
+    const GapSide& side = open_a ? a_side_ : b_side_;
+    const TreeNode opened = open_a ? node_a : node_b;
+    const double unit = open_a ? 1 : scale_;
+    const double other_radius = (open_a ? radius_b : radius_a) / unit;
     ChildGaps gaps;
-    if (open_a) {
-      child_gaps(a_side_, pair.level_a, pair.a, pair.level_b, pair.b, gap_, cover_limit(),
-                 precision_, gaps);
-    } else {
-      child_gaps(b_side_, pair.level_b, pair.b, pair.level_a, pair.a, gap_ / scale_,
-                 cover_limit() / scale_, precision_, gaps);
-    }
-    const std::uint32_t below = open_a ? a_.level[pair.level_a - 1].count - kWidth * pair.a
-                                       : b_.level[pair.level_b - 1].count - kWidth * pair.b;
-    const BallBlock& opened =
-        open_a ? a_.level[pair.level_a].blocks[pair.a] : b_.level[pair.level_b].blocks[pair.b];
-    const double still = open_a ? scale_ * b_.ball(pair.level_b, pair.b).r
-                                : a_.ball(pair.level_a, pair.a).r / scale_;
-    const std::size_t first = size_;
-    // Unused lanes are left out by number: among objects far enough apart no radius would do it.
+    child_gaps(side, opened, open_a ? node_b : node_a, gap_ / unit, cover_limit() / unit, gaps);
+    const std::uint32_t below = side.x->count(opened.level - 1) - kWidth * opened.block;
+    const float* const radii = side.x->level[opened.level].blocks[opened.block].r;
+    // Unused lanes are excluded by number: for solids far enough apart no radius would exclude
+    // them.
     const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
     for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
       const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
-      const double gap = factor * gaps.gap[lane];
-      const double cover = factor * gaps.cover[lane];
-      if (!wanted(gap, cover)) continue;
       WaitingPair child = pair;
-      child.gap = gap;
-      child.cover = cover;
-      if (open_a) {
-        child.a = kWidth * pair.a + lane;
-        --child.level_a;
-      } else {
-        child.b = kWidth * pair.b + lane;
-        --child.level_b;
-      }
-      // The nearest on top, by insertion: sixteen at most. Of balls that meet the one that shares
-      // most for its size is most likely to hold spheres that do.
-      const double sizes = factor * (double{opened.r[lane]} + still);
-      child.order = gap < 0 ? gap / sizes : gap;
-      std::size_t place = size_++;
-      for (; place > first && stack_[place - 1].order < child.order; --place)
-        stack_[place] = stack_[place - 1];
-      stack_[place] = child;
+      child.gap = unit * gaps.gap[lane];
+      child.cover = unit * gaps.cover[lane];
+      if (!wanted(child.gap, child.cover)) continue;
+      (open_a ? child.a : child.b) = kWidth * opened.block + lane;
+      --(open_a ? child.level_a : child.level_b);
+      // The nearest comes on top. Of balls that overlap it is the one that overlaps most for its
+      // size, as it is the most likely to have spheres that do.
+      child.order =
+          child.gap < 0 ? child.gap / (unit * (double{radii[lane]} + other_radius)) : child.gap;
+      add(child);
     }
   }
 
   void open_leaves(const WaitingPair& pair) {
-    const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, gap_, cover_limit(), precision_);
+    const LeafGap leaf = leaf_gap(a_side_, pair.a, pair.b, gap_, cover_limit());
     pairs_ += kWidth * kWidth;
     if (cover_ > 0) cover_ = std::min(cover_, leaf.cover);
     if (leaf.gap >= gap_) return;
@@ -153,19 +116,14 @@ class GapDescent {
     measure(a_.sphere(pair.a, leaf.lane_x), b_.sphere(pair.b, leaf.lane_y));
   }
 
-  /// A pair of inner spheres in double: its gap bounds the distance from above, whichever it is.
+  /// Computes a pair of inner spheres in double: any gap is an upper bound on the distance.
   void measure(const NodeBall& sphere_a, const NodeBall& sphere_b) {
-    double moved[3];
-    a_side_.x_from_y->apply(sphere_b.centre, moved);
-    const Eigen::Vector3d xa(sphere_a.centre[0], sphere_a.centre[1], sphere_a.centre[2]);
-    const Eigen::Vector3d xb(moved[0], moved[1], moved[2]);
-    const double gap = ((xb - xa).norm() - sphere_a.r) - scale_ * sphere_b.r;
-    if (gap >= exact_gap_) return;
-    exact_gap_ = gap;
-    centre_a_ = xa;
-    centre_b_ = xb;
-    radius_a_ = sphere_a.r;
-    radius_b_ = scale_ * sphere_b.r;
+    const Eigen::Vector3d xa = vector(sphere_a.centre);
+    const Eigen::Vector3d xb = mapped(*a_side_.x_from_y, sphere_b.centre);
+    const double radius_b = scale_ * sphere_b.r;
+    const double gap = ((xb - xa).norm() - sphere_a.r) - radius_b;
+    if (gap >= nearest_.gap) return;
+    nearest_ = {gap, xa, xb, sphere_a.r, radius_b};
     overlap_ = gap <= 0;
   }
 
@@ -173,31 +131,22 @@ class GapDescent {
   const SphereTree& b_;
   const GapSide a_side_, b_side_;
   const double scale_;
-  const Precision precision_;
-  WaitingPair* const stack_;
-  std::size_t size_ = 0;
-  Budget budget_;
-  double gap_;    ///< least so far, as the kernel has it, or the limit
-  double cover_;  ///< 0: not asked, or met
-  double exact_gap_ = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d centre_a_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d centre_b_ = Eigen::Vector3d::Zero();
-  double radius_a_ = 0, radius_b_ = 0;
+  SpherePair nearest_;
   std::uint32_t pairs_ = 0;
   bool overlap_ = false;
   bool stopped_ = false;
 };
 
-/// Whether a point lies at least `margin` deep in a sphere of a tree; both in its unit frame. Looks
-/// at some nodes alone, the one around the point most deeply first, so that it may miss some.
-bool is_seen_within(const SphereTree& tree, const Eigen::Vector3d& point, double margin) {
+/// True if a sphere of a tree is found that contains a point at least `margin` deep, unit frame.
+/// May miss one, as it opens few nodes: those that contain the point most deeply first.
+bool finds_sphere_around(const SphereTree& tree, const Eigen::Vector3d& point, double margin) {
   constexpr int kMostVisits = 16;
   struct Waiting {
     int level;
     std::uint32_t block;
     float depth;
   };
-  Waiting stack[kWidth * (kMaxLevels + 1)];  // to fill it would take as long as all else
+  Waiting stack[kWidth * (kMaxLevels + 1)];  // uninitialised: that would take as long as the rest
   stack[0] = {tree.top, 0, 0};
   std::size_t size = 1;
   for (int visit = 0; visit < kMostVisits && size > 0; ++visit) {
@@ -227,7 +176,7 @@ bool is_seen_within(const SphereTree& tree, const Eigen::Vector3d& point, double
   return false;
 }
 
-/// Of two solids, and points that both may hold.
+/// The inner spheres of two solids.
 class InnerSpheres {
  public:
   InnerSpheres(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose)
@@ -239,18 +188,18 @@ class InnerSpheres {
         pose_(pose) {}
 
   const SphereTree a, b;
-  const double off;  ///< what rounding may move a point by; A's unit frame
+  const double off;  ///< bound on the rounding of points, A's unit frame
 
-  /// Whether spheres of both are seen to hold a point of A's unit frame: then the solids overlap.
+  /// True if spheres of both are found around a point of A's unit frame, so that the solids
+  /// overlap.
   bool share(const Eigen::Vector3d& point) const {
-    if (!is_seen_within(a, point, off)) return false;
-    double in_b[3];
-    pose_.b_from_a.apply({point.x(), point.y(), point.z()}, in_b);
-    return is_seen_within(b, vector(in_b), off / pose_.a_from_b.scale);
+    return finds_sphere_around(a, point, off) &&
+           finds_sphere_around(b, mapped(pose_.b_from_a, {point.x(), point.y(), point.z()}),
+                               off / pose_.a_from_b.scale);
   }
 
-  /// Whether the middle of what the balls around them share is seen to be in both: of solids that
-  /// fill these balls it mostly is.
+  /// The same for the middle of the overlap of the balls around them. Solids that fill these balls
+  /// mostly share it.
   bool share_the_middle() const {
     constexpr double kFull = 0.25;
     const auto is_full = [](const SphereTree& tree) {
@@ -262,9 +211,8 @@ class InnerSpheres {
  private:
   Eigen::Vector3d middle_of_balls() const {
     const RootBall root_a = a.root(), root_b = b.root();
-    double moved[3];
-    pose_.a_from_b.apply(root_b.centre, moved);
-    const Eigen::Vector3d centre = vector(root_a.centre), between = vector(moved) - centre;
+    const Eigen::Vector3d centre = vector(root_a.centre);
+    const Eigen::Vector3d between = mapped(pose_.a_from_b, root_b.centre) - centre;
     const double length = between.norm(), r = pose_.a_from_b.scale * root_b.r;
     if (!(length > 0)) return centre;
     const double low = std::max(length - r, -root_a.r), high = std::min(root_a.r, length + r);
@@ -274,7 +222,7 @@ class InnerSpheres {
   const RelativePose& pose_;
 };
 
-/// Between the surfaces that both assets keep.
+/// The gap between the meshes of two assets.
 class SurfaceGap {
  public:
   SurfaceGap(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
@@ -294,16 +242,16 @@ class SurfaceGap {
       KeptPairs& kept = scratch.exact.near.of(settings.pair_id, mesh_a_, mesh_b_, pose.a_from_b);
       question_.kept = &kept;
       const double apart = std::exchange(kept.apart, 0);
-      // Surfaces that have not come together on the way hold what they held.
+      // Surfaces that cannot have touched since the last step contain what they contained.
       question_.outside = kept.step + error_ < apart;
-      // A long step: what was near says less than the spheres do.
+      // After a long step the spheres' bound is better than the kept pairs'.
       if (!is_short(kept.step, mesh_a_, mesh_b_, pose.a_from_b.scale, apart))
         kept.nearest = KeptPairs::kNone;
     }
   }
 
   Separation find() {
-    // What the last step found says more than spheres do.
+    // Pairs kept from the last step give a better bound than spheres.
     if (question_.kept == nullptr || question_.kept->nearest == KeptPairs::kNone) {
       if (!lack_spheres(a_, b_)) ask_spheres();
       if (overlap_) return answer({.overlap = true});
@@ -323,7 +271,7 @@ class SurfaceGap {
   }
 
  private:
-  /// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
+  /// Inner spheres that overlap prove an overlap; others bound the distance and give a direction.
   void ask_spheres() {
     const InnerSpheres spheres(a_, b_, pose_);
     overlap_ = spheres.share_the_middle();
@@ -334,11 +282,12 @@ class SurfaceGap {
     descent.run();
     visits_ = descent.visits();
     pairs_ = descent.pairs();
-    overlap_ = descent.gap() < -spheres.off;
-    question_.likely = std::max(0.0, descent.gap()) + error_ + spheres.off;
-    const Eigen::Vector3d way = descent.centre_b() - descent.centre_a();
-    if (const double length = way.norm(); length > 0)
-      question_.toward = {way.x() / length, way.y() / length, way.z() / length};
+    const SpherePair& nearest = descent.nearest();
+    overlap_ = nearest.gap < -spheres.off;
+    question_.likely = std::max(0.0, nearest.gap) + error_ + spheres.off;
+    const Eigen::Vector3d between = nearest.centre_b - nearest.centre_a;
+    if (const double length = between.norm(); length > 0)
+      question_.toward = {between.x() / length, between.y() / length, between.z() / length};
   }
 
   Separation answer(const MeshGap& found) const {
@@ -347,7 +296,7 @@ class SurfaceGap {
     if (found.farther) {
       result = farther_than(settings_.max_distance);
     } else if (found.overlap || found.distance == 0) {
-      // Spheres are the solids' own.
+      // Inner spheres lie in the solids themselves, meshes may be simplified.
       result.distance_max = overlap_ ? 0 : unit * simplified_;
     } else {
       const auto world = [&](const exact::Point& p) { return pose_.to_world({p.x, p.y, p.z}); };
@@ -372,7 +321,7 @@ class SurfaceGap {
   const SeparationSettings& settings_;
   Workspace::Impl& scratch_;
   const MeshTree mesh_a_, mesh_b_;
-  const double simplified_, error_;  ///< A's unit frame; of the meshes, and with all roundings
+  const double simplified_, error_;  ///< A's unit frame: of the meshes, and with all rounding
   GapQuestion question_{mesh_a_, mesh_b_, pose_.a_from_b, pose_.b_from_a};
   bool overlap_ = false;  ///< of inner spheres
   std::uint32_t visits_ = 0, pairs_ = 0;
@@ -388,8 +337,8 @@ bool spheres_share(const PlacedAsset& a, const PlacedAsset& b, const Penetration
   const Eigen::Vector3d middle =
       pose->rotation().transpose() * (found.centroid - vector(pose->origin_a)) / pose->unit_a;
   if (spheres.share(middle)) return true;
-  // The middle of an overlap in parts may lie beside them, and between spheres that are small near
-  // the surface: points on its sides are in spheres of both about as often again.
+  // The middle may lie between the parts of an overlap, or between the small spheres near a
+  // surface: points beside it are in spheres of both about as often again.
   constexpr double kAside = 0.4;
   const Eigen::Vector3d push = pose->rotation().transpose() * found.force;
   if (!(push.squaredNorm() > 0)) return false;
@@ -415,19 +364,18 @@ Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
     return result;
   }
   if (surfaces) return SurfaceGap(a, b, *pose, settings, enough, *workspace.impl()).find();
-  const SphereTree tree_a = sphere_tree(a.asset, Measure::inner);
-  const SphereTree tree_b = sphere_tree(b.asset, Measure::inner);
-  const double length = span(tree_a.root(), tree_b.root(), pose->a_from_b);
-  const double world_error = distance_error(Precision::float64, length) + pose->rounding_of_world();
+  const InnerSpheres spheres(a, b, *pose);
+  const double length = span(spheres.a.root(), spheres.b.root(), pose->a_from_b);
   constexpr double kNoLimit = std::numeric_limits<double>::infinity();
   if (settings.max_distance > 0 && settings.max_visits == 0) {
     const double limit = settings.max_distance / pose->unit_a +
-                         distance_error(Precision::float32, length) + world_error;
-    GapDescent near(tree_a, tree_b, *pose, DescentLimits::kNoLimit, limit, true, *workspace.impl());
+                         distance_error(Precision::float32, length) + spheres.off;
+    GapDescent near(spheres.a, spheres.b, *pose, DescentLimits::kNoLimit, limit, true,
+                    *workspace.impl());
     near.run();
     if (near.cover() == limit) return farther_than(settings.max_distance);
   }
-  GapDescent descent(tree_a, tree_b, *pose, visit_limit(settings.max_visits), kNoLimit, true,
+  GapDescent descent(spheres.a, spheres.b, *pose, visit_limit(settings.max_visits), kNoLimit, true,
                      *workspace.impl());
   descent.run();
   result.node_visits = descent.visits();
@@ -437,15 +385,15 @@ Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
 
   const double unit = pose->unit_a;
   const double kernel_error = distance_error(descent.precision(), length);
-  const double gap = descent.gap();
-  result.distance_min = unit * std::max(0.0, descent.cover() - kernel_error - world_error);
+  const SpherePair& nearest = descent.nearest();
+  result.distance_min = unit * std::max(0.0, descent.cover() - kernel_error - spheres.off);
   if (settings.max_distance > 0 && result.distance_min > settings.max_distance)
     return farther_than(settings.max_distance);
-  result.distance = unit * gap;
-  result.distance_max = unit * (gap + world_error);
-  const Eigen::Vector3d axis = (descent.centre_b() - descent.centre_a()).normalized();
-  result.point_a = pose->to_world(descent.centre_a() + descent.radius_a() * axis);
-  result.point_b = pose->to_world(descent.centre_b() - descent.radius_b() * axis);
+  result.distance = unit * nearest.gap;
+  result.distance_max = unit * (nearest.gap + spheres.off);
+  const Eigen::Vector3d axis = (nearest.centre_b - nearest.centre_a).normalized();
+  result.point_a = pose->to_world(nearest.centre_a + nearest.radius_a * axis);
+  result.point_b = pose->to_world(nearest.centre_b - nearest.radius_b * axis);
   result.normal = pose->rotation() * axis;
   return result;
 }

@@ -3,7 +3,7 @@
 #include "query/base/no_answer.h"
 #include "query/contact/write_patches.h"
 #include "query/shape/gap_search.h"
-#include "query/shape/meeting_search.h"
+#include "query/shape/overlap_search.h"
 #include "query/shape/shape_descent.h"
 #include "query/shape/with_shape.h"
 #include "query/solid_queries.h"
@@ -12,10 +12,9 @@ namespace ist {
 namespace {
 
 /// `tree`: of B, which bins refer to.
-Penetration penetrate(const PlacedShape& a, const PlacedAsset& b, const SphereTree& tree,
-                      const DescentLimits& limits, Workspace& workspace,
-                      ContactBins* bins) noexcept {
-  const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
+Penetration penetrate(const PlacedShape& a, const SphereTree& tree,
+                      const std::optional<RelativePose>& pose, const DescentLimits& limits,
+                      Workspace& workspace, ContactBins* bins) noexcept {
   if (!pose || workspace.impl() == nullptr) return invalid_input<Penetration>();
   if (bins != nullptr) bins->start(tree, true);
   return with_shape(
@@ -33,8 +32,8 @@ Penetration penetrate(const PlacedShape& a, const PlacedAsset& b, const SphereTr
 Penetration find_penetration(const PlacedShape& a, const PlacedAsset& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept {
   if (settings.measure == Measure::exact || lack_spheres(a, b)) return missing_data<Penetration>();
-  const SphereTree tree = sphere_tree(b.asset, settings.measure);
-  return penetrate(a, b, tree, limits_of(settings), workspace, nullptr);
+  return penetrate(a, sphere_tree(b.asset, settings.measure), relative_pose(a.pose, a.scale, b),
+                   limits_of(settings), workspace, nullptr);
 }
 
 Separation find_separation(const PlacedShape& a, const PlacedAsset& b,
@@ -58,7 +57,7 @@ YesNoAnswer find_overlap(const PlacedShape& a, const PlacedAsset& b,
   if (!pose || workspace.impl() == nullptr) return {YesNo::unknown, QueryStatus::invalid_input};
   const SphereTree tree = sphere_tree(b.asset, Measure::inner);
   const auto search = [&](auto& shape) {
-    return YesNoAnswer{ShapeMeetingSearch(shape, tree, *pose, *workspace.impl()).run(),
+    return YesNoAnswer{ShapeOverlapSearch(shape, tree, *pose, *workspace.impl()).run(),
                        QueryStatus::ok};
   };
   return with_shape(a.shape, search, [] {
@@ -75,10 +74,9 @@ ContactPatches find_patches(const PlacedShape& a, const PlacedAsset& b,
   ContactPatches result;
   ContactBins& bins = workspace.impl()->contact;
   const SphereTree tree = sphere_tree(b.asset, settings.measure);
-  result.penetration = penetrate(a, b, tree, limits_of(settings), workspace, &bins);
-  if (result.penetration.status == QueryStatus::invalid_input) return result;
   const std::optional<RelativePose> pose = relative_pose(a.pose, a.scale, b);
-  if (!pose) return result;
+  result.penetration = penetrate(a, tree, pose, limits_of(settings), workspace, &bins);
+  if (result.penetration.status == QueryStatus::invalid_input) return result;
   const double radius = tree.header->root[3] * pose->a_from_b.scale;
   result.count = write_patches({bins, bins.collect(Precision::float64), *pose, radius},
                                result.penetration, patches);

@@ -5,7 +5,9 @@
 #include <ist/query.h>
 #include <ist/time_of_impact.h>
 
-// The public queries of two assets, and of a shape and an asset, in this order.
+#include "query/base/relative_pose.h"
+
+// The public queries for two assets, or for a shape and an asset in this order.
 
 namespace ist {
 
@@ -14,13 +16,12 @@ Penetration find_penetration(const PlacedAsset& a, const PlacedAsset& b,
 Penetration find_penetration(const PlacedShape& a, const PlacedAsset& b,
                              const PenetrationSettings& settings, Workspace& workspace) noexcept;
 
-/// `enough`: once the distance is known to be no more than this [u], distance_max is all that is
-/// asked for.
+/// `enough`: once the distance is known to be no more than this [u], only distance_max is set.
 Separation find_separation(const PlacedAsset& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace,
                            double enough = 0) noexcept;
-/// Whether inner spheres of both are seen to contain a point near the middle of an overlap that was
-/// found: then the solids do overlap. May miss.
+/// True if inner spheres of both contain a point near the middle of the overlap `found`, which
+/// proves that the solids overlap. May be false for solids that do.
 bool spheres_share(const PlacedAsset& a, const PlacedAsset& b, const Penetration& found) noexcept;
 Separation find_separation(const PlacedShape& a, const PlacedAsset& b,
                            const SeparationSettings& settings, Workspace& workspace) noexcept;
@@ -39,5 +40,16 @@ TimeOfImpact find_impact(const PlacedAsset& a, const PlacedAsset& b, const Motio
                          const ImpactSettings& settings, Workspace& workspace) noexcept;
 TimeOfImpact find_impact(const PlacedShape& a, const PlacedAsset& b, const Motions& motions,
                          const ImpactSettings& settings, Workspace& workspace) noexcept;
+
+/// penetration() by Measure::exact.
+Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
+                              const PenetrationSettings& settings, const RelativePose& pose,
+                              Workspace& workspace) noexcept;
+
+/// contact_patches() and overlap_outline() by Measure::exact. `divides`: splits parts into octants.
+OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
+                             const ContactSettings& settings, Workspace& workspace,
+                             std::span<ContactPatch> patches, std::span<OutlineSegment> segments,
+                             bool divides) noexcept;
 
 }  // namespace ist

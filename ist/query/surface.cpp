@@ -17,21 +17,17 @@ namespace {
 using Eigen::Vector3d;
 
 template <class Answer>
-Answer refused(QueryStatus status) noexcept;
-template <>
-RayHit refused(QueryStatus status) noexcept {
-  return {kNone, Vector3d::Constant(kNone), Vector3d::Constant(kNone), ~0u, status};
-}
-template <>
-SurfacePoint refused(QueryStatus status) noexcept {
-  return {kNone, kNone, Vector3d::Constant(kNone), Vector3d::Constant(kNone), ~0u, status};
-}
-template <>
-YesNoAnswer refused(QueryStatus status) noexcept {
-  return {YesNo::unknown, status};
+Answer refused(QueryStatus status) noexcept {
+  const Vector3d none = Vector3d::Constant(kNone);
+  if constexpr (std::is_same_v<Answer, RayHit>)
+    return {kNone, none, none, ~0u, status};
+  else if constexpr (std::is_same_v<Answer, SurfacePoint>)
+    return {kNone, kNone, none, none, ~0u, status};
+  else
+    return {YesNo::unknown, status};
 }
 
-/// A solid's own frame: an asset's unit frame, a shape's own.
+/// An asset's unit frame, or a shape's own frame.
 struct SolidFrame {
   Eigen::Matrix3d rotation;
   Vector3d origin;  ///< [u] world
@@ -42,12 +38,11 @@ struct SolidFrame {
     const std::optional<Eigen::Quaterniond> turn = usable_rotation(pose, scale);
     if (!turn || !ratio_in_range(scale)) return std::nullopt;
     const Eigen::Matrix3d rotation = turn->toRotationMatrix();
-    return SolidFrame{rotation,
-                      Vector3d(pose.t[0], pose.t[1], pose.t[2]) + rotation * (scale * offset),
+    return SolidFrame{rotation, vector(pose.t) + rotation * (scale * offset),
                       std::ldexp(scale, exponent)};
   }
   Vector3d world(const Vector3d& x) const noexcept { return rotation * (unit * x) + origin; }
-  /// Empty where it is too far or no place at all.
+  /// Empty if the point is out of range or not finite.
   std::optional<Vector3d> own(const Vector3d& world) const noexcept {
     const Vector3d x = rotation.transpose() * (world - origin) / unit;
     return in_pose_range(plain(x)) ? std::optional(x) : std::nullopt;
@@ -55,6 +50,7 @@ struct SolidFrame {
 };
 
 exact::Point point(const Vector3d& x) noexcept { return {x.x(), x.y(), x.z()}; }
+
 /// A ray in a solid's own frame.
 struct OwnRay {
   Vector3d origin;
@@ -66,7 +62,7 @@ struct OwnRay {
     const std::optional<Vector3d> origin = frame.own(ray.origin);
     if (!origin || !(largest > 0) || !ray.direction.allFinite() || !(ray.max_distance > 0))
       return std::nullopt;
-    // Halves: a power of two keeps the digits, and neither it nor a square overflows.
+    // A power of two keeps all digits; in two halves neither it nor a square overflows.
     const int exponent = std::ilogb(largest);
     const Vector3d scaled = ray.direction.unaryExpr([&](double x) {
       return std::ldexp(std::ldexp(x, -exponent / 2), exponent / 2 - exponent);
@@ -82,7 +78,7 @@ RayHit hit_at(const SolidFrame& frame, const OwnRay& ray, double distance, const
           (frame.rotation * normal).normalized(), triangle, QueryStatus::ok};
 }
 
-/// An asset's mesh at a place.
+/// A placed asset's mesh.
 class MeshOfSolid {
  public:
   explicit MeshOfSolid(const PlacedAsset& placed) noexcept {
@@ -92,8 +88,7 @@ class MeshOfSolid {
       return;
     }
     const AssetHeader& asset = placed.asset.header();
-    frame_ = SolidFrame::of(placed.pose, placed.scale,
-                            {asset.centre[0], asset.centre[1], asset.centre[2]}, asset.exponent);
+    frame_ = SolidFrame::of(placed.pose, placed.scale, vector(asset.centre), asset.exponent);
     if (!frame_) return;
     mesh_.emplace(mesh_of(placed));
     extent_ = mesh_->extent();
@@ -104,7 +99,7 @@ class MeshOfSolid {
     if (status_ != QueryStatus::ok) return refused<RayHit>(status_);
     const std::optional<OwnRay> ray = OwnRay::of(given, *frame_);
     if (!ray) return refused<RayHit>(QueryStatus::invalid_input);
-    // Nothing is further.
+    // The whole mesh is within this distance.
     const double length = std::min(ray->max_distance, ray->origin.cwiseAbs().sum() + 4 * extent_);
     const Vector3d end = ray->origin + length * ray->direction;
     const MeshHit hit =
@@ -120,7 +115,7 @@ class MeshOfSolid {
     const MeshFoot foot = nearest_on(*mesh_, point(*x));
     const double away = std::sqrt(foot.squared);
     const double side = is_inside({*mesh_}, point(*x)) ? -1 : 1;
-    // Next to the surface the direction to it is rounding.
+    // Very close to the surface the direction to it is mostly rounding.
     const double rounding =
         1e-14 * (extent_ + away) + 1e-15 * (frame_->origin.norm() + given.norm()) / frame_->unit;
     const Vector3d gradient =
@@ -156,14 +151,14 @@ struct Chord {
   Chord within(const Chord& other) const noexcept {
     return {std::max(first, other.first), std::min(last, other.last)};
   }
-  /// The union of two chords whose solids form a convex one.
+  /// The union of two chords; the union of their solids must be convex.
   Chord with(const Chord& other) const noexcept {
     if (empty() || other.empty()) return empty() ? other : *this;
     return {std::min(first, other.first), std::max(last, other.last)};
   }
 };
 
-/// Where x + t d ≤ most.
+/// The chord with x + t d ≤ most.
 Chord below(double x, double d, double most) noexcept {
   constexpr double kLeast = 1e-150;
   if (std::abs(d) < kLeast) return x <= most ? Chord() : Chord::none();
@@ -173,7 +168,7 @@ Chord below(double x, double d, double most) noexcept {
 Chord between(double x, double d, double half) noexcept {
   return below(x, d, half).within(below(-x, -d, half));
 }
-/// Where |x + t d| ≤ radius.
+/// The chord with |x + t d| ≤ radius.
 Chord within_radius(const Vector3d& x, const Vector3d& d, double radius) noexcept {
   const double dd = d.squaredNorm();
   if (!(dd > 1e-150)) return x.norm() <= radius ? Chord() : Chord::none();
@@ -209,13 +204,8 @@ Chord chord_of(const CapsuleSampler& s, const Vector3d& x, const Vector3d& d) no
 }
 
 template <class Sampler>
-concept HasChord = requires(const Sampler& s, const Vector3d& x) {
-  chord_of(s, x, x);
-};
-
-template <class Sampler>
 RayHit shape_hit(Sampler& shape, const SolidFrame& frame, const OwnRay& ray) noexcept {
-  if constexpr (HasChord<Sampler>) {
+  if constexpr (requires { chord_of(shape, ray.origin, ray.origin); }) {
     const Chord chord = chord_of(shape, ray.origin, ray.direction);
     const double distance = chord.first >= 0 ? chord.first : chord.last;
     if (chord.empty() || !(distance >= 0) || !(distance <= ray.max_distance)) return {};
@@ -226,11 +216,10 @@ RayHit shape_hit(Sampler& shape, const SolidFrame& frame, const OwnRay& ray) noe
   }
 }
 
-/// A shape at a place.
 class ShapeAtPose {
  public:
   explicit ShapeAtPose(const PlacedShape& placed) noexcept
-      : field_(placed.shape),
+      : shape_(placed.shape),
         frame_(SolidFrame::of(placed.pose, placed.scale, Vector3d::Zero(), 0)) {}
 
   RayHit answer(const Ray& given) const noexcept {
@@ -239,13 +228,13 @@ class ShapeAtPose {
     const std::optional<OwnRay> ray = OwnRay::of(given, *frame_);
     if (!ray) return refuse();
     return with_shape(
-        field_, [&](auto& shape) { return shape_hit(shape, *frame_, *ray); }, refuse);
+        shape_, [&](auto& shape) { return shape_hit(shape, *frame_, *ray); }, refuse);
   }
 
   SurfacePoint answer(const Vector3d& given, SurfacePoint) const noexcept {
     return with_sample<SurfacePoint>(
         given, [&](const Vector3d& x, const ShapeSample& at, double error) {
-          // Where all directions are alike one of them serves.
+          // In a centre of symmetry any direction serves.
           const double slope = at.gradient.norm();
           const Vector3d gradient =
               slope > 0 ? Vector3d(at.gradient / slope) : Vector3d::UnitX().eval();
@@ -274,22 +263,12 @@ class ShapeAtPose {
     const std::optional<Vector3d> x = frame_->own(given);
     if (!x) return refuse();
     return with_shape(
-        field_, [&](auto& shape) { return use(*x, shape.nearest(*x), shape.error()); }, refuse);
+        shape_, [&](auto& shape) { return use(*x, shape.nearest(*x), shape.error()); }, refuse);
   }
 
-  const Shape& field_;
+  const Shape& shape_;
   std::optional<SolidFrame> frame_;
 };
-
-/// Runs `use(solid)` with what answers.
-template <class Use>
-auto with_solid(const PlacedAsset& placed, const Use& use) noexcept {
-  return use(MeshOfSolid(placed));
-}
-template <class Use>
-auto with_solid(const PlacedShape& placed, const Use& use) noexcept {
-  return use(ShapeAtPose(placed));
-}
 
 template <class Asked, class Answer, class... Kind>
 void answer_all(const PlacedSolid& placed, std::span<const Asked> asked, std::span<Answer> answers,
@@ -298,7 +277,10 @@ void answer_all(const PlacedSolid& placed, std::span<const Asked> asked, std::sp
     for (std::size_t i = 0; i < std::min(asked.size(), answers.size()); ++i)
       answers[i] = solid.answer(asked[i], kind...);
   };
-  std::visit([&](const auto& given) { with_solid(given, answer); }, placed.placed);
+  if (const auto* const asset = std::get_if<PlacedAsset>(&placed.placed))
+    answer(MeshOfSolid(*asset));
+  else
+    answer(ShapeAtPose(*std::get_if<PlacedShape>(&placed.placed)));
 }
 
 template <class Asked, class Answer, class... Kind>

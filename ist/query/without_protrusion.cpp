@@ -13,15 +13,15 @@
 namespace ist {
 namespace {
 
-// Where flat faces meet, depth u = volume / (|force| · skin) and gap follow the same curve for all
-// solids tried (benchmarks/aligned): u is 0.13 … 0.19 as they touch, 0.22 … 0.28 when a fifth of
-// the skin deep, and from there on the volume is right to 10 %.
+// For flat faces, depth u = volume / (|force| · skin) and gap follow the same curve for all solids
+// tried (benchmarks/aligned): u is 0.13 … 0.19 as they touch and 0.22 … 0.28 at a fifth of the
+// skin. Beyond that the volume is accurate to 10 %.
 constexpr double kTouching = 0.135;
 constexpr double kDeepOverlap = 0.225;
-// d(log u) / d(log volume) along the correction, by which the force changes with the volume.
+// d(log u) / d(log volume) along the correction: the force changes with the volume by it.
 constexpr double kStiffening = 0.42;
-// |force|³ / volume² over the depth: hundreds for round contacts of the oracle's solids, and from
-// 5,000 on for faces, up to the last sphere that touches.
+// |force|³ / volume² over the depth is some hundreds for round contacts of the oracle's solids, and
+// more than 5,000 for faces, up to the last sphere that touches.
 constexpr double kRound = 1500;
 constexpr double kFlat = 4500;
 
@@ -33,13 +33,13 @@ double skin_of(const PlacedAsset& placed) {
          std::min(asset.matched_tree.mean_radius, 3 * asset.protrusion);
 }
 
-/// [u] Of two solids' layers together.
+/// [u] The scale of two solids' layers together.
 double skin_of(const PlacedAsset& a, const PlacedAsset& b) {
   const double of_a = skin_of(a), of_b = skin_of(b);
   return std::sqrt((of_a * of_a + of_b * of_b) / 2);
 }
 
-/// [0, 1] whether faces meet that are flat. `depth`: over the skin.
+/// 1 for contacts of flat faces, 0 for round ones. `depth`: over the skin.
 double flatness(double volume, double area, double depth) {
   const double ratio = area / volume;
   return smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
@@ -88,7 +88,7 @@ void without_protrusion(std::span<ContactPatch> patches, const PlacedAsset& a, c
   const auto is_light = [&](const ContactPatch& patch) {
     return patch.volume < kDeepOverlap * (skin * patch.area);
   };
-  // The light patches are one contact, flat or not, and each has its depth.
+  // The light patches share one flatness; each has its own depth.
   double volume = 0;
   Eigen::Vector3d force = Eigen::Vector3d::Zero();
   for (const ContactPatch& patch : patches)

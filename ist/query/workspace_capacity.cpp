@@ -28,9 +28,9 @@ Balls balls_of(const SphereTree& tree, int level, double scale) {
   return balls;
 }
 
-/// A ball of `radius` meets no more of the balls than this, wherever it lies: the most that come as
-/// near to a cell of a grid.
-std::size_t most_met(const Balls& balls, double radius) {
+/// Upper bound on the number of balls that a ball of `radius` can overlap: the most that come as
+/// near to one cell of a grid.
+std::size_t most_overlaps(const Balls& balls, double radius) {
   constexpr double kCells = 4e5, kCellsAReach = 3;
   double low[3], size[3], sum = 0;
   for (int k = 0; k < 3; ++k) {
@@ -48,7 +48,7 @@ std::size_t most_met(const Balls& balls, double radius) {
       std::max((radius + typical) / kCellsAReach, std::cbrt(size[0] * size[1] * size[2] / kCells));
   std::size_t count[3];
   for (int k = 0; k < 3; ++k) count[k] = static_cast<std::size_t>(size[k] / cell) + 1;
-  std::vector<std::uint32_t> met(count[0] * count[1] * count[2]);
+  std::vector<std::uint32_t> near(count[0] * count[1] * count[2]);
   for (const NodeBall& ball : balls) {
     const double reach = ball.r + radius;
     std::size_t first[3], last[3];
@@ -57,7 +57,7 @@ std::size_t most_met(const Balls& balls, double radius) {
       first[k] = static_cast<std::size_t>(std::max(0.0, from - 1e-6));
       last[k] = std::min(count[k] - 1, static_cast<std::size_t>(from + 2 * reach / cell + 1e-6));
     }
-    // Squared, from the ball's centre to a layer of cells.
+    // The squared distance of the ball's centre from a layer of cells.
     const auto gap = [&](int k, std::size_t i) {
       const double to = low[k] + cell * static_cast<double>(i) - ball.centre[k];
       const double away = std::max({to, -to - cell, 0.0}) * (1 - 1e-9);
@@ -66,34 +66,34 @@ std::size_t most_met(const Balls& balls, double radius) {
     for (std::size_t z = first[2]; z <= last[2]; ++z)
       for (std::size_t y = first[1]; y <= last[1]; ++y) {
         const double left = reach * reach - (gap(2, z) + gap(1, y));
-        std::uint32_t* const row = met.data() + (z * count[1] + y) * count[0];
+        std::uint32_t* const row = near.data() + (z * count[1] + y) * count[0];
         for (std::size_t x = first[0]; x <= last[0]; ++x) row[x] += gap(0, x) <= left;
       }
   }
-  return *std::max_element(met.begin(), met.end());
+  return *std::max_element(near.begin(), near.end());
 }
 
-/// At no pose do more pairs of balls meet: each of A meets the most that one of its size can.
+/// Upper bound on the number of overlapping pairs of balls at any pose: each ball of A overlaps the
+/// most that one of its size can.
 std::size_t most_pairs(const Balls& a, const Balls& b, double blur) {
-  constexpr double kAlike = 1.25;  // radii that are taken together
+  constexpr double kAlike = 1.25;  // ratio of radii that are treated alike
   std::vector<double> radii;
   for (const NodeBall& ball : a) radii.push_back(ball.r);
   std::sort(radii.begin(), radii.end());
   std::size_t pairs = 0;
   for (auto from = radii.begin(); from != radii.end();) {
     const auto to = std::upper_bound(from, radii.end(), kAlike * *from);
-    pairs += static_cast<std::size_t>(to - from) * most_met(b, *(to - 1) + blur);
+    pairs += static_cast<std::size_t>(to - from) * most_overlaps(b, *(to - 1) + blur);
     from = to;
   }
   return pairs;
 }
 
-/// The capacity that every stage of some descents needs, the last stages first: they need most.
+/// The capacity for every stage of traversals. Late stages come first, since they need most.
 class Capacity {
  public:
   void add_count(std::size_t pairs) { capacity_ = std::max(capacity_, pairs + kWidth); }
 
-  /// The needs of a Descent.
   void add_trees(const SphereTree& a, const SphereTree& b, const RelativePose& pose) {
     add_trees({a, b, pose}, a.top, b.top);
   }
@@ -120,7 +120,7 @@ class Capacity {
     if (most <= capacity_) return;
     const double scale = trees.pose.a_from_b.scale;
     const double roots = trees.a.header->root[3] + scale * trees.b.header->root[3];
-    // The kernels' rounding may let these pass.
+    // Covers the rounding of the kernels.
     const double blur = distance_error(
         precision_for(trees.a.root(), trees.b.root(), trees.pose.a_from_b.scale), 32 * roots);
     const Balls a = balls_of(trees.a, level_a, 1), b = balls_of(trees.b, level_b, scale);
@@ -138,7 +138,7 @@ void need_spheres(const PlacedAsset& solid) {
         "capacity");
 }
 
-RelativePose scales_of(const std::optional<RelativePose>& pose) {
+RelativePose valid_pose(const std::optional<RelativePose>& pose) {
   if (!pose)
     throw Error("workspace_capacity: an asset is empty, or a scale is not positive and finite");
   return *pose;
@@ -146,21 +146,21 @@ RelativePose scales_of(const std::optional<RelativePose>& pose) {
 
 std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
   const PlacedAsset still_a{a.asset, {}, a.scale}, still_b{b.asset, {}, b.scale};
-  const RelativePose a_from_b = scales_of(relative_pose(still_a, still_b));
+  const RelativePose pose = valid_pose(relative_pose(still_a, still_b));
   Capacity capacity;
   need_spheres(a);
   need_spheres(b);
   const AssetHeader &header_a = a.asset.header(), &header_b = b.asset.header();
   const auto add = [&](const TreeHeader& tree_a, const TreeHeader& tree_b) {
-    capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, a_from_b);
+    capacity.add_trees({header_a, tree_a}, {header_b, tree_b}, pose);
   };
   add(header_a.inner_tree, header_b.inner_tree);
-  const LevelChain chain(header_a, header_b, a_from_b.a_from_b.scale);
+  const LevelChain chain(header_a, header_b, pose.a_from_b.scale);
   for (std::size_t i = 0; i < chain.size(); ++i) {
     const LevelPair& pair = chain[i];
     add(matched_tree(header_a, pair.a), matched_tree(header_b, pair.b));
     if (pair.a != pair.b || !are_one_asset(header_a, header_b)) continue;
-    // Copies that coincide are asked as unlike levels.
+    // Copies that nearly coincide use unlike levels.
     const std::uint32_t other = pair.a < header_a.detail_count ? pair.a + 1 : pair.a - 1;
     add(matched_tree(header_a, pair.a), matched_tree(header_b, other));
     add(matched_tree(header_a, other), matched_tree(header_b, pair.a));
@@ -169,7 +169,7 @@ std::size_t capacity_of(const PlacedAsset& a, const PlacedAsset& b) {
 }
 
 std::size_t capacity_of(const PlacedShape& a, const PlacedAsset& b) {
-  scales_of(relative_pose(Pose{}, a.scale, PlacedAsset{b.asset, {}, b.scale}));
+  valid_pose(relative_pose(Pose{}, a.scale, PlacedAsset{b.asset, {}, b.scale}));
   Capacity capacity;
   need_spheres(b);
   for (const Measure measure : {Measure::matched, Measure::inner})

@@ -99,7 +99,7 @@ std::vector<Part> parts_of(const TriangleMesh& mesh, const std::vector<Ball>& ba
     put_right(there, probes, sums);
   }
   std::vector<Part> parts;
-  const std::uint32_t inside = settled_sides(sums, odd) & used;
+  const std::uint32_t inside = sides_by_angles(sums, odd) & used;
   for (std::size_t i = 0; i < balls.size(); ++i) {
     ProbeSums alone;
     alone.met = sums.met & 1u << i;

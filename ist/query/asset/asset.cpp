@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
+#include <iterator>
 #include <new>
 #include <system_error>
 #include <vector>
@@ -15,6 +16,20 @@ constexpr std::align_val_t kAlignment{kAssetAlignment};
 std::string reason(int error) { return std::generic_category().message(error); }
 
 }  // namespace
+
+const char* describe(AssetStatus status) noexcept {
+  constexpr const char* kSentences[] = {
+      "sound",
+      "the file is truncated; bake again",
+      "the bytes do not start on a 64-byte boundary",
+      "not an .ist asset",
+      "written in another format version; bake again",
+      "the content does not match its checksum; bake again",
+      "a field or offset is out of range; bake again",
+  };
+  const auto place = static_cast<std::size_t>(status);
+  return place < std::size(kSentences) ? kSentences[place] : "unknown status";
+}
 
 void Asset::AlignedDelete::operator()(std::byte* p) const noexcept {
   ::operator delete[](p, kAlignment);

@@ -51,7 +51,7 @@ bool sound_tree(const AssetHeader& header, const TreeHeader& tree) noexcept {
       sound &= i < tree.sphere_count ? is_radius(cover[i]) : cover[i] == kEmptyRadius;
   }
 
-  std::uint64_t below = tree.sphere_count;  // what the lanes of this level stand for
+  std::uint64_t below = tree.sphere_count;  // the number of balls in the lanes of this level
   for (std::uint32_t k = 0; k < tree.level_count && sound; ++k) {
     const LevelHeader& level = tree.level[k];
     const BallBlock* blocks = at<BallBlock>(header, level.blocks);
@@ -71,7 +71,7 @@ bool same_levels(const LevelHeader (&a)[kMaxLevels], const LevelHeader (&b)[kMax
   return std::memcmp(a, b, sizeof(a)) == 0;
 }
 
-/// Like sound_sections() for the mesh, which is laid out too; `expected` had none so far.
+/// True if the mesh's sections are where place_sections() puts them. Adds them to `expected`.
 bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
                          DetailLevel* details) noexcept {
   if (header.mesh != expected.file_bytes ||
@@ -90,15 +90,14 @@ bool sound_mesh_sections(const AssetHeader& header, AssetHeader& expected,
          mesh.neighbours == found.neighbours;
 }
 
-/// An asset contains spheres, or a mesh alone.
+/// True for an asset with spheres, and for a mesh alone.
 bool sound_counts(const AssetHeader& header) noexcept {
   if (header.sphere_count == 0) return header.mesh != 0 && header.detail_count == 0;
   return header.sphere_count <= kMaxSpheres && header.detail_count <= kMaxDetails &&
          detail_spheres(header.sphere_count, header.detail_count) >= 1;
 }
 
-/// Offsets and counts are a function of the counts of spheres and details and those of the mesh:
-/// nothing else is accepted.
+/// True if offsets and counts follow from the counts of spheres, levels of detail and the mesh.
 bool sound_sections(const AssetHeader& header, std::size_t bytes) noexcept {
   if (!sound_counts(header)) return false;
   AssetHeader expected;
@@ -185,35 +184,27 @@ AssetStatus AssetView::from_bytes(std::span<const std::byte> bytes, AssetView& o
 }
 
 std::size_t AssetView::sphere_count() const noexcept {
-  return header_ == nullptr ? 0 : static_cast<std::size_t>(header_->sphere_count);
+  return static_cast<std::size_t>(header().sphere_count);
 }
-
 double AssetView::volume() const noexcept {
-  return header_ == nullptr ? 0 : std::ldexp(header_->volume, 3 * header_->exponent);
+  return std::ldexp(header().volume, 3 * header().exponent);
 }
-
-double AssetView::coverage() const noexcept { return header_ == nullptr ? 0 : header_->coverage; }
-
+double AssetView::coverage() const noexcept { return header().coverage; }
 double AssetView::protrusion() const noexcept {
-  return header_ == nullptr ? 0 : std::ldexp(header_->protrusion, header_->exponent);
+  return std::ldexp(header().protrusion, header().exponent);
 }
-
-bool AssetView::has_mesh() const noexcept { return header_ != nullptr && header_->mesh != 0; }
-
+bool AssetView::has_mesh() const noexcept { return header().mesh != 0; }
 std::uint32_t AssetView::mesh_triangles() const noexcept {
   return has_mesh() ? at<MeshHeader>(*header_, header_->mesh)->triangle_count : 0;
 }
-
 double AssetView::mesh_error() const noexcept {
   if (!has_mesh()) return 0;
   const MeshHeader& mesh = *at<MeshHeader>(*header_, header_->mesh);
   return std::ldexp(mesh.error + mesh.rounding, header_->exponent);
 }
-
 MeshState AssetView::mesh_state() const noexcept {
   return static_cast<MeshState>(header().mesh_state);
 }
-
 double AssetView::self_overlap_volume() const noexcept {
   return std::ldexp(header().self_overlap_volume, 3 * header().exponent);
 }

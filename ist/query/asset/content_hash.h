@@ -6,8 +6,7 @@
 
 namespace ist {
 
-/// XXH3-64 of an asset's bytes with the shape AssetHeader::content_hash taken as zero. `bytes` must
-/// contain at least the header. No allocation.
+/// XXH3-64 of an asset's bytes, at least a header, with AssetHeader::content_hash taken as zero.
 std::uint64_t content_hash(std::span<const std::byte> bytes) noexcept;
 
 }  // namespace ist

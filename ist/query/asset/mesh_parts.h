@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// The mesh of an asset with its offsets resolved, all but boxes.
+/// The mesh of an asset with its offsets resolved, except those of its boxes.
 struct MeshParts {
   MeshParts() = default;
   MeshParts(const AssetHeader& asset, const MeshHeader& mesh) noexcept
@@ -19,7 +19,7 @@ struct MeshParts {
         neighbours(at<std::uint32_t>(asset, mesh.neighbours)) {}
 
   const MeshHeader* header = nullptr;
-  std::uint32_t count = 0;  ///< of blocks
+  std::uint32_t count = 0;  ///< blocks
   const MeshBlock* blocks = nullptr;
   const double* vertices = nullptr;
   const MeshShell* shells = nullptr;

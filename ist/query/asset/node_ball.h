@@ -16,11 +16,11 @@ struct NodeBall {
   double r = 0;
 };
 
-/// A tree as a whole.
+/// The balls around a whole tree.
 struct RootBall {
   double centre[3];
-  double r;      ///< about its spheres
-  double cover;  ///< about its cover balls
+  double r;      ///< contains its spheres
+  double cover;  ///< contains its cover balls
 
   IST_HD static RootBall of(const double (&root)[4], double cover) noexcept {
     return {{root[0], root[1], root[2]}, root[3], cover};
@@ -35,14 +35,12 @@ IST_HD inline NodeBall lane_ball(const BallBlock& b, const Origin& o, std::uint3
           static_cast<double>(b.r[lane])};
 }
 
-/// Cube of the typical radius of the nodes of a level, up to a factor that all trees share: they
-/// tile the root ball.
+/// Cube of the typical radius of a level's nodes, up to a factor common to all trees.
 IST_HD inline double typical_cube(double root, std::uint32_t count) noexcept {
   return root * root * root / count;
 }
 
-/// Whether A's node is opened next, and not B's, by their typical cubes; `scale`: of B in A's unit
-/// frame.
+/// True if A's node is the larger one, which is opened next. `scale`: of B in A's unit frame.
 IST_HD inline bool opens_a(int level_a, double cube_a, int level_b, double cube_b,
                            double scale) noexcept {
   return level_b == kSphereLevel ||

@@ -18,8 +18,13 @@ struct NodeSums {
   double overlap = 1;  ///< κ: no point lies in more spheres than this
 };
 
-/// One tree of an asset with its offsets resolved. A *node* is named by a level and a block of it:
-/// the ball around the sixteen balls (or spheres, at level 0) of that block.
+/// The ball around the sixteen balls (spheres at level 0) of a block of a tree.
+struct TreeNode {
+  int level;
+  std::uint32_t block;
+};
+
+/// One tree of an asset with its offsets resolved.
 struct SphereTree {
   struct Level {
     const BallBlock* blocks = nullptr;
@@ -40,6 +45,7 @@ struct SphereTree {
   }
 
   /// Unit frame, at full precision.
+  NodeBall ball(TreeNode node) const noexcept { return ball(node.level, node.block); }
   NodeBall ball(int at_level, std::uint32_t block) const noexcept {
     if (at_level == top)
       return {{header->root[0], header->root[1], header->root[2]}, header->root[3]};
@@ -61,7 +67,7 @@ struct SphereTree {
     return {static_cast<double>(n.volume[lane]), static_cast<double>(n.overlap[lane])};
   }
 
-  /// Inner tree: radius about the node's centre that contains every cover ball below it.
+  /// Inner tree: the radius about the node's centre that contains every cover ball below it.
   double cover(int at_level, std::uint32_t block) const noexcept {
     if (at_level == top) return header->root_cover;
     return static_cast<double>(level[at_level + 1].nodes[block / kWidth].cover[block % kWidth]);
@@ -82,7 +88,7 @@ struct SphereTree {
             static_cast<std::uint32_t>(std::min(all, full * (block + 1)))};
   }
 
-  /// Nodes of a level.
+  /// The number of nodes of a level.
   std::uint32_t count(int at_level) const noexcept {
     return at_level == kSphereLevel ? header->sphere_count : level[at_level].count;
   }
@@ -90,7 +96,7 @@ struct SphereTree {
   const TreeHeader* header;
   int top;  ///< the level of one block
   Level level[kMaxLevels];
-  const float* sphere_cover;  ///< inner tree: a cover radius a lane of level 0
+  const float* sphere_cover;  ///< inner tree: cover radii by lanes of level 0
 };
 
 inline SphereTree sphere_tree(const AssetView& view, Measure measure) noexcept {

@@ -4,11 +4,11 @@
 
 #include <ist/asset_layout.h>
 
-// Whether values of an asset's bytes are what a query may count on.
+// Validation of the values in an asset's bytes.
 
 namespace ist {
 
-inline constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);  ///< of a level
+inline constexpr std::uint32_t kMostBlocks = 1u << 4 * (kMaxLevels - 1);  ///< in a level
 
 // Comparisons are written so that NaN fails them.
 inline bool in_range(double value, double low, double high) noexcept {
@@ -17,7 +17,7 @@ inline bool in_range(double value, double low, double high) noexcept {
 inline bool is_offset(double value) noexcept { return in_range(value, -kMaxExtent, kMaxExtent); }
 inline bool is_radius(double value) noexcept { return in_range(value, 0, kMaxExtent); }
 
-/// The first `used` lanes are balls, the rest are marked empty.
+/// True if the first `used` lanes are balls and the others are marked empty.
 inline bool sound_block(const BallBlock& block, std::uint64_t used) noexcept {
   bool sound = true;
   for (std::uint32_t l = 0; l < kWidth; ++l) {
@@ -34,14 +34,14 @@ inline bool sound_origin(const Origin& origin) noexcept {
   return is_offset(origin.x) && is_offset(origin.y) && is_offset(origin.z);
 }
 
-/// The mass properties and bounds of an asset could be those of some solid.
+/// True if some solid can have these mass properties and bounds.
 bool sound_mass(const AssetHeader& header) noexcept;
 
-/// The counts by which the mesh's sections are placed.
+/// True if the counts by which place_sections() places the mesh's sections are in range.
 bool sound_mesh_counts(const MeshHeader& mesh) noexcept;
 
-/// The rest, once its sections are where they should be: every index that a query follows leads
-/// into its array, every number is finite, neighbours know each other.
+/// True if every index of a mesh with sound sections is within its array, every number is in range,
+/// and the relation of neighbours is symmetric.
 bool sound_mesh(const AssetHeader& header, const MeshHeader& mesh) noexcept;
 
 }  // namespace ist

@@ -9,11 +9,11 @@ namespace ist {
 namespace {
 
 constexpr double kMassRounding = 1e-12;
-/// No entry of an inertia is larger: a mass of 1e18 within kMaxExtent.
+/// Bound on the entries of an inertia: a mass of 1e18 within kMaxExtent.
 constexpr double kMaxInertia = 1e21;
 
-/// The principal second moments ∫ (y·e)² are not negative: so are then the principal inertias, and
-/// none is larger than the other two together.
+/// True if the principal second moments ∫ (y·e)² are not negative. Then neither are the principal
+/// inertias, and none exceeds the sum of the other two.
 bool sound_inertia(const AssetHeader& header) noexcept {
   const double* m = header.inertia;
   for (int k = 0; k < 6; ++k)
@@ -28,11 +28,11 @@ bool sound_inertia(const AssetHeader& header) noexcept {
   return principal.eigenvalues()[0] >= -(kMassRounding * half_trace + 3 * header.inertia_error);
 }
 
-/// The box lies near the unit frame and contains the centres of ball and mass; the ball is as large
-/// as its longest side at least, and as its diagonal at most.
+/// True if the box lies near the unit frame and contains the centres of ball and mass, and the
+/// ball's radius lies between half the box's longest side and its diagonal.
 bool sound_bounds(const AssetHeader& header) noexcept {
   const double unit = std::ldexp(1.0, header.exponent);
-  const double room = kMassRounding * unit;
+  const double margin = kMassRounding * unit;
   double half_side = 0, squares = 0;
   for (int k = 0; k < 3; ++k) {
     if (!std::isfinite(header.box_lower[k]) || !std::isfinite(header.box_upper[k])) return false;
@@ -45,8 +45,8 @@ bool sound_bounds(const AssetHeader& header) noexcept {
     half_side = std::max(half_side, (high - low) / 2);
     squares += (high - low) * (high - low) / 4;
   }
-  return in_range(header.ball_radius, unit * half_side * (1 - 1e-9) - room,
-                  2 * unit * std::sqrt(squares) + room);
+  return in_range(header.ball_radius, unit * half_side * (1 - 1e-9) - margin,
+                  2 * unit * std::sqrt(squares) + margin);
 }
 
 }  // namespace

@@ -21,8 +21,7 @@ bool sound_block(const MeshBlock& block, std::uint32_t vertex_count) noexcept {
   return sound;
 }
 
-/// Each by itself, and what their counts sum to. The blocks' lists follow each other; a shell
-/// begins with the first block that belongs to it.
+/// True if blocks are sound and in order: lists of neighbours are contiguous, shells ascend.
 bool sound_blocks(const MeshParts& mesh) noexcept {
   std::uint64_t triangles = 0;
   std::uint32_t listed = 0, shells = 0;
@@ -46,7 +45,7 @@ bool has_vertex(const MeshBlock& block, std::uint32_t vertex) noexcept {
   return std::find(block.vertex, block.vertex + kWidth, vertex) != block.vertex + kWidth;
 }
 
-/// Whether a sound list, sorted by block, names the block.
+/// True if the sorted list of neighbours contains the block.
 bool names(const MeshParts& mesh, const MeshBlock& from, std::uint32_t block) noexcept {
   const std::uint32_t* first = mesh.neighbours + from.first_neighbour;
   const std::uint32_t* end = first + from.neighbours;
@@ -54,7 +53,7 @@ bool names(const MeshParts& mesh, const MeshBlock& from, std::uint32_t block) no
   return found != end && *found / kWidth == block;
 }
 
-/// Sorted, every block but once, of the same shell, and the vertex is one that both share.
+/// True if lists are sorted and name other blocks of the shell, once each, and shared vertices.
 bool sound_lists(const MeshParts& mesh) noexcept {
   for (std::uint32_t b = 0; b < mesh.count; ++b) {
     const MeshBlock& block = mesh.blocks[b];
@@ -81,48 +80,29 @@ bool sound_neighbours(const MeshParts& mesh) noexcept {
   return true;
 }
 
-bool sound_box(float low, float high) noexcept {
-  return is_offset(low) && is_offset(high) && low <= high;
-}
-
-bool sound_boxes(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
+/// True if boxes and sums are in range, and unused lanes are empty.
+bool sound_nodes(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
   constexpr double kFarthest = 4 * kMaxExtent;  // along a normal
   bool sound = true;
   for (std::uint32_t level = 1; level < mesh.level_count; ++level) {
-    const BoxBlock* boxes = at<BoxBlock>(asset, mesh.level[level].blocks);
     const std::uint32_t used = mesh.level[level - 1].count;
     for (std::uint64_t i = 0; i < std::uint64_t{kWidth} * mesh.level[level].count; ++i) {
-      sound &= in_range(boxes[i / kWidth].slab_low[i % kWidth], -kFarthest, kFarthest) &&
-               in_range(boxes[i / kWidth].slab_high[i % kWidth], -kFarthest, kFarthest);
-      for (int k = 0; k < 3; ++k) {
-        const float low = boxes[i / kWidth].low[k][i % kWidth];
-        const float high = boxes[i / kWidth].high[k][i % kWidth];
-        sound &= i < used ? sound_box(low, high) : low == kEmptyLow && high == -kEmptyLow;
-        const float normal = boxes[i / kWidth].normal[k][i % kWidth];
-        sound &= i < used ? in_range(normal, -2, 2) : normal == 0;
-      }
-    }
-  }
-  return sound;
-}
-
-/// Finite, no area below zero, and nothing in unused lanes.
-bool sound_sums(const AssetHeader& asset, const MeshHeader& mesh) noexcept {
-  constexpr double kMost = 1e18;
-  bool sound = true;
-  for (std::uint32_t level = 1; level < mesh.level_count; ++level) {
-    const BoxSums* sums = at<BoxSums>(asset, mesh.level[level].nodes);
-    const std::uint32_t used = mesh.level[level - 1].count;
-    for (std::uint64_t i = 0; i < std::uint64_t{kWidth} * mesh.level[level].count; ++i) {
-      const BoxSums& of = sums[i / kWidth];
-      const double most = i < used ? kMost : 0;
+      const BoxBlock& box = at<BoxBlock>(asset, mesh.level[level].blocks)[i / kWidth];
+      const BoxSums& sums = at<BoxSums>(asset, mesh.level[level].nodes)[i / kWidth];
       const std::size_t lane = i % kWidth;
+      const double most = i < used ? 1e18 : 0;  // the largest sum
+      sound &= in_range(box.slab_low[lane], -kFarthest, kFarthest) &&
+               in_range(box.slab_high[lane], -kFarthest, kFarthest) &&
+               in_range(sums.area[lane], 0, most);
       for (int k = 0; k < 3; ++k) {
-        sound &=
-            in_range(of.normal[k][lane], -most, most) && in_range(of.cone[k][lane], -most, most);
-        for (const auto& flux : of.flux[k]) sound &= in_range(flux[lane], -most, most);
+        const float low = box.low[k][lane], high = box.high[k][lane], normal = box.normal[k][lane];
+        sound &= i < used
+                     ? is_offset(low) && is_offset(high) && low <= high && in_range(normal, -2, 2)
+                     : low == kEmptyLow && high == -kEmptyLow && normal == 0;
+        sound &= in_range(sums.normal[k][lane], -most, most) &&
+                 in_range(sums.cone[k][lane], -most, most);
+        for (const auto& flux : sums.flux[k]) sound &= in_range(flux[lane], -most, most);
       }
-      sound &= in_range(of.area[lane], 0, most);
     }
   }
   return sound;
@@ -144,8 +124,7 @@ bool sound_mesh_counts(const MeshHeader& mesh) noexcept {
 bool sound_mesh(const AssetHeader& header, const MeshHeader& mesh) noexcept {
   const MeshParts parts(header, mesh);
   return is_radius(mesh.error) && is_radius(mesh.rounding) && sound_vertices(parts) &&
-         sound_blocks(parts) && sound_neighbours(parts) && sound_boxes(header, mesh) &&
-         sound_sums(header, mesh);
+         sound_blocks(parts) && sound_neighbours(parts) && sound_nodes(header, mesh);
 }
 
 }  // namespace ist

@@ -8,13 +8,12 @@ namespace ist {
 
 /// A ball of radius r cut by a plane.
 struct Cap {
-  double volume = 0;      ///< of the part on the plane's inner side
-  double derivative = 0;  ///< by the centre's distance, which is the disc's area
-  double moment = 0;      ///< of that part about the centre, along the inward normal
+  double volume = 0;      ///< on the plane's inner side
+  double derivative = 0;  ///< of the volume by the centre's distance: the disc's area
+  double moment = 0;      ///< of the volume about the centre, along the inward normal
 };
 
-/// `d`: distance of the centre from the plane, positive inside. Each form has no difference of like
-/// numbers where it is small: relative error 1e-15 up to tangency.
+/// `d`: the centre's distance from the plane, positive inside. Relative error 1e-15 up to tangency.
 IST_HD inline Cap cap(double r, double d) {
   const double pi = std::numbers::pi;
   if (!(d > -r)) return {};

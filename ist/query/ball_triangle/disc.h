@@ -8,9 +8,9 @@
 #include "base/vec3.h"
 #include "query/asset/shared_constants.h"
 
-// A triangle's effect on a ball, for host and device. A GPU's threads sum whole balls by it, one
-// triangle at a time; on the CPU add_patch() (query/ball_triangle/patch_sums.h) sorts by it what
-// its vectors sum.
+// The part of a ball inside a triangle, for host and device. On the GPU a thread sums a whole ball,
+// one triangle at a time; on the CPU add_patch() (query/ball_triangle/patch_sums.h) classifies
+// discs by it before it sums them in vectors.
 
 namespace ist {
 
@@ -32,8 +32,7 @@ IST_HD inline double where_positive(double x, double y) { return x > 0 ? y : 1; 
 
 using disc::DiscPart;
 
-/// A ball whose centre lies on an edge is moved by less than this part of its radius, to where it
-/// sees the triangles from beside the edge.
+/// Bound, in radii, on how far a ball whose centre lies on an edge is moved off it.
 inline constexpr double kMoved = 0x1p-10;
 
 IST_HD inline void move_away(double r, double (&at)[3]) {
@@ -43,7 +42,7 @@ IST_HD inline void move_away(double r, double (&at)[3]) {
 /// A triangle and the axes of its plane.
 struct TrianglePlane : disc::PlaneFrame {
   double corner[3];  ///< the first
-  bool flat;         ///< it has no plane: no ball is to meet it
+  bool flat;         ///< degenerate: skip it, as it has no plane
 
   IST_HD explicit TrianglePlane(const double (&c)[3][3]) {
     double e[3], f[3];
@@ -65,10 +64,10 @@ struct TrianglePlane : disc::PlaneFrame {
   }
 };
 
-/// How the disc in which a triangle's plane cuts a ball lies to the triangle.
+/// The disc in which a triangle's plane cuts a ball, relative to the triangle.
 enum class DiscKind {
-  apart,  ///< the ball misses the triangle
-  whole,  ///< inside it
+  apart,  ///< outside, or there is no disc
+  whole,  ///< inside
   cut     ///< crossed by edges
 };
 
@@ -80,27 +79,26 @@ class Disc {
     t.feet(x, height_, fx, fy);
     place(t.length, t.edge_x, t.edge_y, fx, fy);
   }
-  /// The same from the height, the foot (x, y), and the edges' lengths and directions.
   IST_HD Disc(double height, double x, double y, double r, const double (&length)[3],
               const double (&edge_x)[3], const double (&edge_y)[3])
       : r_(r), height_(height) {
     place(length, edge_x, edge_y, x, y);
   }
 
-  /// Whether the centre all but lies on an edge: rounding decides from where it sees the triangle,
-  /// and cones and angle are worth nothing.
+  /// True if the centre is so close to an edge that rounding decides its side of the triangle:
+  /// cones and angle are meaningless then.
   IST_HD bool on_edge() const {
     const double m2 =
         least(least(edge_[0].m * edge_[0].m, edge_[1].m * edge_[1].m), edge_[2].m * edge_[2].m);
     return m2 + h_ * h_ < kOnEdge2 * (r_ * r_);
   }
 
-  /// How the edges' lines cross a disc.
+  /// Crossings of the disc with the edges.
   struct Crossings {
-    unsigned through = 0;     ///< a bit for each edge that cuts it from side to side
-    bool has_corner = false;  ///< a corner lies in it
+    unsigned through = 0;     ///< a bit for each edge that cuts the disc from side to side
+    bool has_corner = false;  ///< the disc contains a corner
     bool is_outside = false;  ///< the foot is outside the triangle
-    bool is_apart = false;    ///< all of the disc is beyond an edge
+    bool is_apart = false;    ///< the whole disc is beyond an edge
   };
   IST_HD Crossings crossings() const {
     Crossings found;
@@ -144,7 +142,7 @@ class Disc {
             kTurn * sector.second};
   }
 
-  /// Edge by edge, the part between it and the foot.
+  /// Sums, over the edges, the part between the edge and the foot.
   IST_HD DiscPart within_edges() const {
     DiscPart sum = {0, 0, 0, 0};
     const disc::DiscShape shape = disc::disc_shape(h_, r_);
@@ -152,7 +150,7 @@ class Disc {
     for (int k = 0; k < 3; ++k) {
       const Edge e = edge(k);
       const disc::EdgeInDisc in = disc::edge_in_disc(shape, e.m, e.begin, e.end);
-      // In a loop, for angle_of() to stand in the kernel's code once.
+      // A loop keeps one copy of angle_of() in the kernel's code.
       double sectors = 0, omega = 0;
       IST_ROLLED
       for (int seen = 0; seen < 2; ++seen) {
@@ -172,7 +170,7 @@ class Disc {
   }
 
   IST_HD double height() const { return height_; }
-  /// Signed distance of an edge from the foot, positive if that is within.
+  /// The signed distance of an edge from the foot, positive if the foot is within.
   IST_HD double distance(int k) const { return edge(k).m; }
 
  private:
@@ -191,7 +189,7 @@ class Disc {
     edge_[2] = {y * edge_x[2] - x * edge_y[2], t2 - length[2], t2};
   }
 
-  /// Without an index into registers.
+  /// Selects without indexing, since registers cannot be indexed.
   IST_HD Edge edge(int k) const { return k == 0 ? edge_[0] : k == 1 ? edge_[1] : edge_[2]; }
 
   double r_, height_, h_, rho2_;

@@ -1,7 +1,7 @@
-// Formulas of the part of a ball inside a triangle, once for lanes of the CPU and for a thread of
-// the GPU. No header of its own: the file that includes it defines `Real`, a number or lanes of
-// numbers, with constant(), negated(), root(), lesser() and greater(); where_positive(x, y), which
-// is y where x > 0 and 1 elsewhere; and IST_FORMULA, which goes before a function.
+// Formulas of the part of a ball inside a triangle, for lanes of the CPU and threads of the GPU.
+// The file that includes it defines `Real`, a number or lanes of numbers, with constant(),
+// negated(), root(), lesser() and greater(); where_positive(x, y), which is y where x > 0 and 1
+// elsewhere; and IST_FORMULA, which goes before a function.
 
 /// The axes of a triangle's plane: u along the first edge, n the outward normal.
 struct PlaneFrame {
@@ -42,8 +42,7 @@ IST_FORMULA void frame_of(const Real (&e)[3], const Real (&f)[3], PlaneFrame& ou
   }
 }
 
-/// The part of a triangle inside a ball: volume of the cones to the sphere, solid angle, area, and
-/// ∫ (r² − |y − centre|²) dA.
+/// A triangle inside a ball: volume of its cones, solid angle, area, and ∫ (r² − |y − centre|²) dA.
 struct DiscPart {
   Real cones, angle, area, second;
 };
@@ -71,8 +70,8 @@ IST_FORMULA void add_sector(const DiscShape& disc, Real phi, DiscPart& sum) {
   sum.second = sum.second + phi * disc.sector.second;
 }
 
-/// Adds a triangle of the foot and two points at distance m from it, `low` and `high` along the
-/// edge, that is seen under the solid angle `omega`.
+/// Adds the triangle of the foot and the points `low` and `high` along an edge at distance m, which
+/// the centre sees under the solid angle `omega`.
 IST_FORMULA void add_triangle(const DiscShape& disc, Real omega, Real m, Real low, Real high,
                               DiscPart& sum) {
   const Real cross = m * (high - low), area = constant(0.5) * cross;
@@ -84,14 +83,14 @@ IST_FORMULA void add_triangle(const DiscShape& disc, Real omega, Real m, Real lo
   sum.second = sum.second + (disc.rho2 * area - spread);
 }
 
-/// An edge at signed distance m from the foot, positive if the foot is within: the part of it in
-/// the disc, and two angles as points (x, y): that of both sectors beside this part together, and
-/// half of that under which the triangle over it is seen.
+/// The part of an edge in the disc, and two angles as points (x, y): the sum of both sectors beside
+/// this part, and half the solid angle of the triangle between it and the foot.
 struct EdgeInDisc {
   Real low, high;
   Real sectors_x, sectors_y, half_x, half_y;
 };
 
+/// `m`: the signed distance of the edge from the foot, positive if the foot is within.
 IST_FORMULA EdgeInDisc edge_in_disc(const DiscShape& disc, Real m, Real begin, Real end) {
   const Real m2 = m * m;
   const Real half = root(greater(disc.rho2 - m2, constant(0.0)));

@@ -1,4 +1,4 @@
-// The formulas of a ball and a triangle for lanes of doubles: included once a target.
+// The formulas of a ball and a triangle for lanes of doubles. Included once per target.
 
 #if defined(IST_QUERY_DISC_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_DISC_LANES_INL_H_
@@ -25,8 +25,8 @@ HWY_INLINE Real where_positive(Real x, Real y) {
   return hn::IfThenElse(x > hn::Zero(DiscTag()), y, constant(1.0));
 }
 
-/// atan2(y, x) in (−π, π], within a few units in the last place; 0 for the origin. Products and
-/// sums alone, in this order, so that every instruction set has the same bits.
+/// atan2(y, x) in (−π, π], within a few units in the last place; 0 for the origin. Same bits on
+/// every instruction set: only products, quotients and sums in this order.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE V angle_of(D d, V y, V x) {
   // atan(t)/t as a polynomial in t² for 0 ≤ t ≤ tan(π/8), within 4e-17: interpolated at Chebyshev's
@@ -53,7 +53,7 @@ HWY_INLINE V angle_of(D d, V y, V x) {
   const V below = hn::IfThenElse(wide, more + less, more);
   const V t = hn::IfThenElse(wide, less - more, less) / hn::Max(below, hn::Set(d, 1e-300));
   const V t2 = t * t;
-  // Even and odd terms apart: half as long to wait for.
+  // Even and odd terms in separate chains: half the latency.
   const V t4 = t2 * t2;
   V even = hn::Set(d, kTerms[10]), odd = hn::Set(d, kTerms[9]);
   for (int k = 8; k >= 0; k -= 2) even = even * t4 + hn::Set(d, kTerms[k]);

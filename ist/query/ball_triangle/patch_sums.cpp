@@ -10,38 +10,168 @@
 #include <hwy/foreach_target.h>
 
 #include "query/ball_triangle/disc_lanes-inl.h"
-#include "query/ball_triangle/feet-inl.h"
+#include "query/kernel/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
+/// A vector of centres: their heights over triangles' planes, and their feet in these.
+template <class V>
+struct Feet {
+  V height, x, y;
+};
+
+/// A bit for each ball that comes near its triangle, which extends from `left` to `right` and from
+/// 0 to `top` in its plane. kFeet: stores the feet, from `lane` on.
+template <bool kFeet, class V>
+HWY_INLINE std::uint32_t near_lanes(const Feet<V>& feet, V left, V right, V top, V r,
+                                    std::size_t lane, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  const auto beside = hn::And(feet.x > left - r, feet.x < right + r);
+  const auto along = hn::And(feet.y > hn::Zero(d) - r, feet.y < top + r);
+  if constexpr (kFeet) {
+    hn::Store(feet.height, d, height + lane);
+    hn::Store(feet.x, d, x + lane);
+    hn::Store(feet.y, d, y + lane);
+  }
+  return mask_bits(d, hn::And(hn::Abs(feet.height) < r, hn::And(beside, along)));
+}
+
+/// A bit for each ball that comes near triangle t. kFeet: stores heights and feet of all balls.
+template <bool kFeet>
+HWY_INLINE std::uint32_t feet_near(const SurfacePatch& patch, std::size_t t,
+                                   const ProbeBalls& balls, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const auto of = [&](double value) -> V { return hn::Set(d, value); };
+  V from[3], u[3], v[3], n[3];
+  for (int k = 0; k < 3; ++k) {
+    from[k] = of(patch.corner[0][k][t] - balls.origin[k]);
+    u[k] = of(patch.u[k][t]), v[k] = of(patch.v[k][t]), n[k] = of(patch.n[k][t]);
+  }
+  const V left = of(patch.left[t]), right = of(patch.right[t]), top = of(patch.top[t]);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Load(d, balls.x + lane) - from[0];
+    const V py = hn::Load(d, balls.y + lane) - from[1];
+    const V pz = hn::Load(d, balls.z + lane) - from[2];
+    const V r = hn::Load(d, balls.r + lane);
+    const auto dot = [&](const V(&axis)[3]) -> V {
+      return (px * axis[0] + py * axis[1]) + pz * axis[2];
+    };
+    near |=
+        near_lanes<kFeet>(Feet<V>{dot(n), dot(u), dot(v)}, left, right, top, r, lane, height, x, y)
+        << lane;
+  }
+  return near;
+}
+
+/// A bit for each triangle that the ball comes near. kFeet: as for feet_near().
+template <bool kFeet>
+HWY_INLINE std::uint32_t feet_of(const SurfacePatch& patch, const double (&centre)[3],
+                                 double radius, double* height, double* x, double* y) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const V r = hn::Set(d, radius);
+  std::uint32_t near = 0;
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V px = hn::Set(d, centre[0]) - hn::Load(d, patch.corner[0][0] + lane);
+    const V py = hn::Set(d, centre[1]) - hn::Load(d, patch.corner[0][1] + lane);
+    const V pz = hn::Set(d, centre[2]) - hn::Load(d, patch.corner[0][2] + lane);
+    const auto dot = [&](const double(&axis)[3][kWidth]) -> V {
+      return (px * hn::Load(d, axis[0] + lane) + py * hn::Load(d, axis[1] + lane)) +
+             pz * hn::Load(d, axis[2] + lane);
+    };
+    near |= near_lanes<kFeet>(Feet<V>{dot(patch.n), dot(patch.u), dot(patch.v)},
+                              hn::Load(d, patch.left + lane), hn::Load(d, patch.right + lane),
+                              hn::Load(d, patch.top + lane), r, lane, height, x, y)
+            << lane;
+  }
+  return near;
+}
+
+std::uint32_t near_of(const SurfacePatch& patch, const double (&centre)[3], double radius) {
+  return feet_of<false>(patch, centre, radius, nullptr, nullptr, nullptr);
+}
+
+void place_probes_of(const SphereTree& probes, int level, std::uint32_t block,
+                     const Similarity& map, ProbeBalls& balls) {
+  const LaneTag<double> d;
+  using V = hn::Vec<decltype(d)>;
+  const NodeBall ball = probes.ball(level, block);
+  const BallBlock& from = probes.level[level].blocks[block];
+  const Origin& o = probes.level[level].origins[block];
+  map.apply(ball.centre, balls.origin);
+  balls.reach = ball.r * map.scale * (1 + 1e-12);
+  V m[9];
+  for (int k = 0; k < 9; ++k) m[k] = hn::Set(d, map.m[k]);
+  const V ox = hn::Set(d, o.x - ball.centre[0]);
+  const V oy = hn::Set(d, o.y - ball.centre[1]);
+  const V oz = hn::Set(d, o.z - ball.centre[2]);
+  const V scale = hn::Set(d, map.scale);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const V x = ox + load_as<double>(d, from.x + lane);
+    const V y = oy + load_as<double>(d, from.y + lane);
+    const V z = oz + load_as<double>(d, from.z + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, balls.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, balls.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, balls.z + lane);
+    hn::Store(hn::Max(load_as<double>(d, from.r + lane), hn::Zero(d)) * scale, d, balls.r + lane);
+  }
+}
+
+void make_patch_of(const TriangleCorners& corners, SurfacePatch& patch) {
+  const DiscTag d;
+  const Real zero = hn::Zero(d), never = hn::Set(d, -1e300);
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    Real e[3], f[3];
+    const auto load = [&](int k, const double(&of)[3][kWidth]) {
+      const Real a = hn::Load(d, of[0] + lane);
+      const Real b = hn::Load(d, of[1] + lane);
+      const Real c = hn::Load(d, of[2] + lane);
+      e[k] = b - a;
+      f[k] = c - a;
+      hn::Store(a, d, patch.corner[0][k] + lane);
+      hn::Store(b, d, patch.corner[1][k] + lane);
+      hn::Store(c, d, patch.corner[2][k] + lane);
+    };
+    load(0, corners.x), load(1, corners.y), load(2, corners.z);
+    PlaneFrame frame;
+    frame_of(e, f, frame);
+    for (int k = 0; k < 3; ++k) {
+      hn::Store(frame.u[k], d, patch.u[k] + lane);
+      hn::Store(frame.v[k], d, patch.v[k] + lane);
+      hn::Store(frame.n[k], d, patch.n[k] + lane);
+      hn::Store(frame.length[k], d, patch.length[k] + lane);
+      hn::Store(frame.edge_x[k], d, patch.edge_x[k] + lane);
+      hn::Store(frame.edge_y[k], d, patch.edge_y[k] + lane);
+    }
+    const auto flat = hn::Not(frame.area > zero);
+    hn::Store(hn::Min(zero, frame.apex_x), d, patch.left + lane);
+    hn::Store(hn::IfThenElse(flat, never, hn::Max(frame.length[0], frame.apex_x)), d,
+              patch.right + lane);
+    hn::Store(hn::IfThenElse(flat, never, frame.apex_y), d, patch.top + lane);
+  }
+}
+
 inline constexpr std::size_t kAtOnce = 64;
-inline constexpr std::size_t kRoom = kAtOnce + 8;
+inline constexpr std::size_t kCapacity = kAtOnce + 8;
 
-/// Volume between surface and sphere, solid angle, area and ∫ (ρ² − |y|²) dA of parts of discs.
+/// Members of DiscPart, for vectors of discs.
 struct alignas(64) Shares {
-  double cones[kRoom], angle[kRoom], area[kRoom], second[kRoom];
+  double cones[kCapacity], angle[kCapacity], area[kCapacity], second[kCapacity];
 };
 
-/// Discs that an edge cuts from side to side.
-struct alignas(64) Chords {
-  double h[kRoom], r[kRoom];  ///< height under the ball's centre and its radius
-  double m[kRoom];            ///< from the foot to the edge, > 0 if the foot is within
-  std::uint32_t ball[kRoom];
-  std::uint32_t triangle[kRoom];
-  double sign[kRoom];
-  Shares lost;  ///< beyond the edge
-  std::size_t size = 0;
-};
-
-/// Discs that contain a corner.
-struct alignas(64) Corners {
-  double h[kRoom], r[kRoom];
-  double x[kRoom], y[kRoom];  ///< the foot in the triangle's plane
-  std::int64_t triangle[kRoom];
-  std::uint32_t ball[kRoom];
-  double sign[kRoom];
-  Shares kept;  ///< within the triangle
+/// Discs that are computed in vectors: cut from side to side (chords), or with a corner inside.
+struct alignas(64) DiscList {
+  double h[kCapacity], r[kCapacity];  ///< height under the ball's centre, and the ball's radius
+  /// Corners: the foot in the triangle's plane. Chords: x is the distance from the foot to the
+  /// edge, > 0 if the foot is within.
+  double x[kCapacity], y[kCapacity];
+  std::int64_t triangle[kCapacity];
+  std::uint32_t ball[kCapacity];
+  double sign[kCapacity];
+  Shares part;  ///< corners: within the triangle; chords: beyond the edge
   std::size_t size = 0;
 };
 
@@ -53,24 +183,24 @@ HWY_INLINE void store(const DiscPart& from, std::size_t i, Shares& to) {
   hn::Store(from.second, d, to.second + i);
 }
 
-/// The segments beyond the chords: the sector over a chord without its triangle.
-HWY_INLINE void measure_chords(Chords& chords) {
+/// The segment beyond a chord is the sector over it without its triangle.
+HWY_INLINE void measure_chords(DiscList& chords) {
   const DiscTag d;
   const Real zero = hn::Zero(d), two = hn::Set(d, 2.0);
   for (std::size_t i = 0; i < chords.size; i += hn::Lanes(d)) {
     const DiscShape disc = disc_shape(hn::Load(d, chords.h + i), hn::Load(d, chords.r + i));
-    const Real m = hn::Load(d, chords.m + i);
+    const Real m = hn::Load(d, chords.x + i);
     const Real half = hn::Sqrt(hn::Max(disc.rho2 - m * m, zero));
     const Real phi = two * angle_of(d, half, m);
     const Real omega = two * angle_of(d, m * half, (disc.h * disc.h + m * m) + disc.h * disc.r);
     DiscPart sums{zero, zero, zero, zero};
     add_triangle(disc, zero - omega, zero - m, zero - half, half, sums);
     add_sector(disc, phi, sums);
-    store(sums, i, chords.lost);
+    store(sums, i, chords.part);
   }
 }
 
-/// The part between the foot and an edge that goes from t1 to t2.
+/// Adds the part between the foot and an edge from t1 to t2.
 HWY_INLINE void add_edge(const DiscShape& disc, Real m, Real t1, Real t2, DiscPart& sums) {
   const DiscTag d;
   const EdgeInDisc in = edge_in_disc(disc, m, t1, t2);
@@ -78,7 +208,7 @@ HWY_INLINE void add_edge(const DiscShape& disc, Real m, Real t1, Real t2, DiscPa
   add_triangle(disc, hn::Set(d, 2.0) * angle_of(d, in.half_y, in.half_x), m, in.low, in.high, sums);
 }
 
-HWY_INLINE void measure_corners(const SurfacePatch& patch, Corners& corners) {
+HWY_INLINE void measure_corners(const SurfacePatch& patch, DiscList& corners) {
   const DiscTag d;
   const hn::RebindToSigned<DiscTag> di;
   const Real zero = hn::Zero(d);
@@ -88,72 +218,66 @@ HWY_INLINE void measure_corners(const SurfacePatch& patch, Corners& corners) {
     const DiscShape disc = disc_shape(hn::Load(d, corners.h + i), hn::Load(d, corners.r + i));
     const Real x = hn::Load(d, corners.x + i), y = hn::Load(d, corners.y + i);
     DiscPart sums{zero, zero, zero, zero};
-    const Real base = of(patch.length[0]);
-    add_edge(disc, y, zero - x, base - x, sums);
-    const auto other = [&](int k, Real px) {
-      const Real ex = of(patch.edge_x[k]), ey = of(patch.edge_y[k]);
-      const Real t = px * ex - y * ey;
-      add_edge(disc, px * ey + y * ex, t, t + of(patch.length[k]), sums);
-    };
-    other(1, base - x);
-    // The third edge ends in the first corner.
-    const Real ex = of(patch.edge_x[2]), ey = of(patch.edge_y[2]);
-    const Real t = zero - (x * ex + y * ey);
-    add_edge(disc, y * ex - x * ey, t - of(patch.length[2]), t, sums);
-    store(sums, i, corners.kept);
+    const Real px = of(patch.length[0]) - x;
+    add_edge(disc, y, zero - x, px, sums);
+    const Real ex1 = of(patch.edge_x[1]), ey1 = of(patch.edge_y[1]), t1 = px * ex1 - y * ey1;
+    add_edge(disc, px * ey1 + y * ex1, t1, t1 + of(patch.length[1]), sums);
+    const Real ex2 = of(patch.edge_x[2]), ey2 = of(patch.edge_y[2]),
+               t2 = zero - (x * ex2 + y * ey2);
+    add_edge(disc, y * ex2 - x * ey2, t2 - of(patch.length[2]), t2, sums);
+    store(sums, i, corners.part);
   }
 }
 
-/// Adds `share` of triangle t inside ball b.
-HWY_INLINE void add_share(const SurfacePatch& patch, std::size_t t, std::size_t b, double sign,
-                          double cones, double angle, double area, double second, ProbeSums& sums) {
-  sums.cones[b] += sign * cones;
-  sums.angle[b] += sign * angle;
-  sums.area[b] += area;
+/// Adds a part of triangle t's plane in ball b.
+HWY_INLINE void add_part(const SurfacePatch& patch, std::size_t t, std::size_t b, double sign,
+                         const disc::DiscPart& part, ProbeSums& sums) {
+  sums.cones[b] += sign * part.cones;
+  sums.angle[b] += sign * part.angle;
+  sums.area[b] += part.area;
   for (int k = 0; k < 3; ++k) {
-    sums.pull[k][b] += patch.n[k][t] * area;
-    sums.shift[k][b] += patch.n[k][t] * (0.5 * second);
+    sums.pull[k][b] += patch.n[k][t] * part.area;
+    sums.shift[k][b] += patch.n[k][t] * (0.5 * part.second);
   }
 }
 
 /// Lanes beyond the last must be numbers.
-template <class List>
-HWY_INLINE std::size_t fill_up(List& list) {
-  const std::size_t end = (list.size + 7) / 8 * 8;
-  for (std::size_t i = list.size; i < end; ++i) {
-    list.h[i] = 0;
+HWY_INLINE void fill_up(DiscList& list) {
+  for (std::size_t i = list.size; i < (list.size + 7) / 8 * 8; ++i) {
+    list.h[i] = list.x[i] = list.y[i] = 0;
     list.r[i] = 1;
     list.triangle[i] = 0;
   }
-  return end;
 }
 
-HWY_NOINLINE void take_chords(const SurfacePatch& patch, Chords& chords, ProbeSums& sums) {
-  const std::size_t end = fill_up(chords);
-  for (std::size_t i = chords.size; i < end; ++i) chords.m[i] = 0;
+/// Adds the computed parts, times `factor`, and empties the list.
+HWY_INLINE void add_parts(const SurfacePatch& patch, double factor, DiscList& list,
+                          ProbeSums& sums) {
+  const Shares& part = list.part;
+  for (std::size_t i = 0; i < list.size; ++i)
+    add_part(patch, static_cast<std::size_t>(list.triangle[i]), list.ball[i], list.sign[i],
+             {factor * part.cones[i], factor * part.angle[i], factor * part.area[i],
+              factor * part.second[i]},
+             sums);
+  list.size = 0;
+}
+
+HWY_NOINLINE void take_chords(const SurfacePatch& patch, DiscList& chords, ProbeSums& sums) {
+  fill_up(chords);
   measure_chords(chords);
-  const Shares& lost = chords.lost;
-  for (std::size_t i = 0; i < chords.size; ++i)
-    add_share(patch, chords.triangle[i], chords.ball[i], chords.sign[i], -lost.cones[i],
-              -lost.angle[i], -lost.area[i], -lost.second[i], sums);
-  chords.size = 0;
+  add_parts(patch, -1, chords, sums);
 }
 
-HWY_NOINLINE void take_corners(const SurfacePatch& patch, Corners& corners, ProbeSums& sums) {
-  const std::size_t end = fill_up(corners);
-  for (std::size_t i = corners.size; i < end; ++i) corners.x[i] = corners.y[i] = 0;
+HWY_NOINLINE void take_corners(const SurfacePatch& patch, DiscList& corners, ProbeSums& sums) {
+  fill_up(corners);
   measure_corners(patch, corners);
-  const Shares& kept = corners.kept;
-  for (std::size_t i = 0; i < corners.size; ++i)
-    add_share(patch, static_cast<std::size_t>(corners.triangle[i]), corners.ball[i],
-              corners.sign[i], kept.cones[i], kept.angle[i], kept.area[i], kept.second[i], sums);
-  corners.size = 0;
+  add_parts(patch, 1, corners, sums);
 }
 
-/// Sorts a ball that comes near a triangle: it misses it, its disc lies within, edges cut the disc
-/// from side to side, or it contains a corner.
+/// Classifies a ball near a triangle: it misses it, its disc lies within, edges cut the disc from
+/// side to side, or the disc contains a corner.
 HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t b, double height,
-                          double x, double y, double r, Chords& chords, Corners& corners,
+                          double x, double y, double r, DiscList& chords, DiscList& corners,
                           ProbeSums& sums) {
   double length[3], edge_x[3], edge_y[3];
   for (int k = 0; k < 3; ++k) {
@@ -167,37 +291,30 @@ HWY_INLINE void sort_disc(const SurfacePatch& patch, std::size_t t, std::size_t 
   if (found.is_apart) return;
   sums.meet(b);
   ++sums.pairs;
-  const double h = std::abs(height), sign = height > 0 ? 1 : -1;
+  const auto append = [&](DiscList& list, double at_x, double at_y) {
+    const std::size_t i = list.size++;
+    list.h[i] = std::abs(height), list.r[i] = r;
+    list.x[i] = at_x, list.y[i] = at_y;
+    list.triangle[i] = static_cast<std::int64_t>(t);
+    list.ball[i] = static_cast<std::uint32_t>(b);
+    list.sign[i] = height > 0 ? 1 : -1;
+    return list.size == kAtOnce;
+  };
   if (found.has_corner) {
-    const std::size_t i = corners.size++;
-    corners.h[i] = h, corners.r[i] = r;
-    corners.x[i] = x, corners.y[i] = y;
-    corners.triangle[i] = static_cast<std::int64_t>(t);
-    corners.ball[i] = static_cast<std::uint32_t>(b);
-    corners.sign[i] = sign;
-    if (corners.size == kAtOnce) take_corners(patch, corners, sums);
+    if (append(corners, x, y)) take_corners(patch, corners, sums);
     return;
   }
-  // No corner within: the disc is whole, but for the segments that are cut off; where the foot is
-  // outside and no edge cuts, there is nothing.
+  // The disc contains no corner: it is whole without the segments that edges cut off, or outside.
   if (found.through == 0 && found.is_outside) return;
-  const auto all = disc.whole();
-  add_share(patch, t, b, 1, all.cones, all.angle, all.area, all.second, sums);
-  for (int k = 0; k < 3; ++k) {
-    if ((found.through >> k & 1) == 0) continue;
-    const std::size_t i = chords.size++;
-    chords.h[i] = h, chords.r[i] = r, chords.m[i] = disc.distance(k);
-    chords.ball[i] = static_cast<std::uint32_t>(b);
-    chords.triangle[i] = static_cast<std::uint32_t>(t);
-    chords.sign[i] = sign;
-    if (chords.size == kAtOnce) take_chords(patch, chords, sums);
-  }
+  add_part(patch, t, b, 1, disc.whole(), sums);
+  for (int k = 0; k < 3; ++k)
+    if ((found.through >> k & 1) != 0 && append(chords, disc.distance(k), 0))
+      take_chords(patch, chords, sums);
 }
 
 void add_patch_to(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
                   std::uint32_t chosen, ProbeSums& sums) {
-  Chords chords;
-  Corners corners;
+  DiscList chords, corners;
   alignas(64) double height[kWidth], x[kWidth], y[kWidth];
   if (hwy::PopCount(triangles) <= hwy::PopCount(chosen)) {
     for (; triangles != 0; triangles &= triangles - 1) {
@@ -231,6 +348,23 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(add_patch_to);
+HWY_EXPORT(make_patch_of);
+HWY_EXPORT(near_of);
+HWY_EXPORT(place_probes_of);
+
+void place_probes(const SphereTree& probes, int level, std::uint32_t block, const Similarity& map,
+                  ProbeBalls& balls) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_probes_of)(probes, level, block, map, balls);
+}
+
+std::uint32_t triangles_near(const SurfacePatch& patch, const double (&centre)[3],
+                             double radius) noexcept {
+  return HWY_DYNAMIC_DISPATCH(near_of)(patch, centre, radius);
+}
+
+void make_patch(const TriangleCorners& corners, SurfacePatch& patch) noexcept {
+  HWY_DYNAMIC_DISPATCH(make_patch_of)(corners, patch);
+}
 
 ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexcept {
   ProbeBalls moved = balls;

@@ -8,20 +8,18 @@
 
 namespace ist {
 
-/// The effect of the surface on each of sixteen balls, all factors included. Valid for balls that
-/// touch it.
+/// Integrals over the surface inside each of sixteen balls. Valid for balls in `met`.
 struct ProbeSums {
-  double cones[kWidth];    ///< volume between the surface inside the ball and the ball's own
-  double angle[kWidth];    ///< solid angle of that surface, seen from the centre: > 0 if it is seen
-                           ///< from outside
-  double area[kWidth];     ///< of that surface
-  double pull[3][kWidth];  ///< ∫ n dA over it
+  double cones[kWidth];     ///< volume between the surface and the ball's own
+  double angle[kWidth];     ///< solid angle from the centre, > 0 if that sees the outer side
+  double area[kWidth];      ///< of the surface
+  double pull[3][kWidth];   ///< ∫ n dA over it
   double shift[3][kWidth];  ///< ½ ∫ (r² − |y − centre|²) n dA over it
-  std::uint32_t met = 0;    ///< a bit a ball that a triangle may meet
-  /// A bit a ball whose centre all but lies on an edge: rounding decides from where it sees the
-  /// triangles there, and `cones` and `angle` are worth nothing (away_from_edges).
+  std::uint32_t met = 0;    ///< a bit for each ball that a triangle may intersect
+  /// A bit for each ball whose centre is so close to an edge that rounding decides its side of the
+  /// triangles: `cones` and `angle` are meaningless (off_edges).
   std::uint32_t on_edge = 0;
-  std::uint32_t pairs = 0;  ///< balls and triangles that were put together
+  std::uint32_t pairs = 0;  ///< of balls and triangles that were computed
 
   void meet(std::size_t ball) noexcept {
     if ((met >> ball & 1) != 0) return;
@@ -31,31 +29,29 @@ struct ProbeSums {
   }
 };
 
-/// Adds the patch's share to the sums. Once all triangles that reach a ball are added, the part of
-/// it inside the closed surface has the volume [centre inside] · v + cones, the gradient −pull by
-/// the centre, and the first moment −shift about the centre. Exact but for rounding, some 1e-15 of
-/// r³. Same bits on every instruction set.
+/// Adds the patch's integrals. Once all triangles that reach a ball are added, its part inside the
+/// closed surface has the volume [centre inside] · v + cones, the gradient −pull by the centre, and
+/// the first moment −shift about the centre. Exact but for rounding, some 1e-15 of r³. Same bits on
+/// every instruction set.
 ///
-/// By rays from the centre: each triangle takes away, or adds where it is seen from outside, the
-/// part of its cone between itself and the sphere, (r³ Ω − h A) / 3 over the part within the ball.
+/// By rays from the centre: each triangle subtracts, or adds where its outer side is seen, the part
+/// of its cone between itself and the sphere, (r³ Ω − h A) / 3 over its part within the ball.
 ///
-/// `triangles`: those to look at, a bit each; all that come near one of the balls. `chosen`: the
-/// balls to look at. A vector goes over the balls or over the triangles, whichever are more.
+/// `triangles`, `chosen`: a bit for each triangle and ball to use; all triangles that come near one
+/// of these balls. A vector goes over the balls or the triangles, whichever are more.
 void add_patch(const SurfacePatch& patch, std::uint32_t triangles, const ProbeBalls& balls,
                std::uint32_t chosen, ProbeSums& sums) noexcept;
 
-/// The chosen balls moved by some 2e-4 of their radii, where their centres see each edge from one
-/// side; the others get a radius of 0.
+/// The chosen balls, moved off edges by some 2e-4 of their radii; the others get a radius of 0.
 ProbeBalls away_from_edges(const ProbeBalls& balls, std::uint32_t chosen) noexcept;
 
-/// Puts right `cones` and `angle` of the balls on edges by their sums where they were moved to. The
-/// angle is that of the moved ball; the volume is good to some 1e-11 of r³, being smooth in the
-/// centre: by the mean of both gradients it misses no more than the third derivative.
+/// Corrects `cones` and `angle` of the balls on edges by the sums of the moved balls. The angle is
+/// the moved ball's. The volume is smooth in the centre, so the mean of both gradients takes it
+/// back to some 1e-11 of r³: the error is of the third derivative.
 void put_right(const ProbeSums& moved, const ProbeBalls& balls, ProbeSums& sums) noexcept;
 
-/// Puts the balls on edges right, once all triangles are added. `add(moved, there)` adds to `there`
-/// all that comes near them where they were moved to. Returns the balls with the centres by which
-/// their sides are to be told.
+/// Corrects the balls on edges once all triangles are added. `add(moved, there)` adds to `there`
+/// all triangles near the moved balls. Returns the balls with the centres that decide their sides.
 template <class Add>
 ProbeBalls off_edges(const ProbeBalls& balls, ProbeSums& sums, const Add& add) noexcept {
   if (sums.on_edge == 0) return balls;

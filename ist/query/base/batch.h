@@ -8,45 +8,33 @@
 
 namespace ist {
 
-/// Items that the workers of a pool answer: answer(i, worker) answers the i-th.
-template <class Answer>
-class Batch {
- public:
-  Batch(std::size_t count, const Answer& answer) noexcept : count_(count), answer_(answer) {}
-
-  /// Answers items as long as there are any. Which worker answers one changes nothing of it.
-  static void work(void* context, std::size_t worker) {
-    Batch& batch = *static_cast<Batch*>(context);
-    for (;;) {
-      const std::size_t begin = batch.next_.fetch_add(kTaken, std::memory_order_relaxed);
-      if (begin >= batch.count_) return;
-      for (std::size_t i = begin; i < std::min(begin + kTaken, batch.count_); ++i)
-        batch.answer_(i, worker);
-    }
-  }
-
- private:
-  // Items that a worker takes at a time: enough that the counter is not what it waits for.
-  static constexpr std::size_t kTaken = 4;
-
-  std::size_t count_;
-  const Answer& answer_;
-  std::atomic<std::size_t> next_ = 0;
-};
-
-/// answer(i, worker) for each i in [0, count), by `workers` > 0 workers at most.
+/// Calls answer(i, worker) for each i in [0, count), on at most `workers` > 0 workers.
 template <class Answer>
 void answer_all(std::size_t count, std::size_t workers, const ParallelFor& parallel,
                 const Answer& answer) noexcept {
-  Batch<Answer> batch(count, answer);
+  struct Batch {
+    std::size_t count;
+    const Answer& answer;
+    std::atomic<std::size_t> next = 0;
+  } all{count, answer};
+  const auto work = [](void* context, std::size_t worker) {
+    constexpr std::size_t kTaken = 4;  // at a time, so that workers do not wait for the counter
+    Batch& batch = *static_cast<Batch*>(context);
+    for (;;) {
+      const std::size_t begin = batch.next.fetch_add(kTaken, std::memory_order_relaxed);
+      if (begin >= batch.count) return;
+      for (std::size_t i = begin; i < std::min(begin + kTaken, batch.count); ++i)
+        batch.answer(i, worker);
+    }
+  };
   if (parallel.run == nullptr) {
-    Batch<Answer>::work(&batch, 0);
+    work(&all, 0);
   } else if (count > 0) {
-    parallel.run(parallel.pool, std::min(workers, count), Batch<Answer>::work, &batch);
+    parallel.run(parallel.pool, std::min(workers, count), work, &all);
   }
 }
 
-/// The answer of a batch that had no workspace.
+/// The answers of a batch without workspaces.
 inline Penetration unknown_penetration() noexcept {
   Penetration unknown;
   unknown.volume_max = std::numeric_limits<double>::infinity();

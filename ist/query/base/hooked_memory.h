@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// Memory of a caller's hooks, or of operator new. Throws std::bad_alloc.
+/// Allocates by a caller's hooks, or by operator new without hooks. Throws std::bad_alloc.
 inline void* take_memory(const MemoryHooks& hooks, std::size_t bytes, std::size_t alignment) {
   if (hooks.allocate == nullptr) return ::operator new(bytes, std::align_val_t(alignment));
   void* const memory = hooks.allocate(hooks.context, bytes, alignment);
@@ -38,7 +38,7 @@ struct HookedRelease {
 template <class T>
 using HookedArray = std::unique_ptr<T[], HookedRelease>;
 
-/// Room for `count` values, not touched before use: what is large costs address space, not memory.
+/// An uninitialised array: pages that are never used cost address space, not memory.
 template <class T>
 HookedArray<T> hooked_array(const MemoryHooks& hooks, std::size_t count) {
   static_assert(std::is_trivially_destructible_v<T>);
@@ -50,7 +50,7 @@ HookedArray<T> hooked_array(const MemoryHooks& hooks, std::size_t count) {
 template <class T>
 using Hooked = std::unique_ptr<T, HookedRelease>;
 
-/// One value, made as the defaults of its members have it.
+/// One default-initialised value.
 template <class T>
 Hooked<T> hooked(const MemoryHooks& hooks) {
   T* const value = new (hooked_array<T>(hooks, 1).release()) T;

@@ -7,14 +7,13 @@
 #include <ist/shapes.h>
 #include <ist/time_of_impact.h>
 
-// Answers to what cannot be asked: every number is NaN, which nobody takes for no contact.
+// Answers of failed queries: every number is NaN, which cannot be mistaken for no contact.
 
 namespace ist {
 
-/// The numbers of an answer that cannot be given.
 inline constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// It is a mesh alone.
+/// True if the asset is a mesh alone.
 inline bool lacks_spheres(const AssetView& tree) noexcept {
   return !tree.empty() && tree.sphere_count() == 0;
 }

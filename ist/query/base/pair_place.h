@@ -8,18 +8,16 @@
 #include "base/vec3.h"
 #include "query/asset/shared_constants.h"
 
-// Where two placed solids are, in plain numbers: on the CPU and on the GPU.
+// The relative pose of two placed solids in plain numbers, on the CPU and on the GPU.
 
 namespace ist {
 
-/// The range of poses, points and motions: no coordinate of one thing in the other's unit frame
-/// exceeds kFarthestPose.
+/// True if no coordinate exceeds kFarthestPose.
 IST_HD inline bool in_pose_range(const Vec3& x) noexcept {
   for (int k = 0; k < 3; ++k)
     if (!(x[k] <= kFarthestPose) || !(x[k] >= -kFarthestPose)) return false;
   return true;
 }
-/// The range of ratios of two sizes.
 IST_HD inline bool ratio_in_range(double ratio) noexcept {
   return ratio <= kFarthestPose && ratio >= 1 / kFarthestPose;
 }
@@ -56,7 +54,7 @@ struct Similarity {
       y[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2] + t[i];
   }
 
-  // For the GPU, where a fused product is one instruction.
+  // On the GPU a fused product is one instruction.
   IST_HD void apply_fused(const double (&x)[3], double (&y)[3]) const {
     for (int i = 0; i < 3; ++i) y[i] = fused(i, x, t[i]);
   }
@@ -72,14 +70,14 @@ struct Similarity {
   }
 };
 
-/// How a number grows with motions of B, A's unit frame.
+/// The gradient of a number by motions of B, in A's unit frame.
 struct PoseSlope {
   Vec3 by_translation = {0, 0, 0};
   Vec3 by_rotation = {0, 0, 0};  ///< about B's unit-frame origin
 };
 
-/// How quotients by one number are formed: the CPU divides; the GPU, to which a division is a dozen
-/// instructions, divides once.
+/// The CPU divides each component of a vector; the GPU, where a division takes a dozen
+/// instructions, multiplies by the reciprocal.
 enum class Quotients { divided, by_reciprocal };
 
 template <Quotients kBy>
@@ -93,7 +91,7 @@ struct Rotation {
   double w;
   Vec3 v;
 
-  /// Normalises. NaN if the length is out of range.
+  /// Normalises q; NaN if its length is out of range.
   template <Quotients kBy = Quotients::divided>
   IST_HD static Rotation of(const double (&q)[4]) noexcept {
     const double norm = std::sqrt((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
@@ -116,13 +114,12 @@ struct Rotation {
   IST_HD void matrix(double (&m)[9]) const { formulas::rotation_matrix(w, v, m); }
 };
 
-/// Whether a pose and a scale are valid, apart from the range above.
+/// True if a pose and a scale are valid, apart from the ranges above.
 IST_HD inline bool usable(const Rotation& rotation, const double (&t)[3], double scale) noexcept {
   return std::isfinite(rotation.w) && std::isfinite(t[0]) && std::isfinite(t[1]) &&
          std::isfinite(t[2]) && scale > 0 && std::isfinite(scale);
 }
 
-/// The data of a solid that a relative pose needs.
 struct AssetFrame {
   Vec3 centre;  ///< [u] origin of the unit frame
   double unit;  ///< [u]
@@ -142,7 +139,7 @@ struct PairPlace {
   Vec3 offset_b;         ///< [u] from B's origin to its unit frame's, world
   double unit_a;         ///< [u] length of one unit of A's unit frame
 
-  /// False where a pose or scale cannot be used (QueryStatus::invalid_input).
+  /// False if a pose or scale is not usable (QueryStatus::invalid_input).
   template <Quotients kBy = Quotients::divided>
   IST_HD bool place(const AssetFrame& a, const Pose& pose_a, double scale_a, const AssetFrame& b,
                     const Pose& pose_b, double scale_b) noexcept {
@@ -178,10 +175,10 @@ struct PairPlace {
 
   IST_HD double unit3() const noexcept { return unit_a * unit_a * unit_a; }  ///< [u³]
 
-  /// By how much the world's coordinates may be rounded, A's unit frame.
+  /// Bound on the rounding of world coordinates, A's unit frame.
   IST_HD double rounding_of_world() const noexcept { return 1e-15 * norm(origin_a) / unit_a; }
 
-  /// [u] Of a point of A's unit frame.
+  /// [u] The world position of a point of A's unit frame.
   IST_HD Vec3 to_world(const Vec3& x) const noexcept {
     return turned(rotation_a, unit_a * x) + origin_a;
   }

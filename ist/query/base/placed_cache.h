@@ -8,8 +8,7 @@
 
 namespace ist {
 
-/// The most recently placed blocks: slot n % kPlaces stores the last block whose number has that
-/// remainder. Call forget() before the first use.
+/// A direct-mapped cache of placed blocks. Call forget() before the first use.
 template <class T, std::uint32_t kPlaces>
 struct PlacedCache {
   std::uint32_t number[kPlaces];
@@ -17,7 +16,7 @@ struct PlacedCache {
 
   void forget() noexcept { std::fill_n(number, kPlaces, kNoIndex); }
 
-  /// The slot of number n, and whether it contains what was placed under n.
+  /// The slot of block n, and whether it contains that block.
   std::pair<T&, bool> find(std::uint32_t n) noexcept {
     return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
   }

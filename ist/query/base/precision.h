@@ -7,12 +7,11 @@
 
 namespace ist {
 
-/// Digits of the arithmetic inside a block. Float serves unless one object is far smaller than the
-/// other.
+/// Arithmetic inside a block is in float unless one solid is far smaller than the other.
 enum class Precision { float32, float64 };
 
-/// How far rounding may move a distance that is computed from coordinates of this magnitude: each
-/// coordinate comes out of a three-term product, a sum and a difference, then a norm.
+/// Bound on the rounding of a distance between points with coordinates of this magnitude: each
+/// coordinate takes a three-term product, a sum and a difference.
 IST_HD constexpr double distance_error(Precision precision, double magnitude) {
   return 12 * (precision == Precision::float32 ? 0x1p-24 : 0x1p-53) * magnitude;
 }
@@ -29,7 +28,7 @@ IST_HD inline Precision precision_for(const RootBall& a, const RootBall& b, doub
                                                               : Precision::float64;
 }
 
-/// Diameter of a region that contains both trees, A's unit frame.
+/// The diameter of a region that contains both trees, A's unit frame.
 IST_HD inline double span(const RootBall& a, const RootBall& b,
                           const Similarity& a_from_b) noexcept {
   double moved[3], sum = 0;
@@ -38,8 +37,7 @@ IST_HD inline double span(const RootBall& a, const RootBall& b,
   return sum + 2 * (a.reach() + a_from_b.scale * b.reach());
 }
 
-/// A gap is measured from block to block, and its rounding grows with their distance: float as long
-/// as that is no more than a few sizes of the objects.
+/// A gap's rounding grows with the distance of blocks: float serves up to a few sizes of solids.
 IST_HD inline Precision precision_for_gap(const RootBall& a, const RootBall& b,
                                           const Similarity& a_from_b) noexcept {
   const double sizes = a.r + a_from_b.scale * b.r;

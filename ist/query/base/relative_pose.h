@@ -17,6 +17,12 @@ Eigen::Vector3d vector(const Point& p) noexcept {
 }
 inline Vec3 plain(const Eigen::Vector3d& v) noexcept { return {v.x(), v.y(), v.z()}; }
 
+inline Eigen::Vector3d mapped(const Similarity& map, const double (&x)[3]) noexcept {
+  double y[3];
+  map.apply(x, y);
+  return vector(y);
+}
+
 /// PairPlace of two placed trees, or of a shape and a tree.
 struct RelativePose : PairPlace {
   /// World from A.
@@ -31,7 +37,7 @@ struct RelativePose : PairPlace {
 /// Normalised; empty if pose or scale is not usable (QueryStatus::invalid_input).
 std::optional<Eigen::Quaterniond> usable_rotation(const Pose& pose, double scale) noexcept;
 
-/// Normalised, whether it is usable or not.
+/// Normalised; NaN if the quaternion is not usable.
 inline Eigen::Quaterniond unit_rotation(const Pose& pose) noexcept {
   const Rotation r = Rotation::of(pose.q);
   return {r.w, r.v.x, r.v.y, r.v.z};
@@ -40,7 +46,7 @@ inline Eigen::Quaterniond unit_rotation(const Pose& pose) noexcept {
 /// Empty if a pose or scale is not usable (QueryStatus::invalid_input) or a tree is empty.
 std::optional<RelativePose> relative_pose(const PlacedAsset& a, const PlacedAsset& b) noexcept;
 
-/// The same where A is no tree: its unit frame is its own.
+/// The same for a shape A, whose unit frame is its own frame.
 std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
                                           const PlacedAsset& b) noexcept;
 

@@ -9,7 +9,7 @@
 
 namespace ist {
 
-/// [u³] At most, of a solid.
+/// [u³] An upper bound.
 inline double volume_of(const PlacedAsset& placed) noexcept {
   const AssetHeader& asset = placed.asset.header();
   return std::ldexp(asset.volume + asset.volume_error, 3 * asset.exponent) *
@@ -20,7 +20,7 @@ inline double smaller_volume(const PlacedAsset& a, const PlacedAsset& b) noexcep
   return std::min(volume_of(a), volume_of(b));
 }
 
-/// The true volume lies between nothing and the smaller solid's; what spheres say may be more.
+/// Bounds the volume by 0 and the smaller solid's volume, or by the spheres' sum if that is larger.
 inline void bound_by_solids(const PlacedAsset& a, const PlacedAsset& b,
                             Penetration& answer) noexcept {
   answer.volume_min = 0;

@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// A float that is lower, by more than what doubles round.
+/// A float below x, by more than the rounding of doubles.
 IST_HD inline float float_below(double x) noexcept {
   const auto nearest = static_cast<float>(x);
   return nearest - ::fabsf(nearest) * 1.2e-7f - 1e-37f;
@@ -18,7 +18,7 @@ struct WorldBox {
 
   static constexpr double kMost = 1e37;
 
-  /// Whether floats can hold it.
+  /// True if floats can represent it.
   IST_HD bool fits() const noexcept {
     for (int k = 0; k < 3; ++k)
       if (!(low[k] >= -kMost) || !(high[k] <= kMost)) return false;
@@ -34,12 +34,12 @@ struct WorldBox {
   }
 };
 
-/// What of a solid's box does not change with its pose: in the solid's own frame.
+/// The box of a solid in its own frame, and its margins.
 struct SolidBox {
   Vec3 middle = {0, 0, 0}, half = {0, 0, 0};  ///< [u]
   double protrusion = 0;                      ///< [u] of matched spheres out of the solid
   double mesh_error = 0;                      ///< [u]
-  bool endless = false;                       ///< there is no box
+  bool endless = false;                       ///< no box bounds it
   bool is_shape = false;
   bool empty = false;
 
@@ -49,7 +49,7 @@ struct SolidBox {
     protrusion *= s;
     mesh_error *= s;
   }
-  /// Wider by so much [u] on each side.
+  /// The world's box around it, wider by `wider` [u] on each side.
   IST_HD WorldBox placed(const Rotation& rotation, const double (&t)[3],
                          double wider) const noexcept {
     WorldBox box;

@@ -5,9 +5,8 @@ namespace ist {
 std::uint32_t version() noexcept { return IST_VERSION; }
 
 bool serves(std::uint32_t headers) noexcept {
-  constexpr std::uint32_t kLine =
-      IST_VERSION_MAJOR > 0 ? 10000 : 100;  // what breaks nothing inside
-  return headers / kLine == IST_VERSION / kLine && headers <= IST_VERSION;
+  constexpr std::uint32_t kCompatible = IST_VERSION_MAJOR > 0 ? 10000 : 100;
+  return headers / kCompatible == IST_VERSION / kCompatible && headers <= IST_VERSION;
 }
 
 }  // namespace ist

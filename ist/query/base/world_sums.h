@@ -4,16 +4,15 @@
 
 namespace ist {
 
-/// A number's slope by rotations about another origin, and by motions of A instead of B. `arm`: [u]
-/// from that origin to this.
+/// The gradient by rotations of A about another origin. `arm`: [u] from that origin to this.
 IST_HD inline Vec3 turned_over(const Vec3& arm, const Vec3& push, const Vec3& turn) noexcept {
   return -(turn + cross(arm, push));
 }
 
-/// An overlap or a part of it in world units, as Penetration has it.
+/// An overlap or a part of it in world units.
 struct WorldSums {
   double volume;
-  Vec3 centroid;              ///< zero if there is no volume
+  Vec3 centroid;              ///< zero without volume
   Vec3 translation_gradient;  ///< by a motion of B
   Vec3 rotation_gradient;     ///< likewise, about B's origin
 

@@ -11,46 +11,46 @@
 
 namespace ist {
 
-/// What one node of the binned tree has of the overlap.
+/// The part of the overlap in one node of the binned tree.
 struct ContactBin {
   std::uint32_t node;  ///< block of the bins' level
   Overlap sum;
   double pull;             ///< |sum.force|
-  Eigen::Vector3d centre;  ///< of sum's volume; zero if that is 0
+  Eigen::Vector3d centre;  ///< of sum.volume; zero without volume
 };
 
-/// Part of a contact while it is divided: a region of the tree, and bins, order[begin … end).
+/// A part of a contact while it is divided: a region of the tree, and bins order[begin … end).
 struct ContactPart {
-  double loss = 0;  ///< what taking it for one patch loses; the largest is divided next
+  double loss = 0;  ///< error of one patch in its place; the largest is divided next
   std::uint64_t id = 0;
   TreeRegion region;
   std::uint32_t begin = 0, end = 0;
 };
 
-/// The sums of a query sorted by the nodes of one of the two trees, at one level of it: scratch of
-/// contact_patches, part of a Workspace. Memory is not touched before use.
+/// The sums of a query by the nodes of one level of one of its trees: scratch of contact_patches(),
+/// part of a Workspace. Memory is not touched before use.
 class ContactBins {
  public:
   static constexpr std::uint32_t kBins = kMostContactBins;
 
   explicit ContactBins(const MemoryHooks& memory);
 
-  /// Empties the bins. They are those of B if `of_b`: its leaf blocks, or the nodes of the first
-  /// level of no more than kBins.
+  /// Empties the bins. They are the tree's leaf blocks, or the nodes of its first level of no more
+  /// than kBins. `of_b`: the tree is B's.
   void start(const SphereTree& tree, bool of_b) noexcept;
 
-  /// Where the sums of these pairs of leaves or spheres go.
+  /// Marks the bins of these pairs of leaves or spheres.
   LeafBinning touch(int level_a, const std::uint32_t* a, int level_b, const std::uint32_t* b,
                     std::size_t n) noexcept;
 
-  /// Keeps what a pair of nodes holds or may hold that is not opened, in the first bin below it.
+  /// Adds the known or estimated overlap of an unopened pair of nodes to the first bin below it.
   void add_guess(int level_a, std::uint32_t a, int level_b, std::uint32_t b,
                  const Overlap& guess) noexcept;
 
-  /// Forgets all but the guesses.
+  /// Clears all but the guesses.
   void forget_sums() noexcept;
 
-  /// Adds up every bin that holds anything, in order of nodes; returns how many.
+  /// Finishes every bin that is not empty, in order of nodes; returns how many.
   std::uint32_t collect(Precision precision) noexcept;
 
   const SphereTree& tree() const noexcept { return *tree_; }
@@ -66,8 +66,8 @@ class ContactBins {
  private:
   void mark(std::uint32_t bin) noexcept;
 
-  HookedArray<LeafSums> sums_;    ///< [kBins] made when a bin is first marked, as are
-  HookedArray<Overlap> guesses_;  ///< [kBins]
+  HookedArray<LeafSums> sums_;    ///< [kBins] constructed when a bin is first marked
+  HookedArray<Overlap> guesses_;  ///< [kBins] likewise
   HookedArray<ContactBin> bins_;  ///< [kBins]
   HookedArray<ContactPart> parts_;
   HookedArray<std::uint32_t> order_, spare_;

@@ -9,11 +9,11 @@
 
 namespace ist {
 
-/// Bins of a contact, at most: 65,536 spheres by leaf blocks.
+/// The largest number of bins of a contact: leaf blocks of 65,536 spheres.
 inline constexpr std::uint32_t kMostContactBins = 4096;
 
-/// A side of a division with less than this share of the whole contact's pull is no patch of its
-/// own: what comes and goes at the rim of a contact must not rename its patches.
+/// A side of a division with less than this share of the contact's pull is no patch of its own:
+/// small parts that come and go at the rim must not rename the patches.
 inline constexpr double kLeastContactShare = 0.01;
 
 /// A pull that another cancels costs as much as if it acted half a radius of the solid away.
@@ -22,13 +22,11 @@ inline constexpr double kContactBend = 0.25;
 /// Solids of fewer leaf blocks than this are too coarse to be divided, if the other is finer.
 inline constexpr std::uint32_t kFewContactBlocks = 16;
 
-/// What lies wholly inside is pushed nowhere but by rounding: an area of no more than this share of
-/// volume^(2/3).
+/// An area of no more than this share of volume^(2/3) is rounding: the solid lies wholly inside.
 inline constexpr double kPushRounding = 1e-9;
 
-/// Whether contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
-/// own corners while it slides, or the only one fine enough. The pose has no say. `blocks_…`: leaf
-/// blocks.
+/// True if contacts are divided along B's tree: the smaller solid's, whose contacts stay with its
+/// corners while it slides, or the only one that is fine enough by its leaf blocks.
 IST_HD inline bool divides_b(std::uint32_t blocks_a, double radius_a, std::uint32_t blocks_b,
                              double radius_b) noexcept {
   const std::uint32_t fewer = blocks_a < blocks_b ? blocks_a : blocks_b;
@@ -41,7 +39,7 @@ struct PatchAxis {
   Vec3 point, normal;
   double area, depth, torsion;
 
-  /// `origin`: [u] that the torque is about; `deepest`: [u] what the depth is held under.
+  /// `origin`: [u] that the torque is about; `deepest`: [u] upper limit of the depth.
   IST_HD static PatchAxis of(double volume, const Vec3& centroid, const Vec3& force,
                              const Vec3& torque, const Vec3& origin, double deepest) noexcept {
     PatchAxis axis = {centroid, {0, 0, 0}, 0, 0, 0};

@@ -18,8 +18,8 @@ struct TreeRegion {
   int level = 0;
 };
 
-/// Where a tree is divided into regions, again and again, down to the nodes of one level. The tree
-/// alone decides, so that a region is the same in every query of it.
+/// The recursive division of a tree into regions, down to the nodes of one level. It depends on the
+/// tree alone, so regions are the same in every query.
 class TreeCuts {
  public:
   explicit TreeCuts(const SphereTree& tree) noexcept : tree_(tree), bin_level_(bin_level(tree)) {}
@@ -35,11 +35,11 @@ class TreeCuts {
 
   TreeRegion root() const noexcept { return {1, 0, tree_.top}; }
 
-  static bool holds(std::uint64_t members, std::uint32_t i) noexcept {
+  static bool has_member(std::uint64_t members, std::uint32_t i) noexcept {
     return i < kMembers && (members >> i & 1) != 0;
   }
 
-  /// Goes down to the first nodes among which there is something to choose; false if none.
+  /// Descends to the first level with more than one member; false if there is none.
   bool open(TreeRegion& region) const noexcept {
     const auto go_down = [&](std::uint32_t node, std::uint32_t nodes) {
       --region.level;
@@ -58,7 +58,7 @@ class TreeCuts {
     return true;
   }
 
-  /// The members of an open region on one side of where they fall apart.
+  /// The members of an open region on one side of its best cut.
   std::uint64_t cut(const TreeRegion& region) const noexcept {
     struct Member {
       Eigen::Vector3d centre;
@@ -78,7 +78,7 @@ class TreeCuts {
       moment += cube * members[count - 1].centre;
     }
 
-    // Along the line through two of the farthest …
+    // The cut is across the line through two far members …
     const auto farthest_from = [&](const Eigen::Vector3d& x) {
       std::uint32_t farthest = 0;
       double most = -1;
@@ -102,7 +102,7 @@ class TreeCuts {
       return l.along != r.along ? l.along < r.along : l.member < r.member;
     });
 
-    // … at the least sum of squares about both sides' means: they differ only in −|Σ w x|²/Σ w.
+    // … where the sum of squares about both sides' means is least: it varies by −|Σ w x|²/Σ w.
     double best = -std::numeric_limits<double>::infinity();
     std::uint64_t best_side = 0, side = 0;
     double near = 0;
@@ -121,8 +121,7 @@ class TreeCuts {
     return best_side != 0 ? best_side : region.members & -region.members;
   }
 
-  /// First leaf block of the members and how many there are: unique among sets of which any two are
-  /// nested or apart.
+  /// The first leaf block and their number: unique, as any two regions are nested or disjoint.
   std::uint64_t id(const TreeRegion& region) const noexcept {
     std::uint64_t first = ~std::uint64_t{0}, size = 0;
     for (std::uint64_t left = region.members; left != 0; left &= left - 1) {
@@ -136,8 +135,7 @@ class TreeCuts {
   }
 
  private:
-  // A node with fewer children than this is divided among its grandchildren: they are at most
-  // kMembers, and the cut finds its place.
+  // For better cuts, nodes with fewer children than this are divided among their grandchildren.
   static constexpr std::uint32_t kFewChildren = 5;
   static constexpr std::uint32_t kMembers = 64;
 

@@ -1,18 +1,139 @@
 #include "query/contact/write_patches.h"
 
-#include "query/contact/contact_division.h"
+#include <algorithm>
 
 namespace ist {
 namespace {
 
-/// Adds what is missing to the sum of `value(patch)` over the patches to the largest of them, so
-/// that the shares give `whole` but for the last digit.
-template <class T, class Value>
-void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole, Value value) {
+/// Divides a contact along the tree of one of its solids. The cuts, and thus a patch's identity,
+/// depend on the tree alone; the pose decides which regions are worth a patch.
+class ContactDivision {
+ public:
+  /// `radius`: of the tree's root, in the frame of the bins.
+  ContactDivision(ContactBins& bins, std::uint32_t bin_count, double radius) noexcept
+      : cuts_(bins.tree()),
+        bins_(bins.bins()),
+        parts_(bins.parts()),
+        order_(bins.order()),
+        spare_(bins.spare()),
+        bend_cost_(kContactBend * radius * radius) {
+    if (bin_count == 0) return;
+    for (std::uint32_t i = 0; i < bin_count; ++i) {
+      total_pull_ += bins_[i].pull;
+      order_[i] = i;
+    }
+    ContactPart& root = parts_[0] = ContactPart();
+    root.region = cuts_.root();
+    root.end = bin_count;
+    root.id = cuts_.id(root.region);
+    root.loss = loss(root);
+    size_ = 1;
+  }
+
+  /// Divides until there are `wanted` parts or none is worth it; sorts by place in the tree.
+  void run(std::size_t wanted) noexcept {
+    wanted = std::min<std::size_t>(wanted, ContactBins::kBins);
+    const auto less = [](const ContactPart& l, const ContactPart& r) {
+      return l.loss != r.loss ? l.loss < r.loss : l.id > r.id;
+    };
+    while (size_ > 0 && size_ < wanted && parts_[0].loss > 0) {
+      std::pop_heap(parts_, parts_ + size_, less);
+      ContactPart other;
+      const bool two = divide(parts_[size_ - 1], other);
+      std::push_heap(parts_, parts_ + size_, less);
+      if (!two) continue;
+      parts_[size_++] = other;
+      std::push_heap(parts_, parts_ + size_, less);
+    }
+    std::sort(parts_, parts_ + size_,
+              [](const ContactPart& l, const ContactPart& r) { return l.id < r.id; });
+  }
+
+  std::size_t size() const noexcept { return size_; }
+
+  Overlap sum(const ContactPart& part) const noexcept {
+    Overlap out;
+    for (std::uint32_t i = part.begin; i < part.end; ++i) out.add(bin(i).sum);
+    return out;
+  }
+
+ private:
+  const ContactBin& bin(std::uint32_t i) const { return bins_[order_[i]]; }
+
+  /// The error of one force at one point in place of the part's: the spread of the points where it
+  /// pulls, and the pull that cancels. No part loses more than the part that contains it.
+  double loss(const ContactPart& part) const {
+    if (part.end - part.begin < 2) return 0;
+    double pull = 0;
+    Eigen::Vector3d force = Eigen::Vector3d::Zero();
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (std::uint32_t i = part.begin; i < part.end; ++i) {
+      pull += bin(i).pull;
+      force += bin(i).sum.force;
+      mean += bin(i).pull * bin(i).centre;
+    }
+    if (!(pull > 0)) return 0;
+    mean /= pull;
+    double spread = 0;
+    for (std::uint32_t i = part.begin; i < part.end; ++i)
+      spread += bin(i).pull * (bin(i).centre - mean).squaredNorm();
+    return spread + bend_cost_ * std::max(0.0, pull - force.norm());
+  }
+
+  /// Divides `part` into itself and `other`; false if it has one member.
+  bool divide(ContactPart& part, ContactPart& other) {
+    ContactPart at = part;  // descends while only one side counts
+    while (cuts_.open(at.region)) {
+      const std::uint64_t side = cuts_.cut(at.region);
+      const int up = 4 * (at.region.level - cuts_.bin_level());
+      std::uint32_t split = at.begin, others = 0;
+      double pull = 0, others_pull = 0;
+      for (std::uint32_t i = at.begin; i < at.end; ++i) {
+        const bool on_side = TreeCuts::has_member(side, (bin(i).node >> up) - at.region.first);
+        (on_side ? pull : others_pull) += bin(i).pull;
+        (on_side ? order_[split++] : spare_[others++]) = order_[i];
+      }
+      std::copy(spare_, spare_ + others, order_ + split);
+      const double least = kLeastContactShare * total_pull_;
+      if (others == 0 || others_pull < least) {
+        at.region.members = side;
+      } else if (split == at.begin || pull < least) {
+        at.region.members &= ~side;
+      } else {
+        part = other = at;
+        part.region.members = side;
+        part.end = split;
+        other.region.members &= ~side;
+        other.begin = split;
+        for (ContactPart* half : {&part, &other}) {
+          half->id = cuts_.id(half->region);
+          half->loss = loss(*half);
+        }
+        return true;
+      }
+    }
+    part.loss = 0;
+    return false;
+  }
+
+  const TreeCuts cuts_;
+  const ContactBin* const bins_;
+  ContactPart* const parts_;
+  std::uint32_t* const order_;
+  std::uint32_t* const spare_;
+  const double bend_cost_;  ///< of a unit of pull that cancels
+  double total_pull_ = 0;
+  std::size_t size_ = 0;
+};
+
+/// Corrects the largest patch so that the patches' members sum to `whole`, but for the last digit.
+template <class T>
+void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole,
+              T ContactPatch::*member) {
   for (int round = 0; round < 2; ++round) {
     T missing = whole;
-    for (ContactPatch& patch : patches) missing -= value(patch);
-    value(patches[largest]) += missing;
+    for (ContactPatch& patch : patches) missing -= patch.*member;
+    patches[largest].*member += missing;
   }
 }
 
@@ -45,7 +166,7 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
     if (patch.volume > out[largest].volume) largest = i;
   }
 
-  // The whole is summed in another order, and bounded.
+  // `whole` is summed in another order, and clamped to its bounds.
   const double factor = volume > 0 ? whole.volume / volume : 0;
   for (ContactPatch& patch : out) {
     patch.volume *= factor;
@@ -53,11 +174,9 @@ std::size_t write_patches(const Binned& binned, const Penetration& whole,
     patch.force *= factor;
     patch.torque *= factor;
   }
-  complete(out, largest, whole.volume, [](ContactPatch& p) -> double& { return p.volume; });
-  complete<Eigen::Vector3d>(out, largest, whole.force,
-                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.force; });
-  complete<Eigen::Vector3d>(out, largest, whole.torque,
-                            [](ContactPatch& p) -> Eigen::Vector3d& { return p.torque; });
+  complete(out, largest, whole.volume, &ContactPatch::volume);
+  complete(out, largest, whole.force, &ContactPatch::force);
+  complete(out, largest, whole.torque, &ContactPatch::torque);
   return out.size();
 }
 

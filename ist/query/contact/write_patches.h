@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// How patches are written: what the bins hold, in which frame, and how many bins are filled.
+/// The filled bins of a contact.
 struct Binned {
   ContactBins& bins;
   std::uint32_t filled;
@@ -15,17 +15,16 @@ struct Binned {
   double radius;  ///< of the binned tree's root, A's unit frame
 };
 
-/// Makes the first `count` patches, which sum to `part`, a level of detail of a blend, sum to the
-/// blend: the difference is spread by volume. If a limit stopped it before it found anything, one
-/// patch is the whole. Returns how many there are.
+/// Makes `count` patches of a `part` of a blend sum to the blend, by volume. Without patches, as of
+/// a stopped query, one becomes the whole. Returns their number.
 std::size_t spread(const Penetration& part, const Penetration& whole, std::size_t count,
                    std::span<ContactPatch> patches) noexcept;
 
-/// Divides what is binned; the patches' shares sum to those of the whole.
+/// Divides the contact into patches, which sum to `whole`; returns their number.
 std::size_t write_patches(const Binned& binned, const Penetration& whole,
                           std::span<ContactPatch> patches) noexcept;
 
-/// What follows from centroids, volumes and wrenches, these about B's origin.
+/// Derives the other members from centroids, volumes and wrenches about B's origin.
 void finish_patches(std::span<ContactPatch> patches, const Pose& b, double deepest) noexcept;
 
 }  // namespace ist

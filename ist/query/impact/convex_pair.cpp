@@ -27,7 +27,7 @@ void nearest_of_edges(const Vector3d& p, const Vector3d& p1, const Vector3d& q, 
   const Vector3d u = p1 - p, v = q1 - q, w = p - q;
   const double uu = u.squaredNorm(), vv = v.squaredNorm(), uv = u.dot(v);
   const double uw = u.dot(w), vw = v.dot(w);
-  if (!(uu > 0) || !(vv > 0)) return;  // corners against faces find these
+  if (!(uu > 0) || !(vv > 0)) return;  // nearest_in_piece() covers these
   const double cross = uu * vv - uv * uv;
   double s = cross > 0 ? std::clamp((uv * vw - uw * vv) / cross, 0.0, 1.0) : 0.0;
   double t = (uv * s + vw) / vv;

@@ -6,7 +6,7 @@
 
 namespace ist {
 
-/// The nearest points of two pieces, found to rounding where they do not cross.
+/// The nearest points of two pieces, up to rounding; valid if they do not cross.
 struct NearestPoints {
   Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero();
   double distance = 0;
@@ -16,10 +16,11 @@ NearestPoints nearest_points(const ConvexPiece& a, const ConvexPiece& b) noexcep
 /// The point of a piece that is nearest to x.
 Eigen::Vector3d nearest_in_piece(const ConvexPiece& piece, const Eigen::Vector3d& x) noexcept;
 
-/// Whether an edge of one triangle goes through the other.
+/// True if an edge of one triangle passes through the other.
 bool triangles_cross(const ConvexPiece& a, const ConvexPiece& b) noexcept;
 
-/// How far two pieces lie apart along a direction, from A to B: a proof for any unit vector.
+/// The gap between two pieces along a direction, from A to B. For a unit vector it is a lower bound
+/// on their distance.
 double apart_along(const Eigen::Vector3d& n, const ConvexPiece& a, const ConvexPiece& b) noexcept;
 
 }  // namespace ist

@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// The point of a triangle that is nearest to the origin, as parts of its corners.
+/// Barycentric coordinates of a triangle's point nearest to the origin.
 Vector3d nearest_parts(const Vector3d& a, const Vector3d& b, const Vector3d& c) noexcept {
   const Vector3d p = nearest_in_piece({{a, b, c}, 3, 0, 0}, Vector3d::Zero());
   const Vector3d u = b - a, v = c - a, w = p - a;
@@ -22,7 +22,7 @@ Vector3d nearest_parts(const Vector3d& a, const Vector3d& b, const Vector3d& c) 
     const double t = std::clamp((uu * v.dot(w) - uv * u.dot(w)) / area, 0.0, 1.0 - s);
     return {1 - s - t, s, t};
   }
-  // All but a segment: along the longer side.
+  // Degenerate: along the longer side.
   const double s = uu > 0 && uu >= vv ? std::clamp(u.dot(w) / uu, 0.0, 1.0) : 0.0;
   const double t = vv > uu ? std::clamp(v.dot(w) / vv, 0.0, 1.0) : 0.0;
   return {1 - s - t, s, t};
@@ -34,7 +34,7 @@ double nearest_part(const Vector3d& a, const Vector3d& b) noexcept {
   return uu > 0 ? std::clamp(-u.dot(a) / uu, 0.0, 1.0) : 0.0;
 }
 
-/// Whether x and the origin lie on one side of a triangle.
+/// True if x and the origin lie on one side of a triangle.
 bool same_side(const Vector3d& a, const Vector3d& b, const Vector3d& c,
                const Vector3d& x) noexcept {
   const Vector3d n = (b - a).cross(c - a);
@@ -83,6 +83,40 @@ bool GjkDistance::add(const Vector3d& difference, const Vector3d& of_b) noexcept
   }
   count_ = kept;
   return shortest_.squaredNorm() < (1 - 1e-12) * before;
+}
+
+Vector3d furthest(const PointHull& hull, const Vector3d& n) noexcept {
+  double most = -std::numeric_limits<double>::infinity();
+  std::uint32_t at = 0;
+  for (std::uint32_t k = 0; k < hull.count; ++k) {
+    const double along = n.x() * hull.x[k] + n.y() * hull.y[k] + n.z() * hull.z[k];
+    if (!(along > most)) continue;
+    most = along;
+    at = k;
+  }
+  return {hull.x[at], hull.y[at], hull.z[at]};
+}
+
+HullPlane plane_between(const PointHull& a, const PointHull& b, const Vector3d& guess,
+                        double least) noexcept {
+  constexpr double kMostOfIt = 0.8;
+  constexpr int kSteps = 16;
+  HullPlane best;
+  best.apart = -std::numeric_limits<double>::infinity();
+  GjkDistance between;
+  Vector3d across = guess;
+  for (int i = 0; i < kSteps; ++i) {
+    const double length = across.norm();
+    if (!(length > least)) break;
+    const Vector3d n = across / length;
+    const Vector3d difference = furthest(b, -n) - furthest(a, n);
+    const double apart = n.dot(difference);
+    if (apart > best.apart) best = {n, apart};
+    if (i > 0 && best.apart >= kMostOfIt * length) break;
+    if (!between.add(difference, Vector3d::Zero()) && i > 0) break;
+    across = between.shortest();
+  }
+  return best;
 }
 
 }  // namespace ist

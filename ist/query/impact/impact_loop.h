@@ -12,26 +12,26 @@
 
 namespace ist {
 
-// Balls that are further apart than this part of the larger radius go on as they are; nearer ones
-// are opened.
+// Pairs of balls further apart than this fraction of the larger radius are advanced, others opened.
 inline constexpr double kFarApart = 0.05;
 
-// An impact is reported once the gap is this part of the tolerance. Steps end at a half, so none is
-// too short to get on.
+// An impact is reported once the gap is this fraction of the tolerance. Steps end at a half of it,
+// so that none is too short to advance.
 inline constexpr double kReported = 0.75;
 
-/// The outcome of a pair, in lengths of the frame.
+/// The outcome of a pair, in the frame's unit of length.
 struct ImpactFound {
   ImpactKind kind = ImpactKind::no_impact;
   double time = 0;
-  double gap = 0;       ///< the solids' distance is at least this, as far as the pair tells
-  double distance = 0;  ///< and at most this
+  double gap = 0;       ///< lower bound on the distance at this pair
+  double distance = 0;  ///< upper bound
   Eigen::Vector3d point_a = Eigen::Vector3d::Zero(), point_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
 
-/// Pairs of nodes, each known to stay clear up to a time of its own: the earliest is looked at
-/// next, so that all are clear up to that time. A pair that stays clear to the end is dropped.
+/// Conservative advancement of pairs of nodes, each of which is known to be clear up to a time of
+/// its own. The earliest is visited next, so all are clear up to that time. A pair that stays clear
+/// to the end is dropped.
 class ImpactLoop {
  public:
   ImpactLoop(const MovingFrame& frame, double tolerance, const ImpactSettings& settings,
@@ -47,13 +47,13 @@ class ImpactLoop {
   const double end;
   const double tolerance;
 
-  /// `look(a, b, at)` looks at a pair at a time; what it calls of the following decides.
-  template <class Look>
-  TimeOfImpact run(const Look& look) noexcept {
+  /// Calls `visit(a, b, at)`, which decides on a pair by one of the functions that follow.
+  template <class Visit>
+  TimeOfImpact run(const Visit& visit) noexcept {
     Placement at;
     while (size_ > 0 && !full_) {
       const RankedPair pair = waiting_[0];
-      // At the start all is weighed, for an overlap counts more than an impact.
+      // At time 0 all pairs are visited, since an overlap takes precedence over an impact.
       if (found_.kind != ImpactKind::no_impact && pair.bound > 0) break;
       if (found_.kind == ImpactKind::overlapping) break;
       if (budget_.grant(1) == 0) {
@@ -63,28 +63,24 @@ class ImpactLoop {
       std::pop_heap(waiting_, waiting_ + size_--, Later());
       now_ = pair.bound;
       if (at.time != now_) at = place(frame_, now_);
-      look(pair.a, pair.b, at);
+      visit(pair.a, pair.b, at);
     }
     if (size_ > 0 && full_) now_ = waiting_[0].bound;
     return answer();
   }
 
-  /// The pair is clear for `step` more, but for no less than `left` of its gap.
-  void clear_for(double step, std::uint32_t a, std::uint32_t b, double left) noexcept {
+  /// The pair keeps a gap of at least `left` for another `step`.
+  void clear_for(double step, std::uint32_t a, std::uint32_t b,
+                 double left = std::numeric_limits<double>::infinity()) noexcept {
     floor_ = std::min(floor_, left);
-    if (!(now_ + step < end)) return;
-    push(now_ + step, a, b);
-  }
-  void clear_for(double step, std::uint32_t a, std::uint32_t b) noexcept {
-    if (!(now_ + step < end)) return;
-    push(now_ + step, a, b);
+    if (now_ + step < end) push(now_ + step, a, b);
   }
 
-  /// Nothing more is known of the pair now.
-  void look_again(std::uint32_t a, std::uint32_t b) noexcept { push(now_, a, b); }
+  /// Visits the pair again at the same time.
+  void visit_again(std::uint32_t a, std::uint32_t b) noexcept { push(now_, a, b); }
 
-  /// Whether a step leads on, as far as time has digits.
-  bool leads_on(double step) const noexcept { return now_ + step > now_; }
+  /// True if the step changes the time, which is rounded.
+  bool advances(double step) const noexcept { return now_ + step > now_; }
 
   void found(const ImpactFound& what) noexcept {
     if (found_.kind != ImpactKind::overlapping &&
@@ -96,7 +92,7 @@ class ImpactLoop {
   void count_surface_pair() noexcept { ++surface_pairs_; }
 
  private:
-  /// An order of all pairs, so that it is the same whatever the heap does.
+  /// A total order, so that visits do not depend on the heap's implementation.
   struct Later {
     bool operator()(const RankedPair& x, const RankedPair& y) const noexcept {
       if (x.bound != y.bound) return x.bound > y.bound;
@@ -135,19 +131,19 @@ class ImpactLoop {
       result.status = QueryStatus::budget_exhausted;
       result.time = std::min(now_, lost_);
     }
-    // At the start nothing may have been looked at.
+    // At time 0 perhaps no pair has been visited.
     result.distance_min = full_ && result.time == 0 ? 0 : frame_.unit * floor_;
     result.distance_max = std::numeric_limits<double>::infinity();
     return result;
   }
 
   const MovingFrame& frame_;
-  RankedPair* const waiting_;  ///< a heap, the earliest first
+  RankedPair* const waiting_;  ///< a heap with the earliest pair on top
   const std::size_t capacity_;
   std::size_t size_ = 0;
   Budget budget_;
   double now_ = 0;
-  double floor_;  ///< no gap has become less than this, but those that were found
+  double floor_;  ///< lower bound on all gaps so far, except for those that were found
   double lost_ = std::numeric_limits<double>::infinity();
   bool full_ = false;
   std::uint32_t surface_pairs_ = 0;

@@ -10,12 +10,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-// A little further, for the rounding of what is compared.
+// Covers the rounding of comparisons.
 constexpr double kMore = 1 + 1e-12;
 
-/// Whether A's mesh contains the centre of a sphere of B, which keeps no mesh.
-bool holds_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b, int level,
-                  std::uint32_t number) noexcept {
+/// True if A's mesh contains the centre of a sphere of B, which has no mesh.
+bool contains_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b, int level,
+                     std::uint32_t number) noexcept {
   const NodeBall ball = b.ball(level, number);
   const exact::Point at = map_point(a_from_b, {ball.centre[0], ball.centre[1], ball.centre[2]});
   const double reach = kMore * (a_from_b.scale * ball.r + a.header->error);
@@ -23,7 +23,7 @@ bool holds_sphere(const MeshTree& a, const ImpactSide& b, const Similarity& a_fr
     return is_inside({a}, at);
   const std::uint32_t count = b.children(level, number);
   for (std::uint32_t i = 0; i < count; ++i)
-    if (holds_sphere(a, b, a_from_b, level - 1, kWidth * number + i)) return true;
+    if (contains_sphere(a, b, a_from_b, level - 1, kWidth * number + i)) return true;
   return false;
 }
 
@@ -78,31 +78,22 @@ NodeBall ImpactSide::ball(int level, std::uint32_t number) const noexcept {
 
 PointHull ImpactSide::hull(int level, std::uint32_t number) const noexcept {
   PointHull hull;
+  const auto add = [&](double x, double y, double z) {
+    hull.x[hull.count] = x, hull.y[hull.count] = y, hull.z[hull.count++] = z;
+  };
   if (level == kSphereLevel) {
     const ConvexPiece one = piece(number);
-    hull.count = static_cast<std::uint32_t>(one.corners);
-    for (int k = 0; k < one.corners; ++k) {
-      hull.x[k] = one.corner[k].x();
-      hull.y[k] = one.corner[k].y();
-      hull.z[k] = one.corner[k].z();
-    }
-    return hull;
-  }
-  if (!has_hull(level)) {
+    for (int k = 0; k < one.corners; ++k)
+      add(one.corner[k].x(), one.corner[k].y(), one.corner[k].z());
+  } else if (!has_hull(level)) {
     const NodeBall around = ball(level, number);
-    hull.count = 1;
-    hull.x[0] = around.centre[0];
-    hull.y[0] = around.centre[1];
-    hull.z[0] = around.centre[2];
-    return hull;
-  }
-  const MeshBlock& block = mesh_->blocks[number];
-  hull.count = block.vertices;
-  for (std::uint32_t k = 0; k < block.vertices; ++k) {
-    const exact::Point x = mesh_->vertex(block.vertex[k]);
-    hull.x[k] = x.x;
-    hull.y[k] = x.y;
-    hull.z[k] = x.z;
+    add(around.centre[0], around.centre[1], around.centre[2]);
+  } else {
+    const MeshBlock& block = mesh_->blocks[number];
+    for (std::uint32_t k = 0; k < block.vertices; ++k) {
+      const exact::Point x = mesh_->vertex(block.vertex[k]);
+      add(x.x, x.y, x.z);
+    }
   }
   return hull;
 }
@@ -129,8 +120,8 @@ ConvexPiece ImpactSide::piece(std::uint32_t number) const noexcept {
   return piece;
 }
 
-bool holds_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept {
-  if (b.mesh() == nullptr) return holds_sphere(a, b, a_from_b, b.top(), 0);
+bool contains_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept {
+  if (b.mesh() == nullptr) return contains_sphere(a, b, a_from_b, b.top(), 0);
   // A shell that does not cross A lies on one side of it.
   const MeshTree& mesh = *b.mesh();
   return std::any_of(mesh.shells, mesh.shells + mesh.header->shell_count,

@@ -10,13 +10,13 @@
 
 namespace ist {
 
-/// A triangle or a point, and what it tells of the solid around it.
+/// A triangle or a point, with bounds on the solid around it.
 struct ConvexPiece {
   Eigen::Vector3d corner[3];
   int corners = 1;    ///< 1 or 3
-  double beyond = 0;  ///< ≥ 0: what the solid has here lies within this of the piece
-  /// For two points, one of them in the piece, the solid has a point whose distance to the other is
-  /// larger by at most this; smaller if this is negative.
+  double beyond = 0;  ///< ≥ 0: this part of the solid lies within this distance of the piece
+  /// From any point, the solid's distance exceeds that of a point of the piece by at most this. It
+  /// is less by as much if this is negative.
   double behind = 0;
 };
 
@@ -27,9 +27,8 @@ struct PointHull {
 };
 
 /// A moving solid as a tree of balls: the triangles of its mesh or, if its asset has none, the
-/// cover balls of its inner spheres. Unit frame. A node is named by a level and a number, as in
-/// SphereTree; at kSphereLevel it is one triangle or sphere, and the node of the top level is the
-/// whole.
+/// cover balls of its inner spheres. Unit frame. A level and a number identify a node, as in
+/// SphereTree: at kSphereLevel one triangle or sphere, at the top level the whole solid.
 class ImpactSide {
  public:
   explicit ImpactSide(const AssetView& view) noexcept;
@@ -40,16 +39,16 @@ class ImpactSide {
 
   int top() const noexcept { return mesh_ ? mesh_->top : spheres_.top; }
 
-  /// Nodes below a node, at most kWidth, whose numbers go on from kWidth · number.
+  /// The number of children of a node, at most kWidth; their numbers begin at kWidth · number.
   std::uint32_t children(int level, std::uint32_t number) const noexcept;
 
-  /// A ball around all that the solid has at a node.
+  /// A ball around the solid's part at a node.
   NodeBall ball(int level, std::uint32_t number) const noexcept;
 
-  /// Whether a node is known by more than its ball: blocks of triangles, single ones, spheres.
+  /// True for nodes with a hull other than a ball: blocks of triangles, single ones, spheres.
   bool has_hull(int level) const noexcept { return level <= (mesh_ ? 0 : kSphereLevel); }
-  /// The solid's part at a node lies within beyond(…) of this hull; the ball's centre if there is
-  /// none.
+  /// The solid's part at a node lies within beyond(…) of this hull: the ball's centre if the node
+  /// has no other.
   PointHull hull(int level, std::uint32_t number) const noexcept;
   double beyond(int level, std::uint32_t number) const noexcept;
 
@@ -62,7 +61,7 @@ class ImpactSide {
   double error_ = 0;  ///< of the mesh
 };
 
-/// Whether something of B lies inside A's mesh, where B's surface meets it nowhere.
-bool holds_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
+/// True if a part of B lies inside A's mesh without an intersection of their surfaces.
+bool contains_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
 
 }  // namespace ist

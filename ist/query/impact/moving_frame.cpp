@@ -17,9 +17,7 @@ constexpr double kPathRounding = 6 * 0x1p-53;
 // Rounding of a rotation: a polynomial's sine and its angle, three-term products and sums.
 constexpr double kTurnRounding = 32 * 0x1p-53;
 
-Vector3d translation(const Pose& pose) noexcept { return {pose.t[0], pose.t[1], pose.t[2]}; }
-
-/// [u] from the object's origin to its straight point, world.
+/// [u] from the solid's origin to the point that moves straight, world.
 Vector3d lever(const Pose& pose, double scale, const Vector3d& about) noexcept {
   return unit_rotation(pose) * (scale * about);
 }
@@ -33,14 +31,15 @@ MovingBody body(const Pose& pose, double scale, const Motion& motion, const Asse
   body.centre = motion.about;
   body.unit = scale / unit;
   if (asset == nullptr) {
-    body.reach = body.unit * body.centre.norm();  // of its origin; the other body adds its distance
+    body.reach =
+        body.unit * body.centre.norm();  // of its origin; place() adds the other's distance
     return body;
   }
   body.unit = std::ldexp(scale, asset->exponent) / unit;
   for (int k = 0; k < 3; ++k)
     body.centre[k] = std::ldexp(motion.about[k] - asset->centre[k], -asset->exponent);
   const TreeHeader& tree = asset->inner_tree;
-  const Vector3d middle(tree.root[0], tree.root[1], tree.root[2]);
+  const Vector3d middle(tree.root);
   double error = 0;
   if (asset->mesh != 0) {
     const MeshHeader& mesh = *at<MeshHeader>(*asset, asset->mesh);
@@ -67,12 +66,12 @@ std::optional<MovingFrame> frame_of(const Pose& pose_a, double scale_a, const As
   frame.a = body(pose_a, scale_a, motions.a, asset_a, frame.unit);
   frame.b = body(b.pose, b.scale, motions.b, &b.asset.header(), frame.unit);
   const Vector3d lever_a = lever(pose_a, scale_a, motions.a.about);
-  frame.between = ((translation(b.pose) - translation(pose_a)) +
+  frame.between = ((vector(b.pose.t) - vector(pose_a.t)) +
                    (lever(b.pose, b.scale, motions.b.about) - lever_a)) /
                   frame.unit;
   frame.velocity = (motions.b.velocity - motions.a.velocity) / frame.unit;
   frame.speed = frame.velocity.stableNorm();
-  frame.world = translation(pose_a) + lever_a;
+  frame.world = vector(pose_a.t) + lever_a;
   frame.drift = motions.a.velocity;
   const double farthest =
       frame.between.norm() + frame.speed * duration + frame.a.reach + frame.b.reach;
@@ -116,7 +115,7 @@ Placement place(const MovingFrame& frame, double time) noexcept {
   at.b = frame.b.unit * frame.b.turning.at(time).toRotationMatrix();
   at.between = frame.between + frame.velocity * time;
   const double path = frame.between.norm() + frame.speed * time;
-  // B's coordinates may be turned into A's frame too.
+  // B's coordinates may be rotated into A's frame too.
   const double around_a = frame.a.reach + at.between.norm() + frame.b.reach;
   at.error = kPathRounding * path + kTurnRounding * (around_a * (1 + frame.a.spin_speed * time) +
                                                      frame.b.reach * frame.b.spin_speed * time);
@@ -151,13 +150,13 @@ Motion motion_between(const Pose& from, const Pose& to, double duration, const V
     return motion;
   }
   const Vector3d straight =
-      (translation(to) - translation(from)) + (lever(to, scale, about) - lever(from, scale, about));
+      (vector(to.t) - vector(from.t)) + (lever(to, scale, about) - lever(from, scale, about));
   motion.velocity = straight / duration;
   Quaterniond turn = unit_rotation(to) * unit_rotation(from).conjugate();
   if (turn.w() < 0) turn.coeffs() *= -1;
   const double sine = turn.vec().norm();
   if (!(sine > 0)) return motion;
-  // Half the angle, between 0 and π/2, by steps that triple its digits.
+  // Half the angle, in [0, π/2], by an iteration that triples the correct digits.
   double half = sine * (std::numbers::pi / 2 - turn.w() * (std::numbers::pi / 2 - 1));
   for (int i = 0; i < 4; ++i) {
     const SineCosine at = sine_cosine(half);
@@ -169,7 +168,7 @@ Motion motion_between(const Pose& from, const Pose& to, double duration, const V
 
 Pose moved(const Pose& start, const Motion& motion, double time, double scale) noexcept {
   const Quaterniond rotation = Turning(unit_rotation(start), motion.angular_velocity).at(time);
-  const Vector3d place = translation(start) + lever(start, scale, motion.about) +
+  const Vector3d place = vector(start.t) + lever(start, scale, motion.about) +
                          motion.velocity * time - rotation * (scale * motion.about);
   return {{rotation.w(), rotation.x(), rotation.y(), rotation.z()},
           {place.x(), place.y(), place.z()}};

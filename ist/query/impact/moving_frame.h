@@ -11,8 +11,7 @@
 
 namespace ist {
 
-/// Sine and cosine of h in [−π/2, π/2], from sums and products alone: the C library's differ in the
-/// last bit between processors.
+/// Sine and cosine of h in [−π/2, π/2]. Same bits on every processor, unlike the C library's.
 struct SineCosine {
   double sine, cosine;
 };
@@ -31,8 +30,8 @@ class Turning {
   double turns_ = 0;  ///< a unit of time
 };
 
-/// One body of a pair. x, of its unit frame, is at R(t) · unit · (x − centre) from the point that
-/// goes straight on.
+/// One body of a pair. x, of its unit frame, is at R(t) · unit · (x − centre) from the point of the
+/// body that moves straight.
 struct MovingBody {
   Turning turning;
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();  ///< angular velocity, world
@@ -42,8 +41,8 @@ struct MovingBody {
   double reach = 0;  ///< no point of the body is further from its centre
 };
 
-/// Two moving bodies in the frame that goes along with A's straight point and does not turn: what
-/// both have in common cancels first. The unit of length is that of A's unit frame.
+/// Two moving bodies in a frame that moves with A's straight point without rotation, so that their
+/// common motion cancels first. The unit of length is that of A's unit frame.
 struct MovingFrame {
   MovingBody a, b;
   Eigen::Vector3d between = Eigen::Vector3d::Zero();   ///< from A's straight point to B's at 0
@@ -59,27 +58,26 @@ struct MovingFrame {
   }
 };
 
-/// Where both bodies are at a time.
+/// Both bodies at a time.
 struct Placement {
   double time = -1;
   Eigen::Matrix3d a, b;     ///< unit · R
   Eigen::Vector3d between;  ///< from A's straight point to B's
-  /// No distance of two points, as computed from these, is further off; nor does rounding of the
-  /// time itself move anything further.
+  /// Bound on the error of distances computed from these, and on the motion within the rounding of
+  /// `time`.
   double error = std::numeric_limits<double>::infinity();
 };
 
 Placement place(const MovingFrame& frame, double time) noexcept;
 
-/// Empty if poses or motions are not usable.
+/// Empty if a pose or motion is not usable.
 std::optional<MovingFrame> moving_frame(const PlacedAsset& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept;
-/// A's unit frame is its own.
+/// A shape's unit frame is its own frame.
 std::optional<MovingFrame> moving_frame(const PlacedShape& a, const PlacedAsset& b,
                                         const Motions& motions, double duration) noexcept;
 
-/// For how long a gap lasts that shrinks at `rate`, a speed that grows by `bend` per time at most;
-/// a little less, for rounding.
+/// The time for which a gap lasts that shrinks at `rate`, a speed that grows by at most `bend`.
 double safe_step(double gap, double rate, double bend) noexcept;
 
 }  // namespace ist

@@ -1,70 +1,48 @@
 #pragma once
 
-#include "query/impact/convex_pair.h"
-#include "query/impact/hull_pair.h"
 #include "query/impact/impact_loop.h"
 #include "query/impact/impact_side.h"
-#include "query/impact/node_key.h"
 
 namespace ist {
 
-/// A point, or a ball around it, of a body that turns.
+/// A node of a tree in 32 bits, level and number: spheres and triangles come first.
+struct NodeKey {
+  int level;
+  std::uint32_t number;
+
+  static NodeKey of(std::uint32_t bits) noexcept {
+    return {static_cast<int>(bits >> kNumberBits) + kSphereLevel, bits & ((1u << kNumberBits) - 1)};
+  }
+  std::uint32_t bits() const noexcept {
+    return static_cast<std::uint32_t>(level - kSphereLevel) << kNumberBits | number;
+  }
+
+  static constexpr int kNumberBits = 28;  // 16^7 spheres
+};
+static_assert(kMaxSpheres == std::uint64_t{1} << NodeKey::kNumberBits);
+
+/// A point of a rotating body, or a ball around it.
 struct TurningPoint {
   Eigen::Vector3d place;     ///< in the frame
-  Eigen::Vector3d velocity;  ///< by turning alone
+  Eigen::Vector3d velocity;  ///< by rotation alone
   double radius = 0;
 };
 
+/// `turned`: the body's unit · R; `base`: its straight point.
 TurningPoint turning_point(const MovingBody& body, const Eigen::Matrix3d& turned,
                            const Eigen::Vector3d& base, const Eigen::Vector3d& x,
                            double radius) noexcept;
 
-/// For how long two convex parts stay clear whose gap along the unit vector `n`, from A to B, is
-/// known.
+/// The time for which two convex parts with a gap along the unit vector n, A to B, stay clear.
 ///
-/// `turning`: the speed at which they approach along n now by turning alone; no point that counts
-/// turns faster than at speed_a, speed_b. Of balls only the centres count, for a ball that turns
-/// stays where it is.
+/// `turning`: their approach along n now, by rotation alone; speed_a, speed_b: bounds on the speeds
+/// of their points by rotation. Of balls only the centres count, since balls do not change by
+/// rotation.
 double clear_step(const MovingFrame& frame, const Eigen::Vector3d& n, double gap, double turning,
                   double speed_a, double speed_b) noexcept;
 
-/// The search for the impact of two moving trees.
-class PairSearch {
- public:
-  PairSearch(const MovingFrame& frame, const ImpactSide& a, const ImpactSide& b,
-             ImpactLoop& loop) noexcept
-      : frame_(frame), a_(a), b_(b), loop_(loop) {}
-
-  TimeOfImpact run() noexcept;
-
- private:
-  struct Piece {
-    ConvexPiece shape;            ///< in the frame
-    Eigen::Vector3d velocity[3];  ///< of its corners, by turning
-    double fastest = 0;           ///< of these
-  };
-  struct Approach {
-    double gap, step;
-  };
-
-  TurningPoint ball_a(NodeKey node, const Placement& at) const noexcept;
-  TurningPoint ball_b(NodeKey node, const Placement& at) const noexcept;
-  Approach approach(const TurningPoint& a, const TurningPoint& b,
-                    const Placement& at) const noexcept;
-  void look(NodeKey a, NodeKey b, const Placement& at) noexcept;
-  bool look_at_hulls(NodeKey a, NodeKey b, const TurningPoint& ball_of_a,
-                     const TurningPoint& ball_of_b, const Placement& at) noexcept;
-  void open(NodeKey a, NodeKey b, bool open_a, const TurningPoint& other,
-            const Placement& at) noexcept;
-  void offer(NodeKey a, NodeKey b, const Approach& approach) noexcept;
-  Piece piece(const ImpactSide& side, const MovingBody& body, const Eigen::Matrix3d& turned,
-              const Eigen::Vector3d& base, std::uint32_t number) const noexcept;
-  void look_at_pieces(NodeKey a, NodeKey b, const Placement& at) noexcept;
-
-  const MovingFrame& frame_;
-  const ImpactSide& a_;
-  const ImpactSide& b_;
-  ImpactLoop& loop_;
-};
+/// Searches for the impact of two moving trees.
+TimeOfImpact search_pair(const MovingFrame& frame, const ImpactSide& a, const ImpactSide& b,
+                         ImpactLoop& loop) noexcept;
 
 }  // namespace ist

@@ -12,8 +12,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Half of the lanes at most: every step of this descent waits for the one before, and roots of a
-/// longer vector come later.
+/// At most half of the lanes: each step of the traversal waits for the one before, and the latency
+/// of roots grows with the length of vectors.
 template <class T>
 using GapTag = hn::CappedTag<T, kWidth / 2>;
 
@@ -24,15 +24,14 @@ struct alignas(64) Gaps {
 };
 
 template <class T>
-HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                              std::uint32_t block_y, Gaps<T>& out) {
+HWY_INLINE void child_gaps_as(const GapSide& side, TreeNode x, TreeNode y, Gaps<T>& out) {
   const GapTag<T> d;
-  const SphereTree::Level& level = side.x->level[level_x];
-  const BallBlock& block = level.blocks[block_x];
-  const Origin& origin = level.origins[block_x];
-  const float* covers = level_x == 0 ? side.x->sphere_cover + std::size_t{kWidth} * block_x
-                                     : level.nodes[block_x].cover;
-  const NodeBall ball = side.y->ball(level_y, block_y);
+  const SphereTree::Level& level = side.x->level[x.level];
+  const BallBlock& block = level.blocks[x.block];
+  const Origin& origin = level.origins[x.block];
+  const float* covers = x.level == 0 ? side.x->sphere_cover + std::size_t{kWidth} * x.block
+                                     : level.nodes[x.block].cover;
+  const NodeBall ball = side.y->ball(y);
   double q[3];
   side.x_from_y->apply(ball.centre, q);
   const auto qx = hn::Set(d, static_cast<T>(q[0] - origin.x));
@@ -40,7 +39,7 @@ HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t bl
   const auto qz = hn::Set(d, static_cast<T>(q[2] - origin.z));
   const double scale = side.x_from_y->scale;
   const auto radius = hn::Set(d, static_cast<T>(ball.r * scale));
-  const auto cover = hn::Set(d, static_cast<T>(side.y->cover(level_y, block_y) * scale));
+  const auto cover = hn::Set(d, static_cast<T>(side.y->cover(y.level, y.block) * scale));
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     const auto dx = load_as<T>(d, block.x + lane) - qx;
     const auto dy = load_as<T>(d, block.y + lane) - qy;
@@ -51,7 +50,7 @@ HWY_INLINE void child_gaps_as(const GapSide& side, int level_x, std::uint32_t bl
   }
 }
 
-/// A bit a lane that comes under one of the limits.
+/// A bit for each lane that is below one of the limits.
 template <class T>
 HWY_INLINE std::uint32_t nearer(const Gaps<T>& gaps, T gap_limit, T cover_limit) {
   const GapTag<T> d;
@@ -68,9 +67,9 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
                                double gap_limit, double cover_limit) {
   const GapTag<T> d;
   using V = hn::Vec<decltype(d)>;
-  // Spheres of x that y's leaf ball leaves in play.
+  // Spheres of x whose gaps to y's leaf ball are below a limit.
   Gaps<T> reach;
-  child_gaps_as<T>(side, 0, block_x, 0, block_y, reach);
+  child_gaps_as<T>(side, {0, block_x}, {0, block_y}, reach);
   const std::uint32_t tasks = nearer(reach, static_cast<T>(gap_limit), static_cast<T>(cover_limit));
   LeafGap result{static_cast<double>(hwy::HighestValue<T>()),
                  static_cast<double>(hwy::HighestValue<T>()), 0, 0};
@@ -98,7 +97,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
     }
   }
 
-  // A lane keeps its own least gap, so that ties fall alike for every vector width.
+  // Each lane keeps its own least gap, so that ties do not depend on the vector width.
   alignas(64) T least[kWidth], least_cover[kWidth], task_of[kWidth];
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     const V x = load_as<T>(d, by.x + lane);
@@ -136,7 +135,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
   return result;
 }
 
-/// A limit that no rounding to T makes smaller, and that T can represent.
+/// A limit in T that is not less than this one.
 template <class T>
 T rounded_up(double limit) {
   constexpr double kMost = sizeof(T) == sizeof(float) ? 1e38 : 1e300;
@@ -145,11 +144,10 @@ T rounded_up(double limit) {
 }
 
 template <class T>
-HWY_INLINE void child_gaps_to(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                              std::uint32_t block_y, double gap_limit, double cover_limit,
-                              ChildGaps& out) {
+HWY_INLINE void child_gaps_to(const GapSide& side, TreeNode x, TreeNode y, double gap_limit,
+                              double cover_limit, ChildGaps& out) {
   Gaps<T> gaps;
-  child_gaps_as<T>(side, level_x, block_x, level_y, block_y, gaps);
+  child_gaps_as<T>(side, x, y, gaps);
   out.near = nearer(gaps, rounded_up<T>(gap_limit), rounded_up<T>(cover_limit));
   for (std::uint32_t left = out.near; left != 0; left &= left - 1) {
     const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
@@ -158,13 +156,11 @@ HWY_INLINE void child_gaps_to(const GapSide& side, int level_x, std::uint32_t bl
   }
 }
 
-void child(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-           std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
+void child(const GapSide& side, TreeNode x, TreeNode y, double gap_limit, double cover_limit,
            ChildGaps& out) {
-  precision == Precision::float32
-      ? child_gaps_to<float>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, out)
-      : child_gaps_to<double>(side, level_x, block_x, level_y, block_y, gap_limit, cover_limit,
-                              out);
+  side.precision == Precision::float32
+      ? child_gaps_to<float>(side, x, y, gap_limit, cover_limit, out)
+      : child_gaps_to<double>(side, x, y, gap_limit, cover_limit, out);
 }
 
 std::uint32_t around(const BallBlock& balls, const float (&point)[3], float (&depth)[kWidth]) {
@@ -183,8 +179,8 @@ std::uint32_t around(const BallBlock& balls, const float (&point)[3], float (&de
 }
 
 LeafGap leaf(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y, double gap_limit,
-             double cover_limit, Precision precision) {
-  return precision == Precision::float32
+             double cover_limit) {
+  return side.precision == Precision::float32
              ? leaf_gap_as<float>(side, block_x, block_y, gap_limit, cover_limit)
              : leaf_gap_as<double>(side, block_x, block_y, gap_limit, cover_limit);
 }
@@ -204,16 +200,14 @@ std::uint32_t balls_around(const BallBlock& balls, const float (&point)[3],
   return HWY_DYNAMIC_DISPATCH(around)(balls, point, depth);
 }
 
-void child_gaps(const GapSide& side, int level_x, std::uint32_t block_x, int level_y,
-                std::uint32_t block_y, double gap_limit, double cover_limit, Precision precision,
+void child_gaps(const GapSide& side, TreeNode x, TreeNode y, double gap_limit, double cover_limit,
                 ChildGaps& out) noexcept {
-  HWY_DYNAMIC_DISPATCH(child)
-  (side, level_x, block_x, level_y, block_y, gap_limit, cover_limit, precision, out);
+  HWY_DYNAMIC_DISPATCH(child)(side, x, y, gap_limit, cover_limit, out);
 }
 
 LeafGap leaf_gap(const GapSide& side, std::uint32_t block_x, std::uint32_t block_y,
-                 double gap_limit, double cover_limit, Precision precision) noexcept {
-  return HWY_DYNAMIC_DISPATCH(leaf)(side, block_x, block_y, gap_limit, cover_limit, precision);
+                 double gap_limit, double cover_limit) noexcept {
+  return HWY_DYNAMIC_DISPATCH(leaf)(side, block_x, block_y, gap_limit, cover_limit);
 }
 
 }  // namespace ist

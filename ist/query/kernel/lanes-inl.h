@@ -1,4 +1,4 @@
-// Sixteen virtual lanes of float or double on any vector width: included once a target.
+// Sixteen virtual lanes of float or double on any vector width. Included once per target.
 
 #if defined(IST_QUERY_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_LANES_INL_H_
@@ -19,7 +19,7 @@ namespace ist::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// The widest vectors that sixteen lanes fill.
+/// Vectors of up to sixteen lanes.
 template <class T>
 using LaneTag = hn::CappedTag<T, kWidth>;
 
@@ -44,7 +44,7 @@ HWY_INLINE void store_as(hn::Vec<D> v, D d, T* to) {
   }
 }
 
-/// One bit a lane.
+/// One bit per lane.
 template <class D>
 HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
   std::uint8_t bytes[8] = {};
@@ -54,7 +54,7 @@ HWY_INLINE std::uint32_t mask_bits(D d, hn::Mask<D> mask) {
   return hn::Lanes(d) < 16 ? bits & ((1u << hn::Lanes(d)) - 1) : bits;
 }
 
-/// The mask of the lowest bits, one a lane.
+/// The mask of the lowest bits, one per lane.
 template <class D>
 HWY_INLINE hn::Mask<D> mask_of_bits(D d, std::uint32_t bits) {
   std::uint8_t bytes[8] = {};
@@ -62,13 +62,12 @@ HWY_INLINE hn::Mask<D> mask_of_bits(D d, std::uint32_t bits) {
   return hn::LoadMaskBits(d, bytes);
 }
 
-/// Whether Highway's Compress is one instruction. Where it is a table, GCC copies that to the stack
-/// at every call.
+/// True if Compress is one instruction. GCC copies the table of the other form at every call.
 template <class D>
 inline constexpr bool kCompressInstruction = HWY_ARCH_X86&& HWY_TARGET <= HWY_AVX3 &&
                                              sizeof(hn::TFromD<D>) == sizeof(float);
 
-/// Moves the lanes of a mask to the front of many vectors alike.
+/// Moves the lanes of a mask to the front of vectors.
 template <class D, bool = kCompressInstruction<D>>
 class Compressor {
  public:
@@ -115,7 +114,7 @@ class Compressor<D, true> {
   std::size_t count_;
 };
 
-/// Writes first + lane for every lane that is chosen, and perhaps more behind; returns how many.
+/// Writes first + lane for every chosen lane, and perhaps scratch beyond; returns their number.
 template <class T, class M>
 HWY_INLINE std::size_t append_lanes(LaneTag<T> d, M chosen, std::uint32_t first,
                                     std::uint32_t* out) {

@@ -6,18 +6,125 @@
 #define HWY_TARGET_INCLUDE "query/kernel/leaf_kernel.cpp"
 #include <hwy/foreach_target.h>
 
-#include "query/kernel/leaf_pairs-inl.h"
 #include "query/kernel/lens_list-inl.h"
+#include "query/kernel/placed_blocks-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Appends the lenses of a task with the lanes it meets.
+/// Pairs that go through the stages together: few enough for the first-level cache.
+inline constexpr std::size_t kPairsAtOnce = 16;
+inline constexpr int kWidthBits = 4;
+static_assert(1u << kWidthBits == kWidth);
+inline constexpr std::size_t kTaskCapacity = kPairsAtOnce * kWidth;
+
+/// Pairs of leaf blocks that go through the stages together. The sixteen spheres of the larger
+/// block are sixteen tasks, since fewer of these reach the other's leaf ball: each is tested
+/// against the sixteen spheres of the other block. Task 16 i + l is lane l of pair i.
 template <class T>
-HWY_INLINE void add_lenses(const PairsOfBlocks<T>& pairs, std::uint32_t met, bool binned,
+struct alignas(64) PairsOfBlocks {
+  T x[kTaskCapacity], y[kTaskCapacity], z[kTaskCapacity];  ///< from the other block's origin
+  T reach[kTaskCapacity];                                  ///< radius and rounding
+  const PlacedBlock<T>* block[kPairsAtOnce][2];            ///< of A and of B
+  const Spheres<T>* one[kPairsAtOnce];                     ///< the tasks
+  const Spheres<T>* many[kPairsAtOnce];                    ///< the others
+  const T* lever[kPairsAtOnce];                            ///< of the others
+  alignas(32) T ball[kPairsAtOnce][4];    ///< the centre of the other's leaf ball from one's origin
+  alignas(32) T offset[kPairsAtOnce][4];  ///< one's origin from the other's
+  T ball_reach[kPairsAtOnce];             ///< radius of that ball and rounding
+  T error[kPairsAtOnce];  ///< bound on the rounding of a distance; negative if the tasks are B's
+  std::uint32_t bin[kPairsAtOnce];
+  std::uint32_t task[kTaskCapacity + kWidth];  ///< that reach the other's leaf ball
+  std::uint32_t hits[kTaskCapacity + 1];       ///< task << 16 | the lanes it overlaps
+};
+
+/// The side whose spheres are tasks.
+struct Tasks {
+  std::size_t of_larger, of_b;  ///< 0 or 1; both 0: A's
+};
+
+/// Chooses the block whose spheres are tasks, and places the two blocks.
+template <class T>
+HWY_INLINE void describe_pair(Tasks tasks, std::size_t i, PairsOfBlocks<T>& pairs) {
+  const PlacedBlock<T>* const* both = pairs.block[i];
+  const std::size_t of_b =
+      (static_cast<std::size_t>(both[0]->radius <= both[1]->radius) & tasks.of_larger) | tasks.of_b;
+  const PlacedBlock<T>& one = *both[of_b];  // no branch: it would be unpredictable
+  const PlacedBlock<T>& many = *both[1 - of_b];
+  pairs.one[i] = one.spheres;
+  pairs.many[i] = many.spheres;
+  pairs.lever[i] = many.lever;
+  subtract(many.centre, one.origin, pairs.ball[i]);
+  subtract(one.origin, many.origin, pairs.offset[i]);
+  const T error = one.error + many.error;
+  pairs.ball_reach[i] = many.radius + error;
+  static constexpr T kSign[2] = {1, -1};
+  pairs.error[i] = error * kSign[of_b];
+}
+
+/// Places the spheres of pair `i` and lists those that reach the other's leaf ball: all, or lane
+/// `single` if that is not negative. Returns the number of tasks listed so far.
+template <class T>
+HWY_INLINE std::size_t list_tasks(PairsOfBlocks<T>& pairs, std::size_t i, int single,
+                                  std::size_t listed) {
+  const LaneTag<T> d;
+  const Spheres<T>& spheres = *pairs.one[i];
+  const auto reach = hn::Set(d, pairs.ball_reach[i]);
+  const auto error = hn::Abs(hn::Set(d, pairs.error[i]));
+  for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+    const std::size_t at = kWidth * i + lane;
+    const auto x = hn::Load(d, spheres.x + lane);
+    const auto y = hn::Load(d, spheres.y + lane);
+    const auto z = hn::Load(d, spheres.z + lane);
+    const auto r = hn::Load(d, spheres.r + lane);
+    const auto dx = x - hn::Set(d, pairs.ball[i][0]);
+    const auto dy = y - hn::Set(d, pairs.ball[i][1]);
+    const auto dz = z - hn::Set(d, pairs.ball[i][2]);
+    const auto sum = r + reach;
+    auto near = ((dx * dx + dy * dy) + dz * dz) < sum * sum;
+    if (single >= 0)
+      near = hn::And(near, hn::Iota(d, static_cast<T>(lane)) == hn::Set(d, static_cast<T>(single)));
+    hn::Store(x + hn::Set(d, pairs.offset[i][0]), d, pairs.x + at);
+    hn::Store(y + hn::Set(d, pairs.offset[i][1]), d, pairs.y + at);
+    hn::Store(z + hn::Set(d, pairs.offset[i][2]), d, pairs.z + at);
+    hn::Store(r + (error + error), d, pairs.reach + at);
+    listed += append_lanes<T>(d, near, static_cast<std::uint32_t>(at), pairs.task + listed);
+  }
+  return listed;
+}
+
+/// Finds the lanes that tasks overlap, within rounding. Returns the number of tasks with any.
+template <class T>
+HWY_INLINE std::size_t find_hits(PairsOfBlocks<T>& pairs, std::size_t listed) {
+  const LaneTag<T> d;
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < listed; ++k) {
+    const std::size_t at = pairs.task[k];
+    const Spheres<T>& spheres = *pairs.many[at / kWidth];
+    const auto xi = hn::Set(d, pairs.x[at]);
+    const auto yi = hn::Set(d, pairs.y[at]);
+    const auto zi = hn::Set(d, pairs.z[at]);
+    const auto reach = hn::Set(d, pairs.reach[at]);
+    std::uint32_t lanes = 0;
+    for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
+      const auto dx = hn::Load(d, spheres.x + lane) - xi;
+      const auto dy = hn::Load(d, spheres.y + lane) - yi;
+      const auto dz = hn::Load(d, spheres.z + lane) - zi;
+      const auto sum = hn::Load(d, spheres.r + lane) + reach;
+      lanes |= mask_bits(d, ((dx * dx + dy * dy) + dz * dz) < sum * sum) << lane;
+    }
+    pairs.hits[found] = static_cast<std::uint32_t>(at) << 16 | lanes;
+    found += lanes != 0 ? 1 : 0;
+  }
+  return found;
+}
+
+/// Appends the lenses of a task with the lanes that it overlaps.
+template <class T>
+HWY_INLINE void add_lenses(const PairsOfBlocks<T>& pairs, std::uint32_t hits, bool binned,
                            LensList<T>& list) {
   const LaneTag<T> d;
-  const std::size_t at = met >> 16;
+  const std::size_t at = hits >> 16;
   const std::size_t i = at / kWidth;
   const Spheres<T>& spheres = *pairs.many[i];
   const T* const lever = pairs.lever[i];
@@ -31,7 +138,7 @@ HWY_INLINE void add_lenses(const PairsOfBlocks<T>& pairs, std::uint32_t met, boo
   const auto error = hn::Set(d, pairs.error[i]);
   const std::size_t before = list.size;
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-    const Compressor compress(d, mask_of_bits(d, (met & 0xffff) >> lane));
+    const Compressor compress(d, mask_of_bits(d, (hits & 0xffff) >> lane));
     const auto rj = hn::Load(d, spheres.r + lane);
     const auto dx = hn::Load(d, spheres.x + lane) - xi;
     const auto dy = hn::Load(d, spheres.y + lane) - yi;
@@ -51,24 +158,24 @@ HWY_INLINE void add_lenses(const PairsOfBlocks<T>& pairs, std::uint32_t met, boo
   if (binned) std::fill(list.bin + before, list.bin + list.size, pairs.bin[i]);
 }
 
-/// Appends the lenses of two tasks, which together meet sixteen lanes at most, with half the
-/// stores: only for vectors of sixteen lanes.
+/// Appends the lenses of two tasks, which together overlap at most sixteen lanes, with half the
+/// stores. Requires vectors of sixteen lanes.
 template <class T>
-HWY_INLINE void add_two(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
+HWY_INLINE void add_two(const PairsOfBlocks<T>& pairs, std::uint32_t hits_1, std::uint32_t hits_2,
                         LensList<T>& list) {
   const LaneTag<T> d;
   static_assert(hn::MaxLanes(d) == kWidth);
   const hn::RebindToUnsigned<decltype(d)> du;
   using V = hn::Vec<decltype(d)>;
-  const std::size_t at_1 = met_1 >> 16, at_2 = met_2 >> 16;
+  const std::size_t at_1 = hits_1 >> 16, at_2 = hits_2 >> 16;
   const std::size_t i_1 = at_1 / kWidth, i_2 = at_2 / kWidth;
-  const auto lanes_1 = hn::RebindMask(du, mask_of_bits(d, met_1 & 0xffff));
-  const auto lanes_2 = hn::RebindMask(du, mask_of_bits(d, met_2 & 0xffff));
+  const auto lanes_1 = hn::RebindMask(du, mask_of_bits(d, hits_1 & 0xffff));
+  const auto lanes_2 = hn::RebindMask(du, mask_of_bits(d, hits_2 & 0xffff));
   const std::size_t count_1 = hn::CountTrue(du, lanes_1);
   const std::size_t count_2 = hn::CountTrue(du, lanes_2);
   const auto later = mask_of_bits(d, 0xffffu << count_1 & 0xffffu);
   const auto numbers = hn::Load(du, kLaneNumbers);
-  // The second task's lanes move up behind the first one's.
+  // The second task's lanes follow the first one's.
   const auto moved = hn::IndicesFromVec(du, hn::LoadU(du, kLateLanes + kWidth - count_1));
   const auto from = hn::IndicesFromVec(
       d, hn::IfThenElse(hn::RebindMask(du, later),
@@ -102,34 +209,34 @@ HWY_INLINE void add_two(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std:
   list.size = end + count_1 + count_2;
 }
 
-/// Tasks that meet too much for add_two: seldom, so kept out of the registers of the others.
+/// Tasks that overlap too many lanes for add_two(). Not inlined, as it is rare and costs registers.
 template <class T>
-HWY_NOINLINE void add_apart(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
-                            bool binned, LensList<T>& list) {
-  add_lenses(pairs, met_1, binned, list);
-  add_lenses(pairs, met_2, binned, list);
+HWY_NOINLINE void add_apart(const PairsOfBlocks<T>& pairs, std::uint32_t hits_1,
+                            std::uint32_t hits_2, bool binned, LensList<T>& list) {
+  add_lenses(pairs, hits_1, binned, list);
+  add_lenses(pairs, hits_2, binned, list);
 }
 
-/// Appends the lenses of two tasks: the same list whatever the vectors.
+/// Appends the lenses of two tasks, in the same order for every vector width.
 template <class T>
-HWY_INLINE void add_both(const PairsOfBlocks<T>& pairs, std::uint32_t met_1, std::uint32_t met_2,
+HWY_INLINE void add_both(const PairsOfBlocks<T>& pairs, std::uint32_t hits_1, std::uint32_t hits_2,
                          bool binned, LensList<T>& list) {
   if constexpr (kCompressInstruction<LaneTag<T>>) {
-    const std::size_t count_1 = hwy::PopCount(met_1 & 0xffff);
-    if (count_1 + hwy::PopCount(met_2 & 0xffff) > kWidth)
-      return add_apart(pairs, met_1, met_2, binned, list);
+    const std::size_t count_1 = hwy::PopCount(hits_1 & 0xffff);
+    if (count_1 + hwy::PopCount(hits_2 & 0xffff) > kWidth)
+      return add_apart(pairs, hits_1, hits_2, binned, list);
     std::uint32_t* const bins = list.bin + list.size;
-    add_two(pairs, met_1, met_2, list);
+    add_two(pairs, hits_1, hits_2, list);
     if (!binned) return;
-    std::fill(bins, bins + count_1, pairs.bin[(met_1 >> 16) / kWidth]);
-    std::fill(bins + count_1, list.bin + list.size, pairs.bin[(met_2 >> 16) / kWidth]);
+    std::fill(bins, bins + count_1, pairs.bin[(hits_1 >> 16) / kWidth]);
+    std::fill(bins + count_1, list.bin + list.size, pairs.bin[(hits_2 >> 16) / kWidth]);
   } else {
-    add_lenses(pairs, met_1, binned, list);
-    add_lenses(pairs, met_2, binned, list);
+    add_lenses(pairs, hits_1, binned, list);
+    add_lenses(pairs, hits_2, binned, list);
   }
 }
 
-/// add_leaf_pairs in T, a few pairs through all stages at a time.
+/// add_leaf_pairs() in T: a few pairs at a time go through all stages.
 template <class T>
 void add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t* a,
             const std::uint32_t* b, std::size_t n, LeafSums& sums) {
@@ -170,10 +277,10 @@ void add_as(const LeafStage& stage, PlacedBlocks<T>& blocks, const std::uint32_t
       for (std::size_t i = 0; i < taken; ++i)
         pairs.bin[i] = stage.bins.node[done + i] >> stage.bins.shift;
     done += taken;
-    const std::size_t found = find_met(pairs, listed);
-    if (found % 2 != 0) pairs.met[found] = pairs.met[found - 1] & 0xffff0000;  // meets nothing
+    const std::size_t found = find_hits(pairs, listed);
+    if (found % 2 != 0) pairs.hits[found] = pairs.hits[found - 1] & 0xffff0000;  // overlaps none
     for (std::size_t k = 0; k < found; k += 2) {
-      add_both(pairs, pairs.met[k], pairs.met[k + 1], bins != nullptr, list);
+      add_both(pairs, pairs.hits[k], pairs.hits[k + 1], bins != nullptr, list);
       if (list.size >= kFullList) sum_full_list(list, sums, bins);
     }
   }

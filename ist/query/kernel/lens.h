@@ -7,8 +7,8 @@
 
 namespace ist {
 
-/// Overlap of two balls. `circle` is the squared radius of the circle in which the two surfaces
-/// meet, so that dV/dd = −π · circle; it is 0 where one ball contains the other or they are apart.
+/// The overlap of two balls. `circle` is the squared radius of the circle in which their surfaces
+/// intersect, so dV/dd = −π · circle; it is 0 if one ball contains the other or they are disjoint.
 template <class T>
 struct Lens {
   T cap_a = 0;   ///< 3/π times the volume of ball A's cap, on B's side of the circle's plane
@@ -23,12 +23,12 @@ struct Lens {
 template <class T>
 inline constexpr T kSmallestNormal = std::numeric_limits<T>::min();
 
-/// Lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must never be
-/// re-associated: in this order each loses no digit at any ratio of radii, near tangency or near
-/// coincidence (docs/design.md 3.5; f goes two ways, because d − a is exact only where d is of a's
-/// size, and a − b only where b is). The moment of a cap about its ball's centre is π/4 · circle²
-/// along the axis, the same for both caps and opposite, so the lens's centroid is (cap_a · centre_a
-/// + cap_b · centre_b) / (cap_a + cap_b).
+/// The lens of balls of radii `ra`, `rb` ≥ 0 at centre distance `d` ≥ 0. The sums g, f, e must not
+/// be re-associated: in this order none loses digits at any ratio of radii, near tangency or near
+/// coincidence (docs/design.md 3.5; f has two forms, because d − a is exact only if d is of a's
+/// size, and a − b only if b is). The moments of the caps about their balls' centres are π/4 ·
+/// circle² along the axis and opposite, so the lens's centroid is (cap_a · centre_a + cap_b ·
+/// centre_b) / (cap_a + cap_b).
 template <class T>
 IST_HD Lens<T> lens(T ra, T rb, T d) {
   const T a = ra > rb ? ra : rb;
@@ -38,11 +38,11 @@ IST_HD Lens<T> lens(T ra, T rb, T d) {
   const T e = (a - b) + d;
   if (!(g > 0)) return {};
   // Below the smallest normal number 1/(2d) overflows, and equal balls coincide to rounding.
-  const bool holds = f <= 0 || d < kSmallestNormal<T>;
-  const T inverse = T(0.5) / (holds ? T(1) : d);
-  const T ha = holds ? T(0) : (f * inverse) * g;
+  const bool contained = f <= 0 || d < kSmallestNormal<T>;
+  const T inverse = T(0.5) / (contained ? T(1) : d);
+  const T ha = contained ? T(0) : (f * inverse) * g;
   const T full = (e * inverse) * g;
-  const T hb = holds || T(2) * b < full ? T(2) * b : full;
+  const T hb = contained || T(2) * b < full ? T(2) * b : full;
   const T cap_large = (ha * ha) * (T(3) * a - ha);
   const T cap_small = (hb * hb) * (T(3) * b - hb);
   const T circle = ha * (T(2) * a - ha);

@@ -1,4 +1,4 @@
-// Lenses packed side by side, whatever pairs of blocks they come from: included once a target.
+// Lists of lenses of any pairs of blocks. Included once per target.
 
 #if defined(IST_QUERY_LENS_LIST_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_LENS_LIST_INL_H_
@@ -15,23 +15,24 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Lenses are summed as soon as there are so many.
+/// Lenses are summed as soon as there are this many.
 inline constexpr std::size_t kFullList = 8 * kWidth;
-inline constexpr std::size_t kListRoom = kFullList + 2 * kWidth;
+inline constexpr std::size_t kListCapacity = kFullList + 2 * kWidth;
 
-/// Pairs of spheres i, j that may overlap, in A's axes. A store writes a whole vector and counts
-/// its valid lanes, so the arrays are longer than the list.
+/// Candidate pairs of spheres i, j, in A's axes. A store writes a whole vector, of which only some
+/// lanes count, so the arrays are longer than the list.
 template <class T>
 struct alignas(64) LensList {
-  T dx[kListRoom], dy[kListRoom], dz[kListRoom];  ///< centre of j less centre of i
-  T rj[kListRoom], ri[kListRoom];
-  T lx[kListRoom], ly[kListRoom], lz[kListRoom];  ///< centre of i, relative to B's origin
-  T error[kListRoom];                             ///< of the distance; negative if i is B's
-  std::uint32_t bin[kListRoom];                   ///< of LeafBinning::sums
+  T dx[kListCapacity], dy[kListCapacity], dz[kListCapacity];  ///< centre of j less centre of i
+  T rj[kListCapacity], ri[kListCapacity];
+  T lx[kListCapacity], ly[kListCapacity],
+      lz[kListCapacity];             ///< centre of i, relative to B's origin
+  T error[kListCapacity];            ///< of the distance; negative if i is B's
+  std::uint32_t bin[kListCapacity];  ///< of LeafBinning::sums
   std::size_t size = 0;
 };
 
-/// Sums of one list, sixteen lanes each.
+/// The sums of one list, in sixteen lanes.
 template <class T>
 struct alignas(64) LaneSums : LensSums<T[kWidth]> {};
 
@@ -63,13 +64,13 @@ HWY_INLINE void fold(const T* from, double* total) {
   }
 }
 
-/// Vectors of lenses as lanes [lane, …) of the sums.
+/// Stores vectors as lanes [lane, …) of the sums.
 template <class T, class D, class V>
 HWY_INLINE void store(const LensSums<V>& from, D d, std::size_t lane, LaneSums<T>& to) {
   for_each_sum([&](const V& v, T* lanes) { hn::Store(v, d, lanes + lane); }, from, to);
 }
 
-/// lens() of lens.h, a vector at a time and without branches. Counts those that are not empty.
+/// lens() of lens.h for vectors, without branches. Counts the lenses that are not empty.
 template <class T, class D, class V = hn::Vec<D>>
 HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at,
                                     std::uint32_t& lenses) {
@@ -91,18 +92,18 @@ HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at
   const V f = hn::IfThenElse(step <= b, distance - step, (distance - a) + b);
   const V e = step + distance;
   const V g0 = hn::Max(g, zero);
-  const auto holds = hn::Or(f <= zero, distance < tiny);
+  const auto contained = hn::Or(f <= zero, distance < tiny);
   const V inverse = hn::Set(d, T(0.5)) / hn::Max(distance, tiny);
-  const V ha = hn::IfThenZeroElse(holds, (f * inverse) * g0);
+  const V ha = hn::IfThenZeroElse(contained, (f * inverse) * g0);
   const V diameter = two * b;
-  const V hb = hn::IfThenElse(holds, diameter, hn::Min((e * inverse) * g0, diameter));
+  const V hb = hn::IfThenElse(contained, diameter, hn::Min((e * inverse) * g0, diameter));
   const V large = (ha * ha) * (three * a - ha);
   const V small = (hb * hb) * (three * b - hb);
   const V circle = ha * (two * a - ha);
   const V cap_j = hn::IfThenElse(ri > rj, small, large);
   const V pull = hn::CopySignToAbs(circle * inverse, signed_error);
-  // Within rounding of tangency the circle says nothing; b² bounds it at any distance. Else it
-  // is concave between the tangencies, so within ± error it is at most doubled.
+  // Within rounding of tangency the circle is meaningless; b² bounds it at any distance. Elsewhere
+  // it is concave between the tangencies, so within ± error it is at most doubled.
   const V error = hn::Abs(signed_error);
   const V near = hn::Abs(hn::Min(g, f));
   const V lx = hn::Load(d, list.lx + at);
@@ -114,7 +115,7 @@ HWY_INLINE LensSums<V> lens_vectors(const LensList<T>& list, D d, std::size_t at
   lens.force[0] = pull * dx;
   lens.force[1] = pull * dy;
   lens.force[2] = pull * dz;
-  // The push acts along the line of centres, so at the centre of i.
+  // The force acts along the line of centres, so at the centre of i.
   lens.torque[0] = ly * lens.force[2] - lz * lens.force[1];
   lens.torque[1] = lz * lens.force[0] - lx * lens.force[2];
   lens.torque[2] = lx * lens.force[1] - ly * lens.force[0];
@@ -140,8 +141,7 @@ HWY_INLINE void bin_lenses(const LensList<T>& list, std::size_t batches, LeafSum
   }
 }
 
-/// Adds lenses [0, 16 · batches) to the sums and, if there are any, to the bins'. Lanes of any
-/// vector width add in the same order.
+/// Adds lenses [0, 16 · batches) to sums and bins, in the same order for every vector width.
 template <class T>
 HWY_INLINE void sum_lenses(const LensList<T>& list, std::size_t batches, LeafSums& sums,
                            LeafSums* bins) {
@@ -175,7 +175,7 @@ HWY_INLINE void sum_full_list(LensList<T>& list, LeafSums& sums, LeafSums* bins)
   }
 }
 
-/// Sums all that is left, filled up with points that meet nothing.
+/// Sums the rest, padded with points that overlap nothing.
 template <class T>
 HWY_INLINE void sum_last_lenses(LensList<T>& list, LeafSums& sums, LeafSums* bins) {
   const std::size_t batches = (list.size + kWidth - 1) / kWidth;

@@ -14,17 +14,17 @@ namespace ist::HWY_NAMESPACE {
 
 inline constexpr std::size_t kMostBalls = 4 * kWidth;
 
-/// Evenly filled balls, in A's axes about the middle of B's root: so floats tell B's balls apart.
+/// Evenly filled balls, in A's axes about the centre of B's root, where floats resolve B's balls.
 struct alignas(64) FilledBalls {
   float x[kMostBalls + kWidth], y[kMostBalls + kWidth], z[kMostBalls + kWidth];
   float r[kMostBalls + kWidth];     ///< ≤ 0 in an unused lane
-  float fill[kMostBalls + kWidth];  ///< volume of the spheres below, part of the ball's
+  float fill[kMostBalls + kWidth];  ///< volume of the spheres below over the ball's
   std::size_t count = 0;            ///< a multiple of 16
   float middle[3] = {};             ///< of the root
-  float reach = 0;                  ///< all balls lie within it of the middle
+  float reach = 0;                  ///< radius about `middle` of all balls
 };
 
-/// The nodes of a tree, moved. `about`: their new origin, A's unit frame.
+/// Places the nodes of a tree. `about`: their new origin, A's unit frame.
 HWY_INLINE void place(const SphereTree& tree, const Similarity& map, const double (&about)[3],
                       FilledBalls& out) {
   const LaneTag<double> d;
@@ -84,7 +84,7 @@ HWY_INLINE void place(const SphereTree& tree, const Similarity& map, const doubl
   out.reach = static_cast<float>(hn::GetLane(hn::MaxOfLanes(d, reach)) * (1 + 1e-6));
 }
 
-/// Leaves what comes within the other's reach.
+/// Removes the balls that do not come within the other's reach.
 HWY_INLINE void keep_near(const FilledBalls& other, FilledBalls& balls) {
   const LaneTag<float> d;
   using V = hn::Vec<decltype(d)>;
@@ -107,7 +107,7 @@ HWY_INLINE void keep_near(const FilledBalls& other, FilledBalls& balls) {
     kept += compress.count();
   }
   balls.count = kept;
-  // Fills the last sixteen up with balls that meet nothing.
+  // Pads the last sixteen with balls that overlap nothing.
   for (std::size_t i = kept; i % kWidth != 0; ++i) {
     balls.x[i] = balls.y[i] = balls.z[i] = balls.fill[i] = 0;
     balls.r[i] = kEmptyRadius;
@@ -123,15 +123,15 @@ HWY_INLINE double total(V sums, double before) {
   return before;
 }
 
-/// `lever`: from B's unit-frame origin to where the balls' centres are told from.
+/// `lever`: from B's unit-frame origin to the origin of the balls' centres.
 template <bool kSlopes>
 HWY_INLINE void add_lenses(const FilledBalls& a, const FilledBalls& b, const double (&lever)[3],
-                           Looked& look) {
+                           QuickLook& look) {
   const LaneTag<float> d;
   using V = hn::Vec<decltype(d)>;
   const V zero = hn::Zero(d), two = hn::Set(d, 2.0f), three = hn::Set(d, 3.0f);
   const V one = hn::Set(d, 1.0f), tiny = hn::Set(d, static_cast<float>(kLeastDistance));
-  // Sixteen lanes, each of which adds up in the same order whatever the vectors' width.
+  // Each of sixteen lanes adds up in the same order for every vector width.
   for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
     V volume = zero;
     V force[3] = {zero, zero, zero}, torque[3] = {zero, zero, zero};
@@ -144,7 +144,7 @@ HWY_INLINE void add_lenses(const FilledBalls& a, const FilledBalls& b, const dou
         const V dz = bz - hn::Load(d, a.z + i);
         const V ar = hn::Load(d, a.r + i);
         const V reach = ar + br, step = hn::Abs(ar - br);
-        // A ball that the other contains overlaps as one that touches it from inside.
+        // A contained ball is treated as one that touches the other from inside.
         const V distance = hn::Max(hn::Max(hn::Sqrt((dx * dx + dy * dy) + dz * dz), step), tiny);
         const V depth = hn::Max(reach - distance, zero);
         const V inverse = one / distance;
@@ -170,18 +170,18 @@ HWY_INLINE void add_lenses(const FilledBalls& a, const FilledBalls& b, const dou
     look.volume = total(volume, look.volume);
     if constexpr (kSlopes) {
       for (int k = 0; k < 3; ++k) {
-        look.by_translation[k] = total(force[k], look.by_translation[k]);
-        look.by_rotation[k] = total(torque[k], look.by_rotation[k]);
+        look.slope.by_translation[k] = total(force[k], look.slope.by_translation[k]);
+        look.slope.by_rotation[k] = total(torque[k], look.slope.by_rotation[k]);
       }
     }
   }
 }
 
 void look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b, bool slopes,
-          Looked& out) {
+          QuickLook& out) {
   const NodeBall root_a = a.ball(a.top, 0), root_b = b.ball(b.top, 0);
   const double reach_a = kPokeOut * root_a.r, reach_b = kPokeOut * (root_b.r * a_from_b.scale);
-  // A tiny partner costs little in double, and floats could not represent both.
+  // A tiny partner is cheap in double, and floats could not represent both.
   if (!(reach_a > kSpeck * reach_b && reach_b > kSpeck * reach_a)) return;
   double about[3], lever[3], square = 0;
   a_from_b.apply(root_b.centre, about);
@@ -213,15 +213,13 @@ HWY_EXPORT(look);
 
 QuickLook quick_look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b,
                      bool slopes) noexcept {
-  Looked looked;
-  HWY_DYNAMIC_DISPATCH(look)(a, b, a_from_b, slopes, looked);
-  constexpr double kTwelfth = std::numbers::pi / 12;
   QuickLook result;
-  result.volume = kTwelfth * looked.volume;
-  for (int k = 0; k < 3; ++k) {
-    result.slope.by_translation[k] = -3 * kTwelfth * looked.by_translation[k];
-    result.slope.by_rotation[k] = -3 * kTwelfth * looked.by_rotation[k];
-  }
+  HWY_DYNAMIC_DISPATCH(look)(a, b, a_from_b, slopes, result);
+  // Factors that the sums leave out.
+  constexpr double kTwelfth = std::numbers::pi / 12;
+  result.volume *= kTwelfth;
+  result.slope.by_translation = (-3 * kTwelfth) * result.slope.by_translation;
+  result.slope.by_rotation = (-3 * kTwelfth) * result.slope.by_rotation;
   return result;
 }
 

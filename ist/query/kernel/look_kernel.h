@@ -5,20 +5,14 @@
 
 namespace ist {
 
-/// A coarse estimate of the overlap of two trees: each is a few balls, evenly filled with the
-/// volume of the spheres below. A smooth function of the pose. A's unit frame.
+/// A coarse estimate of the overlap of two trees, each a few balls that are evenly filled with the
+/// volume of the spheres below. Smooth in the pose. A's unit frame.
 struct QuickLook {
   double volume = 0;
   PoseSlope slope;
 };
 
-/// QuickLook as vector code leaves it: plain numbers, by π/12; slopes by −π/4.
-struct Looked {
-  double volume = 0, by_translation[3] = {}, by_rotation[3] = {};
-};
-
-/// Uses the nodes of the lowest levels that have no more than 64. `slopes`: with the derivatives,
-/// which are 0 otherwise.
+/// Uses the lowest levels of no more than 64 nodes. `slopes`: computes the derivatives, else 0.
 QuickLook quick_look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b,
                      bool slopes) noexcept;
 

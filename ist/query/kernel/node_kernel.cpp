@@ -9,8 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Appends the pairs of the chosen lanes and y to two lists, which have a spare vector at their
-/// ends.
+/// Appends the pairs of the chosen lanes and y to two lists, which have a spare vector at the end.
 template <class T, class M>
 HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::uint32_t y,
                               std::uint32_t* out_x, std::uint32_t* out_y) {
@@ -20,19 +19,18 @@ HWY_INLINE std::size_t append(LaneTag<T> d, M chosen, std::uint32_t first, std::
   return append_lanes<T>(d, chosen, first, out_x);
 }
 
-/// The balls that are not opened: the ball of node y of each pair, from the origin of the block
-/// that is opened.
+/// The ball of node y of each pair, relative to the origin of the block that is opened.
 template <class T>
-struct alignas(64) StandingBalls {
+struct alignas(64) FixedBalls {
   T x[kNodePairs], y[kNodePairs], z[kNodePairs];
-  T reach[kNodePairs];   ///< radius, more by what rounding may move a distance
-  T within[kNodePairs];  ///< less by it
+  T reach[kNodePairs];   ///< radius plus the rounding of distances
+  T within[kNodePairs];  ///< radius less that rounding
 };
 
-/// Collects what the balls follow from, pair by pair, and computes them a vector at a time.
+/// Gathers the balls pair by pair and maps them a vector at a time.
 template <class T>
-HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                      std::size_t n, StandingBalls<T>& standing) {
+HWY_INLINE void place_fixed(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                            std::size_t n, FixedBalls<T>& fixed) {
   const hn::CappedTag<double, 8> d;
   using V = hn::Vec<decltype(d)>;
   alignas(64) double centre[3][kNodePairs];
@@ -49,7 +47,7 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
   const Similarity& map = *stage.x_from_y;
   const V scale = hn::Set(d, map.scale);
   for (std::size_t i = 0; i < n; i += hn::Lanes(d)) {
-    const auto pairs = hn::FirstN(d, n - i);  // beyond are no numbers
+    const auto pairs = hn::FirstN(d, n - i);  // others are uninitialised
     const V cx = hn::MaskedLoad(pairs, d, centre[0] + i);
     const V cy = hn::MaskedLoad(pairs, d, centre[1] + i);
     const V cz = hn::MaskedLoad(pairs, d, centre[2] + i);
@@ -64,40 +62,39 @@ HWY_INLINE void stand(const NodeStage& stage, const std::uint32_t* x, const std:
       magnitude = magnitude + hn::Abs(q[k]);
     }
     const V error = magnitude * hn::Set(d, distance_error<T>(2));
-    store_as(q[0], d, standing.x + i);
-    store_as(q[1], d, standing.y + i);
-    store_as(q[2], d, standing.z + i);
-    store_as(r + error, d, standing.reach + i);
-    store_as(r - error, d, standing.within + i);
+    store_as(q[0], d, fixed.x + i);
+    store_as(q[1], d, fixed.y + i);
+    store_as(q[2], d, fixed.z + i);
+    store_as(r + error, d, fixed.reach + i);
+    store_as(r - error, d, fixed.within + i);
   }
 }
 
-/// Which children [lane, …) of a block come within reach of standing ball i; `d2`: squares of their
-/// distances, `r`: of their radii or more.
+/// The mask of the children [lane, …) of a block that reach fixed ball i. `d2`: their squared
+/// distances; `r`: upper bounds on their radii.
 template <class T, class V = hn::Vec<LaneTag<T>>>
 HWY_INLINE hn::Mask<LaneTag<T>> near_of(const BallBlock& block, std::size_t lane,
-                                        const StandingBalls<T>& standing, std::size_t i, V& d2,
-                                        V& r) {
+                                        const FixedBalls<T>& fixed, std::size_t i, V& d2, V& r) {
   const LaneTag<T> d;
-  const V dx = load_as<T>(d, block.x + lane) - hn::Set(d, standing.x[i]);
-  const V dy = load_as<T>(d, block.y + lane) - hn::Set(d, standing.y[i]);
-  const V dz = load_as<T>(d, block.z + lane) - hn::Set(d, standing.z[i]);
+  const V dx = load_as<T>(d, block.x + lane) - hn::Set(d, fixed.x[i]);
+  const V dy = load_as<T>(d, block.y + lane) - hn::Set(d, fixed.y[i]);
+  const V dz = load_as<T>(d, block.z + lane) - hn::Set(d, fixed.z[i]);
   d2 = (dx * dx + dy * dy) + dz * dz;
   r = load_as<T>(d, block.r + lane) * hn::Set(d, static_cast<T>(1 + distance_error<T>(1)));
-  // Negative for an unused lane, whose square must not count.
-  const V sum = hn::Max(r + hn::Set(d, standing.reach[i]), hn::Zero(d));
+  // Unused lanes have negative radii, whose squares must not count.
+  const V sum = hn::Max(r + hn::Set(d, fixed.reach[i]), hn::Zero(d));
   return d2 < sum * sum;
 }
 
-/// With kContained, children inside of y[i] go to `contained`.
+/// kContained: children inside of y[i] go to `contained`.
 template <class T, bool kContained>
 HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
                                const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
                                std::uint32_t* out_y, ContainedNodes* contained) {
   const LaneTag<T> d;
   const SphereTree::Level& opened = stage.x->level[stage.level_x];
-  StandingBalls<T> standing;
-  stand(stage, x, y, n, standing);
+  FixedBalls<T> fixed;
+  place_fixed(stage, x, y, n, fixed);
   std::size_t found = 0;
   const std::uint32_t below = stage.x->count(stage.level_x - 1);
   for (std::size_t i = 0; i < n; ++i) {
@@ -105,12 +102,12 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
     const std::uint32_t first_child = kWidth * x[i];
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
       hn::Vec<LaneTag<T>> d2, r;
-      auto near = near_of(block, lane, standing, i, d2, r);
+      auto near = near_of(block, lane, fixed, i, d2, r);
       const std::uint32_t child = first_child + static_cast<std::uint32_t>(lane);
       if constexpr (kContained) {
-        // Zero but near: an unused lane's square is no float.
+        // Only of near lanes: the square of an unused one may overflow.
         const auto spare =
-            hn::IfThenElseZero(near, hn::Max(hn::Set(d, standing.within[i]) - r, hn::Zero(d)));
+            hn::IfThenElseZero(near, hn::Max(hn::Set(d, fixed.within[i]) - r, hn::Zero(d)));
         const auto inside = d2 < spare * spare;
         contained->size += append<T>(d, inside, child, y[i], contained->x + contained->size,
                                      contained->y + contained->size);
@@ -118,7 +115,7 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
       }
       found += append<T>(d, near, child, y[i], out_x + found, out_y + found);
     }
-    // Unused lanes, which a large enough ball would reach all the same.
+    // A large enough ball reaches unused lanes too.
     while (found > 0 && out_x[found - 1] >= below) --found;
     if constexpr (kContained)
       while (contained->size > 0 && contained->x[contained->size - 1] >= below) --contained->size;
@@ -126,24 +123,14 @@ HWY_INLINE std::size_t open_as(const NodeStage& stage, const std::uint32_t* x,
   return found;
 }
 
-template <bool kContained>
-HWY_INLINE std::size_t open_either(const NodeStage& stage, const std::uint32_t* x,
-                                   const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                                   std::uint32_t* out_y, ContainedNodes* contained) {
-  return stage.precision == Precision::float32
-             ? open_as<float, kContained>(stage, x, y, n, out_x, out_y, contained)
-             : open_as<double, kContained>(stage, x, y, n, out_x, out_y, contained);
-}
-
 std::size_t open(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                 std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) {
-  return open_either<false>(stage, x, y, n, out_x, out_y, nullptr);
-}
-
-std::size_t open_holding(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                         std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
-                         ContainedNodes& contained) {
-  return open_either<true>(stage, x, y, n, out_x, out_y, &contained);
+                 std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                 ContainedNodes* contained) {
+  if (stage.precision == Precision::float32)
+    return contained == nullptr ? open_as<float, false>(stage, x, y, n, out_x, out_y, contained)
+                                : open_as<float, true>(stage, x, y, n, out_x, out_y, contained);
+  return contained == nullptr ? open_as<double, false>(stage, x, y, n, out_x, out_y, contained)
+                              : open_as<double, true>(stage, x, y, n, out_x, out_y, contained);
 }
 
 }  // namespace ist::HWY_NAMESPACE
@@ -153,17 +140,11 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(open);
-HWY_EXPORT(open_holding);
 
 std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept {
-  return HWY_DYNAMIC_DISPATCH(open)(stage, x, y, n, out_x, out_y);
-}
-
-std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
-                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                               std::uint32_t* out_y, ContainedNodes& contained) noexcept {
-  return HWY_DYNAMIC_DISPATCH(open_holding)(stage, x, y, n, out_x, out_y, contained);
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                       ContainedNodes* contained) noexcept {
+  return HWY_DYNAMIC_DISPATCH(open)(stage, x, y, n, out_x, out_y, contained);
 }
 
 }  // namespace ist

@@ -9,10 +9,10 @@
 
 namespace ist {
 
-/// Pairs that are opened together.
+/// The largest number of pairs that are opened together.
 inline constexpr std::size_t kNodePairs = 64;
 
-/// One stage of the descent: nodes of tree x are opened, those of y stand still.
+/// One stage of the traversal: nodes of tree x are opened, those of y are not.
 struct NodeStage {
   const SphereTree* x;
   const SphereTree* y;
@@ -22,12 +22,6 @@ struct NodeStage {
   Precision precision;
 };
 
-/// Opens node x[i] of each of n ≤ kNodePairs pairs and keeps its children that come within reach of
-/// node y[i], never losing one to rounding. Writes at most 16 n pairs and up to 16 entries of
-/// scratch beyond them; returns how many pairs. Same output on every instruction set.
-std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
-                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y) noexcept;
-
 /// Nodes of x that lie in a sphere of y.
 struct ContainedNodes {
   std::uint32_t* x;
@@ -35,10 +29,14 @@ struct ContainedNodes {
   std::size_t size = 0;
 };
 
-/// The same where y are single spheres, but children that lie altogether in sphere y[i] are
-/// appended to `contained` instead: at most 16 n, and up to 16 entries beyond.
-std::size_t open_under_spheres(const NodeStage& stage, const std::uint32_t* x,
-                               const std::uint32_t* y, std::size_t n, std::uint32_t* out_x,
-                               std::uint32_t* out_y, ContainedNodes& contained) noexcept;
+/// Opens node x[i] of each of n ≤ kNodePairs pairs and keeps its children that reach node y[i],
+/// within rounding. Writes at most 16 n pairs and up to 16 entries of scratch beyond them; returns
+/// the number of pairs. Same output on every instruction set.
+///
+/// `contained`, for single spheres y: gets the children that lie wholly in sphere y[i] instead,
+/// with the same limits.
+std::size_t open_nodes(const NodeStage& stage, const std::uint32_t* x, const std::uint32_t* y,
+                       std::size_t n, std::uint32_t* out_x, std::uint32_t* out_y,
+                       ContainedNodes* contained) noexcept;
 
 }  // namespace ist

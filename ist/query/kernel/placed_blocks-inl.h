@@ -1,4 +1,4 @@
-// Leaf blocks as PlacedBlock: included once a target.
+// Places leaf blocks. Included once per target.
 
 #if defined(IST_QUERY_PLACED_BLOCKS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_PLACED_BLOCKS_INL_H_
@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// The map from B's unit frame to A's in the forms the stages load: T row by row, and columns.
+/// The map from B's unit frame to A's, as the stages load it: in T by rows, and by columns.
 template <class T>
 struct alignas(32) TurnedAxes {
   explicit TurnedAxes(const Similarity& map) : scale(map.scale) {
@@ -40,21 +40,20 @@ HWY_INLINE void subtract(const double (&x)[4], const double (&y)[4], T (&differe
     store_as(hn::Load(d, x + k) - hn::Load(d, y + k), d, difference + k);
 }
 
-/// Derives the remaining members from the positions of a block and its leaf ball; `size` bounds the
-/// distance from the block's origin to the end of any of its spheres.
+/// Derives the remaining members. `size`: bound on the spheres' distance from the block's origin.
 template <class T>
 HWY_INLINE void finish_placing(double size, const TurnedAxes<T>& axes, PlacedBlock<T>& placed) {
-  // Two blocks that touch have origins no further apart than both sizes. The sums that take errors
-  // in are rounded too.
+  // The origins of two blocks that touch are no further apart than both sizes. The sums with errors
+  // are rounded too.
   placed.error = static_cast<T>(distance_error<T>(3 * size));
   subtract(placed.origin, axes.column[3], placed.lever);
 }
 
-/// So far that nothing comes near, and that its square is a number.
+/// Farther than anything, but with a finite square.
 template <class T>
 inline constexpr T kFar = sizeof(T) == sizeof(float) ? static_cast<T>(1e18) : static_cast<T>(1e150);
 
-/// Makes points far away of the lanes of the last block that contain no sphere.
+/// Makes the unused lanes of the last block points that are far away.
 template <class T>
 HWY_INLINE void put_away_unused(const SphereTree& tree, std::uint32_t block, Spheres<T>& spheres) {
   if (block + 1 < tree.level[0].count) return;
@@ -64,7 +63,7 @@ HWY_INLINE void put_away_unused(const SphereTree& tree, std::uint32_t block, Sph
   }
 }
 
-/// A leaf block of A. Full blocks of floats lie in the asset as they are needed.
+/// Places a leaf block of A. Full blocks of floats are used from the asset directly.
 template <class T>
 HWY_INLINE void place_block(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
                             PlacedBlock<T>& placed) {
@@ -75,13 +74,13 @@ HWY_INLINE void place_block(const SphereTree& tree, std::uint32_t block, const T
   } else {
     const LaneTag<T> d;
     for (std::size_t lane = 0; lane < kWidth; lane += hn::Lanes(d)) {
-      hn::Store(load_as<T>(d, balls.x + lane), d, placed.room.x + lane);
-      hn::Store(load_as<T>(d, balls.y + lane), d, placed.room.y + lane);
-      hn::Store(load_as<T>(d, balls.z + lane), d, placed.room.z + lane);
-      hn::Store(load_as<T>(d, balls.r + lane), d, placed.room.r + lane);
+      hn::Store(load_as<T>(d, balls.x + lane), d, placed.own.x + lane);
+      hn::Store(load_as<T>(d, balls.y + lane), d, placed.own.y + lane);
+      hn::Store(load_as<T>(d, balls.z + lane), d, placed.own.z + lane);
+      hn::Store(load_as<T>(d, balls.r + lane), d, placed.own.r + lane);
     }
-    put_away_unused(tree, block, placed.room);
-    placed.spheres = &placed.room;
+    put_away_unused(tree, block, placed.own);
+    placed.spheres = &placed.own;
   }
   const Origin& o = tree.level[0].origins[block];
   const NodeBall ball = tree.ball(0, block);
@@ -97,7 +96,7 @@ HWY_INLINE void place_block(const SphereTree& tree, std::uint32_t block, const T
   finish_placing(size, axes, placed);
 }
 
-/// A leaf block of B, turned and scaled into A's axes.
+/// Places a leaf block of B, turned and scaled into A's axes.
 template <class T>
 HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const TurnedAxes<T>& axes,
                            PlacedBlock<T>& placed) {
@@ -110,13 +109,13 @@ HWY_INLINE void turn_block(const SphereTree& tree, std::uint32_t block, const Tu
     const auto x = load_as<T>(d, balls.x + lane);
     const auto y = load_as<T>(d, balls.y + lane);
     const auto z = load_as<T>(d, balls.z + lane);
-    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, placed.room.x + lane);
-    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, placed.room.y + lane);
-    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, placed.room.z + lane);
-    hn::Store(load_as<T>(d, balls.r + lane) * scale, d, placed.room.r + lane);
+    hn::Store((m[0] * x + m[1] * y) + m[2] * z, d, placed.own.x + lane);
+    hn::Store((m[3] * x + m[4] * y) + m[5] * z, d, placed.own.y + lane);
+    hn::Store((m[6] * x + m[7] * y) + m[8] * z, d, placed.own.z + lane);
+    hn::Store(load_as<T>(d, balls.r + lane) * scale, d, placed.own.r + lane);
   }
-  put_away_unused(tree, block, placed.room);
-  placed.spheres = &placed.room;
+  put_away_unused(tree, block, placed.own);
+  placed.spheres = &placed.own;
 
   const FourDoubles d4;
   const Origin& o = tree.level[0].origins[block];

@@ -25,7 +25,7 @@ void sum_subtrees(const SphereTree& tree, int level, const std::uint32_t* nodes,
       for (std::uint32_t b = below.begin; b < below.end; ++b) {
         const BallBlock& balls = leaves.blocks[b];
         const Origin& origin = leaves.origins[b];
-        // Negative for an unused lane.
+        // Unused lanes have negative radii.
         const auto r = hn::Max(load_as<double>(d, balls.r + lane), hn::Zero(d));
         const auto cube = r * (r * r);
         cubes = cubes + cube;

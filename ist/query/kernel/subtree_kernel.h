@@ -7,8 +7,7 @@
 
 namespace ist {
 
-/// Running sums over spheres, in their tree's unit frame, a lane a sphere of a block. Factors of π
-/// are left to the end.
+/// Running sums over spheres, in their tree's unit frame, by lanes. Without factors of π.
 struct alignas(64) SubtreeSums {
   double cubes[kWidth] = {};      ///< Σ r³
   double moment[3][kWidth] = {};  ///< Σ r³ · centre

@@ -7,13 +7,13 @@
 
 namespace ist {
 
-/// How nearly two copies of one asset coincide. If each sphere lies on its copy, the sum of lenses
-/// is ∫ρ², where ρ, the number of spheres at a point, is 1 in the mean but not everywhere: 6 to 9 %
-/// too much (docs/design.md 5). A level of detail against the next coarser one has other spheres
-/// and no such excess. So as copies come to coincide, such unlike levels take over: the mean of
-/// both orders, which has no force where the copies coincide.
+/// The weight of unlike levels of detail for two copies of one asset that nearly coincide. If each
+/// sphere lies on its copy, the sum of lenses is ∫ρ², where ρ, the number of spheres at a point, is
+/// 1 in the mean but not everywhere: 6 to 9 % too much (docs/design.md 5). A level against the next
+/// coarser one has other spheres and no such excess. So as copies approach coincidence, such unlike
+/// levels take over: the mean of both orders, which has no force at coincidence.
 struct CoincidenceWeight {
-  double weight = 0;  ///< [0, 1] part of the unlike levels; 0 from a displacement of 1.6 mean radii
+  double weight = 0;  ///< [0, 1]; 0 from a displacement of 1.6 mean radii on
   PoseSlope slope;
 };
 

@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// Sums the part of a blend with the largest weight, once: contact patches sort it into bins.
+/// Computes the part of a blend with the largest weight, which contact patches sort into bins.
 class LargestPart {
  public:
   /// A pair of levels, in place of lens_sum().
@@ -22,23 +22,23 @@ class LargestPart {
   ~LargestPart() = default;
 };
 
-/// penetration() by Measure::exact, which stands above this folder.
+/// penetration() by Measure::exact, a function above this folder.
 using ExactMeasure = Penetration (*)(const PlacedAsset& a, const PlacedAsset& b,
                                      const PenetrationSettings& settings, const RelativePose& pose,
                                      Workspace& workspace) noexcept;
 
-/// Whether other levels than the finest have a say in matched spheres' answer.
+/// True if the answer of matched spheres depends on other levels than the finest.
 inline bool asks_levels(const PlacedAsset& a, const PlacedAsset& b,
                         const PenetrationSettings& settings) noexcept {
   return settings.pair_budget > 0 || by_error(settings) ||
          are_one_asset(a.asset.header(), b.asset.header());
 }
 
-/// The penetration from levels of detail. Under a wanted error they and the exact measure are
-/// blended by what they err (WantedError), under a pair budget by what they need (LevelChain), and
-/// without either the finest answers; copies of one asset that all but coincide are asked as unlike
-/// levels (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null
-/// where that part is summed as the others. No allocation, lock or exception.
+/// The penetration by levels of detail. Under a wanted error levels and the exact measure are
+/// blended by their errors (WantedError), under a pair budget levels by their costs (LevelChain);
+/// without either the finest answers. Copies of one asset that nearly coincide use unlike levels
+/// (CoincidenceWeight). The gradients are those of the blended sum. `largest`: null if that part is
+/// summed as the others. No allocation, lock or exception.
 Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
                          const PenetrationSettings& settings, Workspace& workspace,
                          ExactMeasure exact, LargestPart* largest = nullptr) noexcept;

@@ -9,12 +9,12 @@
 
 namespace ist {
 
-/// The pairs of levels with which two assets may be asked, from the finest to the coarsest of both
-/// (docs/design.md 5). Each step takes a coarser level on the side of the smaller spheres, which
-/// cost most and tell least, or on both sides where spheres are about as large.
+/// The pairs of levels of detail of two assets that a query may use, from the finest to the
+/// coarsest of both (docs/design.md 5). Each step takes a coarser level on the side of the smaller
+/// spheres, which cost most and add least, or on both sides if spheres are about as large.
 ///
-/// How many sphere pairs a level needs is told from the overlap of the coarsest levels, the
-/// *coarse estimate*: a smooth function of the pose, so that an answer may be blended by it.
+/// The overlap of the coarsest levels, the *coarse estimate*, predicts the number of sphere pairs
+/// of each level. It is smooth in the pose, so that answers may be blended by it.
 class LevelChain {
  public:
   static constexpr std::size_t kMost = 2 * kMaxDetails + 1;
@@ -42,19 +42,18 @@ class LevelChain {
   IST_HD const LevelPair& operator[](std::size_t i) const noexcept { return pairs_[i]; }
   IST_HD const LevelPair& coarsest() const noexcept { return pairs_[size_ - 1]; }
 
-  /// Part of the answer that the finest pair gives whatever a coarse estimate would say, by what a
-  /// quick look sees (docs/design.md 5), with the slope: 1 while that needs no more than 0.35 of
-  /// `budget`, 0 from a half on.
+  /// The weight of the finest pair by a quick look, before any coarse estimate (docs/design.md 5),
+  /// with its slope: 1 while it needs no more than 0.35 of `budget`, 0 from a half on.
   IST_HD LevelWeight quick_weight(double look, double budget) const noexcept {
     return affordable(pairs_[0], look, budget, kLookAlone, kLookNone);
   }
 
-  /// visit(i, weight) for every pair. The weights sum to 1: all of it is the finest pair's while
-  /// that needs no more than 0.7 of `budget` sphere pairs, none where it needs the whole; what is
-  /// left goes to the next pair by the same rule, and what none can afford to the coarsest.
-  /// Continuous in `coarse`, with the slope. An estimate of 0: the finest.
+  /// Calls visit(i, weight) for every pair. The weights sum to 1: the finest pair gets all while it
+  /// needs no more than 0.7 of `budget` sphere pairs, and nothing if it needs the whole; the rest
+  /// goes to the next pair by the same rule, and in the end to the coarsest. Weights are continuous
+  /// in `coarse` and have their slopes. An estimate of 0 selects the finest.
   ///
-  /// `wanted(i)`: what each pair would give without a budget.
+  /// `wanted(i)`: the weight of each pair without a budget.
   template <class Wanted, class Visit>
   IST_HD void share(double coarse, double budget, const Wanted& wanted,
                     const Visit& visit) const noexcept {

@@ -24,16 +24,16 @@ struct LevelCost {
   }
 };
 
-/// Levels of detail of two assets that are asked together.
+/// A level of detail of each of two assets.
 struct LevelPair {
   std::uint32_t a, b;  ///< 0: the finest
 
-  // The parts of the expected number of sphere pairs, A's unit frame.
-  double density;  ///< pairs over volume of overlap
-  double skin;     ///< √volume: makes up for the rim of a shallow contact
+  // Factors of the expected number of sphere pairs, A's unit frame.
+  double density;  ///< pairs per volume of overlap
+  double skin;     ///< √volume: for the rim of shallow contacts
 };
 
-/// Part of an answer that one pair of levels gives.
+/// The weight of a pair of levels in an answer.
 struct LevelWeight {
   double weight;  ///< [0, 1]
   double slope;   ///< d weight / d estimate of the overlap
@@ -49,7 +49,7 @@ IST_HD inline LevelWeight complement(const LevelWeight& x) noexcept {
   return {1 - x.weight, -x.slope};
 }
 
-/// The levels a and b of two assets. `scale`: of B in A's unit frame.
+/// `scale`: of B in A's unit frame.
 IST_HD inline LevelPair detail_pair(std::uint32_t a, const LevelCost& of_a, std::uint32_t b,
                                     const LevelCost& of_b, double scale) noexcept {
   const double volume_b = of_b.volume_sum * (scale * scale * scale);
@@ -61,8 +61,8 @@ IST_HD inline LevelPair detail_pair(std::uint32_t a, const LevelCost& of_a, std:
           kPairRim * reach * std::sqrt(size)};
 }
 
-/// Goes on to the next coarser level of A, of B, or of both (LevelChain), as far as there are
-/// `more`. Radii are the levels' mean ones, A's unit frame.
+/// Advances to the next coarser level of A, of B, or of both (LevelChain) if there are `more`.
+/// Radii are the levels' mean radii, A's unit frame.
 IST_HD inline void step_coarser(bool more_a, bool more_b, double radius_a, double radius_b,
                                 std::uint32_t& a, std::uint32_t& b) noexcept {
   const double cube_a = radius_a * radius_a * radius_a;
@@ -71,17 +71,17 @@ IST_HD inline void step_coarser(bool more_a, bool more_b, double radius_a, doubl
   b += more_b && (!more_a || !(kAlikeVolume * cube_b > cube_a)) ? 1 : 0;
 }
 
-/// About how many sphere pairs a pair of levels needs for an overlap, A's unit frame.
+/// The expected number of sphere pairs for an overlap, A's unit frame.
 IST_HD inline double expected_pairs(const LevelPair& pair, double overlap) noexcept {
   return pair.density * (overlap + pair.skin * std::sqrt(overlap));
 }
 
-/// 1 where a pair of levels needs no more than the part `alone` of the budget by an estimate of the
-/// overlap, 0 from `none` on, with its slope by the estimate.
+/// 1 if a pair of levels is expected to need no more than the fraction `alone` of the budget, 0
+/// from `none` on; with its slope by the estimated overlap.
 IST_HD inline LevelWeight affordable(const LevelPair& pair, double estimate, double budget,
                                      double alone, double none) noexcept {
   const double expected = expected_pairs(pair, estimate);
-  // (written so that a damaged asset's NaN takes the coarsest level)
+  // (a damaged asset's NaN selects the coarsest level)
   const double t = expected < none * budget ? (none - expected / budget) / (none - alone) : 0;
   if (!(t > 0 && t < 1)) return {smooth_step(t), 0};
   return {smooth_step(t), -smooth_slope(t) / ((none - alone) * budget) * pair.density *

@@ -17,26 +17,25 @@
 namespace ist {
 namespace {
 
-// Ratio of grains up to which trees are summed by lenses alone, however light the contact; from
-// which on the meshes answer light contacts; and from which on all.
-constexpr double kAlike = 1.25, kOther = 2, kUnlike = 4;
-// A contact is light up to an overlap of so many spheres of the coarser grain: there lenses are 2 %
-// and more in error, and few triangles cross …
+// The ratio of feature sizes up to which lenses answer alone, from which on the meshes answer light
+// contacts, and from which on they answer all.
+constexpr double kRatioLensOnly = 1.25, kRatioLight = 2, kRatioExactOnly = 4;
+// A contact is light up to an overlap of this many spheres of the coarser solid: there lenses err
+// by 2 % and more, and few triangles cross …
 constexpr double kFewSpheres = 2;
-// … if a sphere meets no more triangles than the one; never if it meets more than the other.
+// … if a sphere overlaps at most the first number of triangles, and never from the second on.
 constexpr double kFewTriangles = 10, kManyTriangles = 20;
-// The lenses answer alone from so many times that on.
+// Lenses answer alone from this multiple of a light contact's overlap on.
 constexpr double kHandover = 4;
 
-/// How coarse an asset's spheres are for its solid, its unit frame: the mean radius, and more where
-/// inner spheres cover little of it, the solid being thinner than its matched spheres.
-double grain(const AssetHeader& asset) {
+/// The feature size of an asset's spheres, unit frame: the mean radius, or more if inner spheres
+/// cover little of the solid, which is then thinner than its matched spheres.
+double feature_size(const AssetHeader& asset) {
   return asset.matched_tree.mean_radius / covered_part(asset);
 }
 
-/// About how many triangles of a mesh a ball on it meets: those that a disc covers, and those at
-/// its rim.
-double triangles_met(const AssetHeader& asset, double radius) {
+/// The approximate number of triangles of a mesh that a ball on it overlaps, with those at its rim.
+double triangles_in_ball(const AssetHeader& asset, double radius) {
   const MeshHeader& mesh = *at<MeshHeader>(asset, asset.mesh);
   double area = 0;
   for (const double part : at<BoxSums>(asset, mesh.level[mesh.level_count - 1].nodes)->area)
@@ -47,68 +46,28 @@ double triangles_met(const AssetHeader& asset, double radius) {
 }
 
 /// `scale`: of B in A's unit frame.
-PairMethod method_by_grains(const AssetHeader& header_a, const AssetHeader& header_b,
-                            double scale) {
+PairMethod method_by_sizes(const AssetHeader& asset_a, const AssetHeader& asset_b, double scale) {
   PairMethod method;
-  const double feature_size_a = grain(header_a), feature_size_b = grain(header_b) * scale;
-  const double coarse = std::max(feature_size_a, feature_size_b);
-  const double ratio = coarse / std::min(feature_size_a, feature_size_b);
-  if (ratio >= kUnlike) return {false, true};
-  if (!(ratio > kAlike)) return method;
-  // Grows without bound as the ratio does towards kUnlike.
-  const double unlike = smooth_step((ratio - kAlike) / (kUnlike - kAlike));
-  const double triangles = feature_size_b <= feature_size_a
-                               ? triangles_met(header_a, header_b.matched_tree.mean_radius * scale)
-                               : triangles_met(header_b, header_a.matched_tree.mean_radius / scale);
+  const double size_a = feature_size(asset_a), size_b = feature_size(asset_b) * scale;
+  const double coarse = std::max(size_a, size_b);
+  const double ratio = coarse / std::min(size_a, size_b);
+  if (ratio >= kRatioExactOnly) return {false, true};
+  if (!(ratio > kRatioLensOnly)) return method;
+  const double unlike = smooth_step((ratio - kRatioLensOnly) / (kRatioExactOnly - kRatioLensOnly));
+  const double triangles =
+      size_b <= size_a ? triangles_in_ball(asset_a, asset_b.matched_tree.mean_radius * scale)
+                       : triangles_in_ball(asset_b, asset_a.matched_tree.mean_radius / scale);
   const double worth =
       1 - smooth_step((triangles - kFewTriangles) / (kManyTriangles - kFewTriangles));
   method.exact = worth > 0;
-  method.share = smooth_step((ratio - kAlike) / (kOther - kAlike));
+  method.share = smooth_step((ratio - kRatioLensOnly) / (kRatioLight - kRatioLensOnly));
+  // Grows without bound as the ratio approaches kRatioExactOnly.
   method.full = worth * kFewSpheres * kBallVolume * (coarse * coarse * coarse) / (1 - unlike);
   method.none = kHandover * method.full;
   return method;
 }
 
-}  // namespace
-
-PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
-                       const PenetrationSettings& settings,
-                       const std::optional<RelativePose>& pose) noexcept {
-  const bool mesh_alone = lack_spheres(a, b);
-  // Meshes alone have no other measure.
-  if (settings.measure == Measure::exact || (by_error(settings) && mesh_alone))
-    return {false, true};
-  if (settings.measure != Measure::matched || settings.spheres_only || mesh_alone || !pose ||
-      !a.asset.has_mesh() || !b.asset.has_mesh())
-    return {};
-  const PairMethod method =
-      method_by_grains(a.asset.header(), b.asset.header(), pose->a_from_b.scale);
-  // Under a wanted error blend_levels() has the exact measure for what spheres cannot do.
-  const bool has_own = by_error(settings) && settings.pair_budget == 0;
-  return method.spheres && has_own ? PairMethod() : method;
-}
-
-SizeMatch size_match(const PlacedAsset& a, const PlacedAsset& b) noexcept {
-  SizeMatch fit;
-  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return fit;
-  if (!(a.scale > 0) || !(b.scale > 0)) return fit;
-  const auto placed_grain = [](const PlacedAsset& placed) {
-    const AssetHeader& header = placed.asset.header();
-    return std::ldexp(placed.scale * grain(header), header.exponent);
-  };
-  fit.feature_size_a = placed_grain(a);
-  fit.feature_size_b = placed_grain(b);
-  fit.a_is_coarser = fit.feature_size_b <= fit.feature_size_a;
-  fit.ratio = std::max(fit.feature_size_a, fit.feature_size_b) /
-              std::min(fit.feature_size_a, fit.feature_size_b);
-  fit.has_mesh = a.asset.has_mesh() && b.asset.has_mesh();
-  fit.needs_mesh = fit.ratio >= kUnlike;
-  return fit;
-}
-
-namespace {
-
-/// Weight and slope where spheres say `volume`, A's unit frame.
+/// Weight and slope at the spheres' `volume`, A's unit frame.
 std::pair<double, double> weight_at(const PairMethod& method, double volume) noexcept {
   if (!method.exact) return {0, 0};
   if (!(volume > method.full)) return {method.share, 0};
@@ -120,10 +79,45 @@ std::pair<double, double> weight_at(const PairMethod& method, double volume) noe
 
 }  // namespace
 
+PairMethod pair_method(const PlacedAsset& a, const PlacedAsset& b,
+                       const PenetrationSettings& settings,
+                       const std::optional<RelativePose>& pose) noexcept {
+  const bool mesh_alone = lack_spheres(a, b);
+  // Assets of a mesh alone have no other measure.
+  if (settings.measure == Measure::exact || (by_error(settings) && mesh_alone))
+    return {false, true};
+  if (settings.measure != Measure::matched || settings.spheres_only || mesh_alone || !pose ||
+      !a.asset.has_mesh() || !b.asset.has_mesh())
+    return {};
+  const PairMethod method =
+      method_by_sizes(a.asset.header(), b.asset.header(), pose->a_from_b.scale);
+  // Under a wanted error blend_levels() uses the exact measure by itself.
+  const bool has_own = by_error(settings) && settings.pair_budget == 0;
+  return method.spheres && has_own ? PairMethod() : method;
+}
+
+SizeMatch size_match(const PlacedAsset& a, const PlacedAsset& b) noexcept {
+  SizeMatch fit;
+  if (a.asset.sphere_count() == 0 || b.asset.sphere_count() == 0) return fit;
+  if (!(a.scale > 0) || !(b.scale > 0)) return fit;
+  const auto placed_size = [](const PlacedAsset& placed) {
+    const AssetHeader& header = placed.asset.header();
+    return std::ldexp(placed.scale * feature_size(header), header.exponent);
+  };
+  fit.feature_size_a = placed_size(a);
+  fit.feature_size_b = placed_size(b);
+  fit.a_is_coarser = fit.feature_size_b <= fit.feature_size_a;
+  fit.ratio = std::max(fit.feature_size_a, fit.feature_size_b) /
+              std::min(fit.feature_size_a, fit.feature_size_b);
+  fit.has_mesh = a.asset.has_mesh() && b.asset.has_mesh();
+  fit.needs_mesh = fit.ratio >= kRatioExactOnly;
+  return fit;
+}
+
 ExactWeight exact_weight(const PairMethod& method, const Penetration& spheres,
                          double unit3) noexcept {
   const auto [weight, slope] = weight_at(method, spheres.volume / unit3);
-  // It falls with the volume.
+  // The weight falls with the volume.
   return {weight, slope, weight_at(method, spheres.volume_max / unit3).first,
           weight_at(method, spheres.volume_min / unit3).first};
 }
@@ -154,7 +148,8 @@ Penetration blended(const Penetration& spheres, Penetration sum, const ExactWeig
   const double w = weight.weight;
   const double slope = weight.slope / unit3 * (sum.volume - spheres.volume);
   const double volume = w * sum.volume + (1 - w) * spheres.volume;
-  // The weight is as sure as the spheres' volume; a blend is largest and least at its ends.
+  // The weight is as uncertain as the spheres' volume; a blend has its extremes at the weight's
+  // ends.
   const auto at = [](double part, double x, double y) { return part * x + (1 - part) * y; };
   const double lowest = std::min(at(weight.least, sum.volume_min, spheres.volume_min),
                                  at(weight.most, sum.volume_min, spheres.volume_min));

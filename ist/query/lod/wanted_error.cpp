@@ -11,40 +11,41 @@ namespace ist {
 namespace {
 
 // A sum of lenses over n solid spheres (solid_volume()) errs by less than kErrorOfOne · n^(-8/9) in
-// 19 of 20 random poses, and by a third of that in the median. Fitted to spheres of 468 to 30,000
-// in poses of seven pairs of solids (`benchmarks/run.sh wanted_error`).
+// 19 of 20 random poses, and by a third of that in the median. Fitted to assets of 468 to 30,000
+// spheres in poses of seven pairs of solids (`benchmarks/run.sh wanted_error`).
 constexpr double kErrorOfOne = 0.09;
 constexpr double kMostOverMedian = 3;
-// In deep contact forces cancel and err by more than volumes: by 1° at 0.5 % with so many times the
-// overlap more per share of the smaller solid. Only where a finer level is at hand.
+// In deep contact forces cancel and err by more than volumes. They err by 1° at 0.5 % if the
+// required overlap grows by this factor per share of the smaller solid; only for levels with a
+// finer one.
 constexpr double kDeep = 4.5;
 
-// The part of a level's overlap from which on it is blended in.
+// The fraction of a level's required overlap from which on it is blended in.
 constexpr double kTooRough = 0.7;
 
-// Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being all of them.
-// One costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
+// Surfaces cross in kCrossings (√T_A (V/V_A)^⅜ + √T_B (V/V_B)^⅜) triangles, T being their numbers.
+// A crossing costs as much as kPairsOfCrossing pairs of spheres; spheres must save kPairsSaved.
 constexpr double kCrossings = 4.5, kPairsOfCrossing = 28, kPairsSaved = 250;
-// The overlap at which both are compared, in those from which on a level answers: the next coarser
-// one takes over at four.
+// Costs are compared at this multiple of a level's required overlap: the next coarser level takes
+// over at four.
 constexpr double kCompared = 2;
 
-// A level is compared with another whose spheres are by at least this part larger …
+// A level is compared with one whose spheres are larger by at least this fraction …
 constexpr double kLeastWider = 0.3;
-// … and trusted up to this square of the error that follows over the accepted one; from the other
-// on not at all. In between a blend with the truth errs by no more than accepted.
+// … and trusted up to this square of the derived error over the accepted one, from the second on
+// not at all. In between a blend with the truth errs by no more than accepted.
 constexpr double kTrusted2 = 0.75, kDistrusted2 = 3;
 
 double eighth_root(double x) { return std::sqrt(std::sqrt(std::sqrt(x))); }
 
-/// (kErrorOfOne / error)^(9/8), of an error where there is one sphere.
+/// The number of spheres for an error, from the error of one: (error_of_one / error)^(9/8).
 double spheres_for(double error_of_one, double error) {
   const double times = error_of_one / error;
   return times * eighth_root(times);
 }
 
-/// How many such spheres an overlap needs. By the errors that the bake measured, if it did: their
-/// inverse is about linear in the number.
+/// The number of solid spheres that an overlap needs for an error. Interpolates the errors that the
+/// bake measured, if any: their inverse is nearly linear in the number.
 double spheres_needed(const AssetHeader& asset, double error) {
   const TreeHeader& tree = asset.matched_tree;
   const double all = tree.volume_sum / solid_volume(asset, tree);
@@ -66,7 +67,7 @@ double spheres_needed(const AssetHeader& asset, double error) {
   return before > 0 ? before * spheres_for(error_before, error) : spheres_for(kErrorOfOne, error);
 }
 
-/// About how many triangles of a mesh cross the other's surface.
+/// The approximate number of triangles that cross the other surface. `share`: of the volume.
 double crossings(const AssetHeader& asset, double share) {
   const double root = std::sqrt(share), quarter = std::sqrt(root);
   return kCrossings *
@@ -104,7 +105,7 @@ WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const Relat
     wider_[i] = both(wide_a.mean_radius, wide_b.mean_radius * pose.a_from_b.scale) /
                     both(tree_a.mean_radius, tree_b.mean_radius * pose.a_from_b.scale) -
                 1;
-    // The overlap from which on two levels are predicted to err by less.
+    // The overlap from which on two levels are predicted to err by less than `error`.
     const auto overlap_for = [&](const TreeHeader& of_a, const TreeHeader& of_b, double error) {
       const double overlap =
           both(spheres_needed(asset_a, error) * solid_volume(asset_a, of_a),
@@ -116,8 +117,8 @@ WantedError::WantedError(const PlacedAsset& a, const PlacedAsset& b, const Relat
     double& from = from_[i];
     from = overlap_for(tree_a, tree_b, error_);
     if (wider_[i] >= kLeastWider) {
-      // A level that the coarser one does not confirm costs two answers. It is confirmed in half of
-      // the poses and more once the coarser one's median error is small enough.
+      // A level that the coarser one does not confirm costs two answers. At least half of the poses
+      // confirm it once the coarser one's median error is small enough.
       from = std::max(from, overlap_for(wide_a, wide_b, kMostOverMedian * wider_[i] * error_));
     } else {
       from = std::numeric_limits<double>::infinity();
@@ -142,7 +143,7 @@ WantedError::Shares WantedError::shares(double coarse) const noexcept {
   LevelWeight& rest = shares.rest;
   for (std::size_t i = size_; i-- > 0;) {
     const double from = from_[i];
-    // (so that a damaged asset's NaN is never exact enough)
+    // (a damaged asset's NaN is never accurate enough)
     const double t = coarse > kTooRough * from
                          ? std::min((coarse / from - kTooRough) / (1 - kTooRough), 1.0)
                          : 0;
@@ -156,7 +157,7 @@ WantedError::Shares WantedError::shares(double coarse) const noexcept {
 LevelTrust WantedError::trust(std::size_t i, double own, double other, double most) const noexcept {
   const double accepted = error_ * wider_[i] * own;
   const double difference = other - own, excess = own - most;
-  // (also where nothing is known: volumes of 0 or infinity)
+  // (also for volumes of 0 or infinity)
   if (!(std::abs(difference) < 2 * accepted) || !(excess < 2 * error_ * most)) return {};
   const double x = difference / accepted, y = excess > 0 ? excess / (error_ * most) : 0;
   const double t = (x * x + y * y - kTrusted2) / (kDistrusted2 - kTrusted2);

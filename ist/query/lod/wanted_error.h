@@ -9,13 +9,12 @@
 
 namespace ist {
 
-/// Whether a query is told what error it may have.
+/// True if a query has a wanted error.
 inline bool by_error(const PenetrationSettings& settings) noexcept {
   return settings.measure == Measure::matched && settings.relative_error > 0;
 }
 
-/// Says of an answer of the exact measure where its bounds, as of simplified meshes, are wider than
-/// a query accepts.
+/// Sets error_exceeded if the bounds of an exact answer are wider than the query accepts.
 inline Penetration with_error_status(Penetration exact,
                                      const PenetrationSettings& settings) noexcept {
   const double most = 2 * settings.relative_error * exact.volume;
@@ -25,8 +24,8 @@ inline Penetration with_error_status(Penetration exact,
   return exact;
 }
 
-/// Volume of solid for which a sphere of a level stands, the asset's unit frame. Thin solids need
-/// more spheres: as many times as what inner spheres of that size leave out makes a radius larger.
+/// The volume of solid that a sphere of a level represents, the asset's unit frame. It is larger
+/// for thin solids, of which inner spheres leave much out.
 double solid_volume(const AssetHeader& asset, const TreeHeader& tree) noexcept;
 
 /// The weight that a level keeps after its comparison with a coarser one, and its slopes.
@@ -35,32 +34,32 @@ struct LevelTrust {
   double by_own = 0, by_other = 0;  ///< [1/u³] by the level's volume, by the coarser one's
 };
 
-/// Which pairs of levels are predicted to err by no more than a query accepts, and are cheaper than
-/// the exact measure (docs/design.md 5).
+/// Selects the pairs of levels that are predicted to err by no more than a query accepts, and to be
+/// cheaper than the exact measure (docs/design.md 5).
 class WantedError {
  public:
   /// `exact`: the exact measure may answer.
   WantedError(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose,
               const PenetrationSettings& settings, const LevelChain& chain, bool exact) noexcept;
 
-  /// Some level is exact enough at some overlap.
+  /// True if some level is accurate enough at some overlap.
   bool by_spheres() const noexcept;
 
   struct Shares {
     LevelChain::Weights levels = {};  ///< of the chain
-    LevelWeight rest{1, 0};           ///< at which no level is exact enough
+    LevelWeight rest{1, 0};           ///< of no level
   };
-  /// Parts of the answer, which sum to 1: all of it is the coarsest pair's from the overlap on at
-  /// which that is exact enough, none up to 0.7 of that; what is left goes to the next finer pair
-  /// by the same rule. Continuous in the coarse estimate, A's unit frame, with the slope.
+  /// Weights, which sum to 1. The coarsest pair gets all from the overlap on at which it is
+  /// accurate enough, and nothing up to 0.7 of that; the rest goes to the next finer pair by the
+  /// same rule. Continuous in the coarse estimate, A's unit frame, with slopes.
   Shares shares(double coarse) const noexcept;
 
-  /// The partner of pair i in comparisons: both sides a level coarser, as far as there is one.
+  /// The pair with which pair i is compared: both sides a level coarser, if there is one.
   const LevelPair& coarser(std::size_t i) const noexcept { return coarser_[i]; }
-  /// The prediction is made from random poses. In others, such as flush faces and solids in one
-  /// place, the protrusions and gaps of spheres add up to an error in proportion to their radius,
-  /// which a coarser level reveals. The level is trusted if the error derived from that is below
-  /// the accepted one, and if it says no more than `most`, the smaller solid's volume. [u³]
+  /// Predictions are fitted to random poses. In others, such as flush faces and coincident solids,
+  /// protrusions and gaps of spheres add up to an error in proportion to their radius, which a
+  /// coarser level reveals. The level is trusted if the error derived from that is below the
+  /// accepted one, and its volume is no more than `most`, the smaller solid's. [u³]
   LevelTrust trust(std::size_t i, double own, double other, double most) const noexcept;
 
  private:

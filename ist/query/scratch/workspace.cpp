@@ -7,7 +7,7 @@
 namespace ist {
 namespace {
 
-// A vector of survivors is stored whole, sixteen at a time, beyond the last one that counts.
+// Lists are written in whole vectors of sixteen, beyond the last valid entry.
 constexpr std::size_t kSlack = 32;
 
 PairList make_list(const MemoryHooks& memory, std::size_t capacity) {
@@ -31,14 +31,14 @@ Workspace::Impl::Impl(std::size_t wanted, const MemoryHooks& hooks)
       exact(capacity, memory) {}
 
 Workspace::Workspace(std::size_t capacity, const MemoryHooks& memory) {
-  // The Impl lies in memory of the hooks too.
+  // The hooks also provide the memory of the Impl.
   const auto release = [&memory](void* p) {
     give_memory_back(memory, p, sizeof(Impl), alignof(Impl));
   };
-  std::unique_ptr<void, decltype(release)> room(take_memory(memory, sizeof(Impl), alignof(Impl)),
-                                                release);
-  impl_.reset(new (room.get()) Impl(capacity, memory));
-  room.release();
+  std::unique_ptr<void, decltype(release)> bytes(take_memory(memory, sizeof(Impl), alignof(Impl)),
+                                                 release);
+  impl_.reset(new (bytes.get()) Impl(capacity, memory));
+  bytes.release();
 }
 
 void Workspace::Release::operator()(Impl* impl) const noexcept {

@@ -13,55 +13,37 @@
 
 namespace ist {
 
-/// Depth first, nearest child first, for two minima at once: the gap between a shape and a tree's
-/// inner spheres, and that of their cover balls. All in the shape's frame.
+/// The gaps between a shape and a tree's inner spheres and cover balls, in the shape's frame.
 template <class Sampler>
-class GapSearch {
+class GapSearch : GapStack {
  public:
   GapSearch(Sampler& shape, const SphereTree& tree, const RelativePose& pose,
             const SeparationSettings& settings, Workspace::Impl& scratch) noexcept
-      : shape_(shape),
+      : GapStack(scratch, visit_limit(settings.max_visits), kInfinity, kInfinity),
+        shape_(shape),
         tree_(tree),
         pose_(pose),
-        map_(pose.a_from_b),
-        stack_(scratch.waiting.get()),
-        budget_(visit_limit(settings.max_visits)) {}
+        map_(pose.a_from_b) {}
 
   Separation run() noexcept {
-    const double none = -std::numeric_limits<double>::infinity();
-    push({none, none, 0, 0, tree_.top, 0});
-    while (size_ > 0 && !(gap_ <= 0)) {
-      const WaitingPair pair = stack_[size_ - 1];
-      if (!wanted(pair.gap, pair.cover)) {
-        --size_;
-        continue;
-      }
-      if (budget_.grant(1) == 0) break;
-      --size_;
-      open(pair);
-    }
-    return answer();
+    const bool stopped = search(
+        {-kInfinity, -kInfinity, 0, 0, tree_.top, 0}, [&](const WaitingPair& pair) { open(pair); },
+        [&] { return gap_ <= 0; });
+    return answer(stopped);
   }
 
  private:
-  bool wanted(double gap, double cover) const noexcept {
-    return gap < gap_ || (cover_ > 0 && cover < cover_);
-  }
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-  void push(const WaitingPair& pair) noexcept { stack_[size_++] = pair; }
-
-  void open(const WaitingPair& pair) noexcept {
+  [[gnu::noinline]] void open(const WaitingPair& pair) noexcept {
     const int level = pair.level_a;
     const std::uint32_t below = tree_.count(level - 1);
-    const std::size_t first = size_;
     for (std::uint32_t lane = 0; lane < kWidth && kWidth * pair.a + lane < below; ++lane) {
       const std::uint32_t child = kWidth * pair.a + lane;
       const NodeBall ball = tree_.ball(level - 1, child);
       const double cover_radius = level == 0 ? static_cast<double>(tree_.sphere_cover[child])
                                              : tree_.cover(level - 1, child);
-      double at[3];
-      map_.apply(ball.centre, at);
-      const Eigen::Vector3d x(at[0], at[1], at[2]);
+      const Eigen::Vector3d x = mapped(map_, ball.centre);
       const double distance = shape_.nearest(x).distance;
       const double gap = distance - ball.r * map_.scale;
       const double cover = distance - cover_radius * map_.scale;
@@ -75,22 +57,15 @@ class GapSearch {
         radius_ = ball.r * map_.scale;
         continue;
       }
-      std::size_t place = size_++;
-      for (; place > first && stack_[place - 1].gap < gap; --place)
-        stack_[place] = stack_[place - 1];
-      stack_[place] = {gap, cover, child, 0, level - 1, 0};
+      add({gap, cover, child, 0, level - 1, 0, gap});
     }
   }
 
-  Separation answer() noexcept {
+  Separation answer(bool stopped) noexcept {
     Separation result;
     result.node_visits = budget_.visits();
     result.sphere_pairs = pairs_;
-    const bool stopped = size_ > 0 && !(gap_ <= 0);
-    if (stopped) {
-      result.status = QueryStatus::budget_exhausted;
-      for (std::size_t i = 0; i < size_; ++i) cover_ = std::min(cover_, stack_[i].cover);
-    }
+    if (stopped) result.status = QueryStatus::budget_exhausted;
     if (gap_ <= 0) return result;
     const double unit = pose_.unit_a;
     const double reach = map_.scale * std::max(tree_.header->root[3], tree_.header->root_cover) +
@@ -98,8 +73,8 @@ class GapSearch {
     const double off =
         shape_.error() + distance_error(Precision::float64, reach) + pose_.rounding_of_world();
     result.distance_min = unit * std::max(0.0, cover_ - off);
-    if (!(gap_ < std::numeric_limits<double>::infinity())) {  // stopped before any sphere
-      result.distance = result.distance_max = std::numeric_limits<double>::infinity();
+    if (!(gap_ < kInfinity)) {  // stopped before any sphere
+      result.distance = result.distance_max = kInfinity;
       return result;
     }
     result.distance = unit * gap_;
@@ -118,11 +93,6 @@ class GapSearch {
   const SphereTree& tree_;
   const RelativePose& pose_;
   const Similarity& map_;
-  WaitingPair* const stack_;
-  std::size_t size_ = 0;
-  Budget budget_;
-  double gap_ = std::numeric_limits<double>::infinity();
-  double cover_ = std::numeric_limits<double>::infinity();
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   double radius_ = 0;
   std::uint32_t pairs_ = 0;

@@ -9,7 +9,7 @@
 namespace ist {
 namespace {
 
-/// Triangles that go to add_patch sixteen at a time.
+/// Passes triangles to add_patch(), sixteen at a time.
 class PatchFiller {
  public:
   PatchFiller(const ProbeBalls& balls, std::uint32_t used, ProbeSums& sums) noexcept
@@ -63,9 +63,7 @@ ProbeTotal BoxSampler::block(const ProbeBalls& balls, std::uint32_t used, const 
       const double distance = below_face(axis, side, balls.origin[axis] + at[axis][i]);
       if (!(distance > -r)) continue;
       const Cap part = cap(r, distance);
-      const Eigen::Vector3d x(balls.origin[0] + balls.x[i] - origin[0],
-                              balls.origin[1] + balls.y[i] - origin[1],
-                              balls.origin[2] + balls.z[i] - origin[2]);
+      const Eigen::Vector3d x = balls.centre(i) - vector(origin);
       ++pairs;
       add_part(x, part.volume, part.derivative * inward, part.moment * inward, total.overlap);
       total.area += part.derivative;
@@ -96,11 +94,10 @@ ProbeTotal BoxSampler::block(const ProbeBalls& balls, std::uint32_t used, const 
   });
   std::uint32_t inside = 0;
   for (std::uint32_t i = 0; i < kWidth; ++i) {
-    const double x[3] = {seen.origin[0] + seen.x[i], seen.origin[1] + seen.y[i],
-                         seen.origin[2] + seen.z[i]};
-    inside |= holds(x) ? 1u << i : 0u;
+    const Eigen::Vector3d x = seen.centre(i);
+    inside |= holds({x.x(), x.y(), x.z()}) ? 1u << i : 0u;
   }
-  return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
+  return total_of(balls, sums, sides_by_angles(sums, inside) & used, origin);
 }
 
 double HeightSampler::height(std::int64_t i, std::int64_t j) noexcept {
@@ -141,7 +138,7 @@ ShapeSample HeightSampler::nearest(const Eigen::Vector3d& x) noexcept {
       point = vector(found);
     }
   };
-  // Ring by ring, as long as one may come nearer, all heights being within their bounds.
+  // Visits rings of cells while one may be nearer, as all heights are within their bounds.
   const double apart = std::max({0.0, x.z() - highest, lowest - x.z()});
   const double step = std::min(spacing[0], spacing[1]);
   const std::int64_t most = std::max(last[0], last[1]) + 1;
@@ -198,7 +195,7 @@ ProbeTotal HeightSampler::block(const ProbeBalls& balls, std::uint32_t used,
         seen.origin[2] + seen.z[i] < surface(seen.origin[0] + seen.x[i], seen.origin[1] + seen.y[i])
             ? 1u << i
             : 0u;
-  return total_of(balls, sums, settled_sides(sums, inside) & used, origin);
+  return total_of(balls, sums, sides_by_angles(sums, inside) & used, origin);
 }
 
 }  // namespace ist

@@ -3,16 +3,16 @@
 #include "query/shape/probe_sum.h"
 #include "query/shape/shapes.h"
 
-// Shapes with a surface of triangles, which balls meet exactly.
+// Shapes with a surface of triangles, whose overlap with balls is exact.
 
 namespace ist {
 
-/// A box, as twelve triangles where a ball comes near more than one of its faces.
+/// A box: twelve triangles for blocks of balls that come near more than one face.
 class BoxSampler : public SamplerOf<PlainBox> {
  public:
   using SamplerOf::SamplerOf;
 
-  /// Adds what of a block of balls is inside.
+  /// The parts of a block of balls inside; adds to `pairs`.
   ProbeTotal block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
                    std::uint32_t& pairs) noexcept;
 
@@ -21,12 +21,12 @@ class BoxSampler : public SamplerOf<PlainBox> {
   bool has_patch_ = false;
 };
 
-/// Terrain: the triangles under a block of balls.
+/// A height field, by the triangles near a block of balls.
 class HeightSampler : public SamplerOf<PlainTerrain> {
  public:
   using SamplerOf::SamplerOf;
 
-  /// The distance from the triangles of the grid, and from the point straight below.
+  /// The distance from the nearest of the grid's triangles and the point straight below.
   ShapeSample nearest(const Eigen::Vector3d& x) noexcept;
   ProbeTotal block(const ProbeBalls& balls, std::uint32_t used, const double (&origin)[3],
                    std::uint32_t& pairs) noexcept;

@@ -11,10 +11,9 @@
 #include "query/ball_triangle/cap.h"
 #include "query/kernel/lens.h"
 
-// The shapes of ist/shapes.h in plain numbers, the same on CPU and GPU. sample(x) gives the
-// distance, negative inside and never further from 0 than the true one, with its gradient; part(x,
-// r) what of
-// a ball is inside. Without part() a shape is flat_part() of its sample.
+// The shapes of ist/shapes.h in plain numbers, the same on CPU and GPU. sample(x) is the distance,
+// negative inside and never further from 0 than the true one, with its gradient. part(x, r) is the
+// part of a ball inside; shapes without it use flat_part() of their sample.
 
 namespace ist {
 
@@ -31,7 +30,7 @@ struct BallPart {
   double moment[3];    ///< ∫ (y − centre) dV
 };
 
-/// A ball before a plane at the closest point of the surface.
+/// The part of a ball behind the tangent plane at the nearest point of the surface.
 IST_HD inline BallPart flat_part(const PlainSample& at, double r) {
   const Cap in = cap(r, -at.distance);
   BallPart part = {in.volume, in.derivative, {}, {}};
@@ -42,10 +41,10 @@ IST_HD inline BallPart flat_part(const PlainSample& at, double r) {
   return part;
 }
 
-/// From this distance on a ball is in or out as a whole. `error`: of the distance.
+/// From this distance on a ball is wholly inside or outside. `error`: of the distance.
 IST_HD inline double sure_reach(double r, double error) { return r * (1 + 1e-6) + error; }
 
-/// A point `away` from the core of a shape that is all within `radius` of it.
+/// The sample at a point `away` from the core of a shape, which is all within `radius` of the core.
 IST_HD inline PlainSample core_sample(double radius, const double (&away)[3]) {
   const double d = norm(away);
   if (!(d > 0)) return {d - radius, {}};
@@ -90,8 +89,8 @@ struct PlainCapsule {
 struct PlainCylinder {
   double radius, half;
 
-  /// Past the rim the farther of mantle and end: a ball that reaches both has a part of each,
-  /// though it may miss the rim.
+  /// Beyond the rim the larger of the distances from mantle and end, since part() is positive for a
+  /// ball that reaches both, though it may miss the rim.
   IST_HD PlainSample sample(const double (&x)[3]) const {
     return {most(std::fabs(x[2]) - half, from_axis(x) - radius), {}};
   }
@@ -109,7 +108,7 @@ struct PlainCylinder {
                                       : end[k];
     return at;
   }
-  /// The share of the mantle times that of the slab between the ends.
+  /// The share within the mantle times the share between the ends.
   IST_HD BallPart part(const double (&x)[3], double r) const {
     const double whole = ball_volume(r);
     const double d = from_axis(x);
@@ -139,7 +138,7 @@ struct PlainGrid {
   double spacing;
   double error;
 
-  /// `sound` becomes false where the grid contains what is no number.
+  /// Sets `sound` to false if the grid's values are not numbers in range.
   IST_HD PlainSample sample(const double (&x)[3], bool& sound) const {
     const PlainSample at = interpolated(x);
     if (std::fabs(at.distance) <= kLongestLength && dot(at.gradient, at.gradient) <= 1e300)
@@ -154,11 +153,11 @@ struct PlainGrid {
     std::uint64_t cell[3];
     for (int k = 0; k < 3; ++k) {
       const double at = (x[k] - origin[k]) / spacing;
-      const double held = clamped(at, 0, size[k] - 1.0);
-      beyond[k] = (at - held) * spacing;
-      const auto whole = static_cast<std::uint64_t>(held);
+      const double on_grid = clamped(at, 0, size[k] - 1.0);
+      beyond[k] = (at - on_grid) * spacing;
+      const auto whole = static_cast<std::uint64_t>(on_grid);
       cell[k] = whole < size[k] - 2 ? whole : size[k] - 2;
-      t[k] = held - static_cast<double>(cell[k]);
+      t[k] = on_grid - static_cast<double>(cell[k]);
     }
     const std::uint64_t nx = size[0], nxy = nx * size[1];
     const float* const from = distances + (cell[0] + nx * cell[1] + nxy * cell[2]);
@@ -174,7 +173,7 @@ struct PlainGrid {
     PlainSample at = {mix(f[0], f[1], t[2]), {}};
     const double away = norm(beyond);
     if (away > 0) {
-      // Whoever is outside of the grid is outside of the solid, at least so far from it.
+      // A point outside the grid is at least this far outside the solid.
       at.distance = most(0, at.distance) + away;
       for (int k = 0; k < 3; ++k) at.gradient[k] = beyond[k] / away;
       return at;
@@ -214,10 +213,10 @@ struct PlainBox {
     return std::fabs(x[0]) < half[0] && std::fabs(x[1]) < half[1] && std::fabs(x[2]) < half[2];
   }
 
-  /// How far a coordinate is below the face x[axis] · side = half[axis].
+  /// The depth of a coordinate below the face x[axis] · side = half[axis].
   IST_HD double below_face(int axis, double side, double x) const { return half[axis] - side * x; }
 
-  /// How many faces are nearer than `reach`, and the last of them; axis −1: none.
+  /// The number of faces nearer than `reach`, and the last of them; axis −1: none.
   IST_HD int faces_near(const double (&x)[3], double reach, int& axis, double& side) const {
     int faces = 0;
     axis = -1;
@@ -254,7 +253,7 @@ struct PlainTerrain {
   double spacing[2];
   double lowest, highest;
 
-  /// Only what is beyond all heights is told at once; 0: a closer look tells.
+  /// Nonzero only beyond all heights: between them the triangles decide.
   IST_HD PlainSample sample(const double (&x)[3]) const {
     PlainSample at = {};
     if (x[2] > highest) at.distance = x[2] - highest;
@@ -282,8 +281,8 @@ struct PlainTerrain {
                   : low + t * (side - low) + s * (high - side);
   }
 
-  /// The cells along an axis that come near a ball. Beyond the border one cell is as good as any
-  /// number: it is level across it.
+  /// The cells along an axis that come near a ball. Beyond the border one cell is enough, since
+  /// heights are constant across it.
   IST_HD void cells_near(int axis, double x, double reach, std::int64_t& from,
                          std::int64_t& to) const {
     const double last = (axis == 0 ? columns : rows) - 1.0;
@@ -291,7 +290,7 @@ struct PlainTerrain {
     to = static_cast<std::int64_t>(std::floor(clamped((x + reach) / spacing[axis], -1, last)));
   }
 
-  /// A coordinate of point n of the grid. The cells at the border reach beyond a ball at x.
+  /// A coordinate of grid point n. Cells at the border extend beyond a ball at x.
   IST_HD double point(int axis, std::int64_t n, double x, double reach) const {
     const std::int64_t last = std::int64_t{axis == 0 ? columns : rows} - 1;
     const double at = static_cast<double>(n) * spacing[axis];

@@ -8,7 +8,7 @@
 #include "query/shape/plain_shapes.h"
 #include "query/shape/sound_shapes.h"
 
-// The shapes of ist/shapes.h as the descents on the CPU sample them.
+// Samplers of the shapes of ist/shapes.h, for traversals on the CPU.
 
 namespace ist {
 
@@ -33,11 +33,11 @@ inline PlainGrid plain(const DistanceGridShape& f) noexcept {
           f.error};
 }
 
-/// A plain shape with all that a descent calls.
+/// A plain shape with the functions that traversals call.
 template <class Plain>
 struct SamplerOf : Plain {
-  [[gnu::always_inline]] explicit SamplerOf(const auto& field) noexcept
-      : Plain(plain(field)), sound(is_sound(field)) {}
+  [[gnu::always_inline]] explicit SamplerOf(const auto& shape) noexcept
+      : Plain(plain(shape)), sound(is_sound(shape)) {}
 
   ShapeSample sample(const Eigen::Vector3d& x) noexcept { return eigen(seen({x[0], x[1], x[2]})); }
   [[gnu::always_inline]] ShapeSample nearest(const Eigen::Vector3d& x) noexcept {
@@ -61,7 +61,7 @@ struct SamplerOf : Plain {
       return 0;
   }
 
-  bool sound;  ///< no longer once the shape gives what is no number: the query's input is invalid
+  bool sound;  ///< false once a value of the shape is out of range: the query's input is invalid
 
  private:
   PlainSample seen(const double (&x)[3]) noexcept {
@@ -81,7 +81,7 @@ using CapsuleSampler = SamplerOf<PlainCapsule>;
 using CylinderSampler = SamplerOf<PlainCylinder>;
 using GridSampler = SamplerOf<PlainGrid>;
 
-/// A caller's function. What it says that is no number makes the query's input invalid.
+/// A caller's function. Values out of range make the query's input invalid.
 struct FunctionSampler {
   explicit FunctionSampler(const FunctionShape& f) noexcept : shape(f), sound(is_sound(f)) {}
   ShapeSample sample(const Eigen::Vector3d& x) noexcept {

@@ -7,7 +7,7 @@
 
 #include "query/asset/shared_constants.h"
 
-// Whether a shape's numbers are in range, except for those it points to; the same on CPU and GPU.
+// Validation of shapes, except for the arrays they point to; the same for CPU and GPU.
 
 namespace ist {
 

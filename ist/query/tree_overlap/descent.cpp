@@ -5,17 +5,68 @@
 #include <utility>
 
 #include "query/base/precision.h"
+#include "query/kernel/lens.h"
 #include "query/kernel/node_kernel.h"
 #include "query/tree_overlap/answer.h"
 
 namespace ist {
 namespace {
 
-// Sums whose rounding may exceed this share are taken again in double. The bound is at least fifty
-// times what rounding does, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
+// Sums whose bound on rounding exceeds this share are repeated in double. The bound is at least
+// fifty times the rounding, so float keeps 1e-5 (property_query, NoGrazingPairIsLost).
 constexpr double kGrazing = 5e-4;
 
-/// Larger bounds first; no two pairs are alike.
+/// Two nodes in A's unit frame.
+struct Nodes {
+  Nodes(const SphereTree& a, TreeNode node_a, const SphereTree& b, TreeNode node_b,
+        const Similarity& a_from_b)
+      : ball_a(a.ball(node_a)),
+        sums_a(a.sums(node_a.level, node_a.block)),
+        sums_b(b.sums(node_b.level, node_b.block)) {
+    const NodeBall ball_b = b.ball(node_b);
+    centre_a = vector(ball_a.centre);
+    centre_b = mapped(a_from_b, ball_b.centre);
+    radius_b = ball_b.r * a_from_b.scale;
+    volume_b = sums_b.volume * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
+    distance = (centre_b - centre_a).norm();
+  }
+
+  /// An upper bound on the sum over all sphere pairs below (docs/design.md 7): every point of the
+  /// overlap lies in at most κ spheres of either tree, and in both balls.
+  double bound() const {
+    // Covers the rounding of the centres, so that no touching pair seems disjoint.
+    const double rounding = 1e-14 * (centre_a.norm() + centre_b.norm() + ball_a.r + radius_b);
+    const Lens<double> outer = lens(ball_a.r + rounding, radius_b + rounding, distance);
+    return (1 + 1e-9) * std::min({sums_b.overlap * sums_a.volume, sums_a.overlap * volume_b,
+                                  sums_a.overlap * sums_b.overlap * outer.volume()});
+  }
+
+  /// The estimated overlap of both nodes as balls of uniform density, at most `most`. `origin`: of
+  /// B's unit frame.
+  Overlap estimate(double most, const Eigen::Vector3d& origin) const {
+    Overlap guess;
+    const Lens<double> inner = lens(ball_a.r, radius_b, distance);
+    const double overlap = inner.volume();
+    if (!(overlap > 0)) return guess;
+    const double density_a = sums_a.volume / (kBallVolume * ball_a.r * ball_a.r * ball_a.r);
+    const double density_b = volume_b / (kBallVolume * radius_b * radius_b * radius_b);
+    guess.volume = std::min(density_a * density_b * overlap, most);
+    const double share = guess.volume / overlap;
+    if (distance > 0) guess.force = share * inner.derivative() / distance * (centre_b - centre_a);
+    const Eigen::Vector3d centre =
+        (inner.cap_a * centre_a + inner.cap_b * centre_b) / (inner.cap_a + inner.cap_b);
+    guess.torque = (centre - origin).cross(guess.force);
+    guess.moment = guess.volume * (centre - origin);
+    return guess;
+  }
+
+  NodeBall ball_a;
+  NodeSums sums_a, sums_b;
+  Eigen::Vector3d centre_a, centre_b;
+  double radius_b, volume_b, distance;
+};
+
+/// Larger bounds first; a total order, since no two pairs are equal.
 bool before(const RankedPair& l, const RankedPair& r) {
   if (l.bound != r.bound) return l.bound > r.bound;
   return l.a != r.a ? l.a < r.a : l.b < r.b;
@@ -44,7 +95,7 @@ void Descent::run() noexcept {
   level_a_ = a_.top;
   level_b_ = b_.top;
   scratch_.now.a[0] = scratch_.now.b[0] = 0;
-  scratch_.now.size = estimate(level_a_, 0, level_b_, 0).bound > 0 ? 1 : 0;
+  scratch_.now.size = Nodes(a_, {level_a_, 0}, b_, {level_b_, 0}, map_).bound() > 0 ? 1 : 0;
   while (level_a_ > 0 || level_b_ > 0) {
     if (!open_level()) return;
   }
@@ -77,8 +128,8 @@ bool Descent::open_level() {
   next.size = 0;
   std::size_t done = 0;
   while (done < now.size) {
-    const std::size_t room = (scratch_.capacity - next.size) / kWidth;
-    const std::size_t n = budget_.grant(std::min({kNodePairs, now.size - done, room}));
+    const std::size_t free = (scratch_.capacity - next.size) / kWidth;
+    const std::size_t n = budget_.grant(std::min({kNodePairs, now.size - done, free}));
     if (n == 0) break;
     open_pairs(stage, open_a, done, n);
     done += n;
@@ -99,12 +150,12 @@ void Descent::open_pairs(const NodeStage& stage, bool open_a, std::size_t from, 
   std::uint32_t* const out_x = (open_a ? next.a : next.b).get() + next.size;
   std::uint32_t* const out_y = (open_a ? next.b : next.a).get() + next.size;
   if (stage.level_y != kSphereLevel) {
-    next.size += open_nodes(stage, x, y, n, out_x, out_y);
+    next.size += open_nodes(stage, x, y, n, out_x, out_y, nullptr);
     return;
   }
   std::uint32_t contained_x[kWidth * (kNodePairs + 1)], contained_y[kWidth * (kNodePairs + 1)];
   ContainedNodes contained{contained_x, contained_y};
-  next.size += open_under_spheres(stage, x, y, n, out_x, out_y, contained);
+  next.size += open_nodes(stage, x, y, n, out_x, out_y, &contained);
   add_contained(open_a, stage.level_x - 1, contained);
 }
 
@@ -137,7 +188,7 @@ void Descent::open_leaves() {
   estimate_unopened(now, done);
   now.size = done;
 
-  // A few grazing lenses are all rounding in float; they are as few as they are shallow.
+  // In float a few grazing lenses are mostly rounding; shallow contacts have few.
   const Overlap sum = sure();
   if (precision_ == Precision::float32 && !limits_.keep_rounding &&
       sum.error > kGrazing * sum.volume && now.size > 0) {
@@ -158,10 +209,6 @@ void Descent::add_leaves(std::size_t from, std::size_t n) {
   add_leaf_pairs(stage, *scratch_.leaves, a, b, n, sums_);
 }
 
-double Descent::bound(std::size_t i) const {
-  return bound_pair(a_, level_a_, scratch_.now.a[i], b_, level_b_, scratch_.now.b[i], map_);
-}
-
 void Descent::choose() {
   const std::size_t left = budget_.left();
   PairList& now = scratch_.now;
@@ -170,14 +217,14 @@ void Descent::choose() {
   RankedPair* ranked = scratch_.ranked.get();
   double* bounds = scratch_.bounds.get();
   for (std::size_t i = 0; i < now.size; ++i) {
-    bounds[i] = bound(i);
+    bounds[i] = Nodes(a_, {level_a_, now.a[i]}, b_, {level_b_, now.b[i]}, map_).bound();
     ranked[i] = {bounds[i], now.a[i], now.b[i]};
   }
   RankedPair* const last = ranked + left - 1;
   std::nth_element(ranked, last, ranked + now.size, before);
   std::size_t chosen = 0, others = left;
   for (std::size_t i = 0; i < now.size; ++i) {
-    // (both lists stay within their capacity even if a damaged asset's bounds are NaN)
+    // (both lists stay within capacity even if a damaged asset's bounds are NaN)
     const bool is_other =
         others < now.size && (chosen == left || before(*last, {bounds[i], now.a[i], now.b[i]}));
     std::size_t& to = is_other ? others : chosen;
@@ -190,29 +237,22 @@ void Descent::choose() {
 
 void Descent::estimate_unopened(const PairList& list, std::size_t from) {
   Overlap guesses;
-  for (std::size_t i = from; i < list.size; ++i)
-    guesses.add(estimate_unopened_pair(list.a[i], list.b[i]));
+  for (std::size_t i = from; i < list.size; ++i) {
+    const Nodes nodes(a_, {level_a_, list.a[i]}, b_, {level_b_, list.b[i]}, map_);
+    stopped_ = true;
+    const double bound = nodes.bound();
+    unopened_bound_ += bound;
+    const Overlap guess = nodes.estimate(bound, vector(map_.t));
+    guesses.add(guess);
+    if (bins_ != nullptr) bins_->add_guess(level_a_, list.a[i], level_b_, list.b[i], guess);
+  }
   unopened_.add(guesses);
-}
-
-Overlap Descent::estimate_unopened_pair(std::uint32_t a, std::uint32_t b) {
-  const PairEstimate pair = estimate(level_a_, a, level_b_, b);
-  const Eigen::Vector3d lever = pair.centre - vector(map_.t);
-  stopped_ = true;
-  unopened_bound_ += pair.bound;
-  Overlap guess;
-  guess.volume = pair.volume;
-  guess.force = pair.force;
-  guess.torque = lever.cross(pair.force);
-  guess.moment = pair.volume * lever;
-  if (bins_ != nullptr) bins_->add_guess(level_a_, a, level_b_, b, guess);
-  return guess;
 }
 
 Penetration Descent::penetration() const noexcept {
   const Overlap overlap = this->overlap();
 
-  // No point is counted more often than κ A's κ B, nor beyond either tree's own volume.
+  // Each point is counted at most κ_A κ_B times, which also limits the sum by either tree's volume.
   const double scale = pose_.a_from_b.scale;
   const double volume_a = a_.header->volume_sum;
   const double volume_b = b_.header->volume_sum * (scale * scale * scale);

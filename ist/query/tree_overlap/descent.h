@@ -13,50 +13,44 @@
 #include "query/kernel/overlap.h"
 #include "query/kernel/subtree_kernel.h"
 #include "query/scratch/workspace.h"
-#include "query/tree_overlap/unopened.h"
 
 namespace ist {
 
-/// Whether a stage opens A's nodes: those of the larger typical size. `scale`: of B in A's frame.
+/// True if a stage opens A's nodes: the larger ones. `scale`: of B in A's unit frame.
 bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
              double scale) noexcept;
 
-/// The staged descent of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
+/// The staged traversal of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
 class Descent {
  public:
-  /// All arguments must outlive the descent. With `bins`, what is summed is sorted into them too.
+  /// All arguments must outlive the traversal. `bins`: get the sums too.
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
           const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
   void run() noexcept;
 
-  /// The answer in world units, from what has been summed.
   Penetration penetration() const noexcept;
 
   Precision precision() const { return precision_; }
 
  private:
-  PairEstimate estimate(int level_a, std::uint32_t a, int level_b, std::uint32_t b) const {
-    return estimate_pair(a_, level_a, a, b_, level_b, b, map_);
-  }
-
-  /// Best answer: what was summed and a guess of the rest.
+  /// The sum and the estimate of the unopened pairs.
   Overlap overlap() const;
 
-  /// The summed part, without estimates.
+  /// The sum without estimates.
   Overlap sure() const;
 
-  /// Opens one side of every pair of the current list. False if the budget stopped it.
+  /// Opens one side of every pair of the current list; false if a limit stopped it.
   bool open_level();
 
-  /// Opens pairs [from, from + n) of the current list into the next. Nodes that a sphere of the
-  /// standing side contains are added up instead.
+  /// Opens pairs [from, from + n) of the current list into the next. Adds up the nodes that a
+  /// sphere of the other side contains instead.
   void open_pairs(const NodeStage& stage, bool open_a, std::size_t from, std::size_t n);
 
-  /// Adds the spheres below nodes of A, or of B: each node lies in one sphere of the other side.
+  /// Adds the spheres below nodes of A, or of B, each in a sphere of the other side.
   void add_contained(bool of_a, int level, const ContainedNodes& contained);
 
-  /// The part of spheres of A, or of B, that lie within a sphere of the other side.
+  /// The overlap of spheres of A, or of B, that lie in spheres of the other side.
   Overlap contained_overlap(bool of_a, const SubtreeSums& contained) const;
 
   void open_leaves();
@@ -64,18 +58,12 @@ class Descent {
   /// Sums pairs [from, from + n) of the current list.
   void add_leaves(std::size_t from, std::size_t n);
 
-  /// Puts the pairs of largest bound that visits are left for first in the current list, if there
-  /// are more. Otherwise they stay in order, as neighbours share nodes.
+  /// If the current list is longer than the visits left, moves the pairs of the largest bounds to
+  /// its front. Both parts stay in order, since neighbours share nodes.
   void choose();
 
-  /// Ranks the pairs of the current list, from the largest bound down.
-  double bound(std::size_t i) const;
-
-  /// Guesses the pairs from `from` on.
+  /// Estimates the pairs of a list from `from` on.
   void estimate_unopened(const PairList& list, std::size_t from);
-
-  /// Guesses one pair that stays unopened.
-  Overlap estimate_unopened_pair(std::uint32_t a, std::uint32_t b);
 
   const SphereTree& a_;
   const SphereTree& b_;
@@ -88,9 +76,9 @@ class Descent {
   Budget budget_;
   int level_a_ = 0, level_b_ = 0;  ///< of the current list
   LeafSums sums_;
-  SubtreeSums contained_a_, contained_b_;  ///< nodes that lie in a sphere of the other tree
-  Overlap unopened_;                       ///< guess of what was not opened
-  double unopened_bound_ = 0;              ///< what that can add at most
+  SubtreeSums contained_a_, contained_b_;  ///< nodes in spheres of the other tree
+  Overlap unopened_;                       ///< estimate of unopened pairs
+  double unopened_bound_ = 0;              ///< bound on their volume
   bool stopped_ = false;
 };
 

@@ -8,14 +8,14 @@
 
 namespace ist {
 
-/// A node of each of two trees.
+/// A pair of nodes.
 struct NodePair {
   std::uint32_t a, b;
   int level_a, level_b;
 };
 
-/// The children of opened pairs that are still to be opened, best first: a sorted run for each
-/// opened pair, so that the best of all is the best of a few heads.
+/// A best-first queue of node pairs: a sorted run of children for each opened pair, so that the
+/// best pair is the best of the runs' heads.
 class OpenRuns {
  public:
   static constexpr std::uint32_t kMostVisits = 256;
@@ -25,31 +25,31 @@ class OpenRuns {
         visits_left_(static_cast<std::uint32_t>(
             std::min<std::size_t>(kMostVisits, scratch.capacity / kWidth))) {}
 
-  /// Opens pairs from `pair` on. open(pair): adds children and returns whether solids overlap for
-  /// certain. `covers_meet`: whether covers that touch were found so far; then the answer is not
-  /// no, and what only may_meet is left out.
+  /// Opens pairs from `pair` on. open(pair) adds children; it returns true if the solids certainly
+  /// overlap. `covers_touch`: touching covers were found. The answer is not `no` then, so pairs
+  /// that touch only by their covers are skipped.
   template <class Open>
-  YesNo search(NodePair pair, const bool& covers_meet, const Open& open) noexcept {
+  YesNo search(NodePair pair, const bool& covers_touch, const Open& open) noexcept {
     do {
       if (visits_left_-- == 0) return YesNo::unknown;
       if (open(pair)) return YesNo::yes;
-    } while (take_best(covers_meet, pair));
-    return covers_meet ? YesNo::unknown : YesNo::no;
+    } while (pop_best(covers_touch, pair));
+    return covers_touch ? YesNo::unknown : YesNo::no;
   }
 
-  /// Children of `parent` follow: of its node in A, or in B.
+  /// Begins the children of `parent`'s node in A, or in B.
   void start(const NodePair& parent, bool of_a) noexcept {
     parent_ = parent;
     of_a_ = of_a;
     begin_ = size_;
   }
 
-  /// `key` ≥ 0: the least is opened first, and of equals the deeper. What only `may_meet` by its
-  /// covers comes after all else.
-  void add(std::uint32_t lane, double key, bool may_meet) noexcept {
+  /// `key` ≥ 0: the least is opened first, preferring deeper nodes. Nodes that touch only by their
+  /// covers (`spheres_touch` false) come last.
+  void add(std::uint32_t lane, double key, bool spheres_touch) noexcept {
     const std::uint32_t child = kWidth * (of_a_ ? parent_.a : parent_.b) + lane;
     const double bound =
-        may_meet ? key + kForALevel * (parent_.level_a + parent_.level_b) : kLast + key;
+        spheres_touch ? key + kPerLevel * (parent_.level_a + parent_.level_b) : kLast + key;
     std::uint32_t place = size_++;
     for (; place > begin_ && ranked_[place - 1].bound > bound; --place)
       ranked_[place] = ranked_[place - 1];
@@ -65,8 +65,8 @@ class OpenRuns {
   }
 
  private:
-  /// Takes out the best; false if there is none, or only such as come last and `without_last`.
-  bool take_best(bool without_last, NodePair& best) noexcept {
+  /// Pops the best; false if there is none, or if `without_last` and only the last ones remain.
+  bool pop_best(bool without_last, NodePair& best) noexcept {
     if (runs_ == 0) return false;
     std::uint32_t least = 0;
     for (std::uint32_t i = 1; i < runs_; ++i)
@@ -84,9 +84,9 @@ class OpenRuns {
     return true;
   }
 
-  // Added to the distance over the sum of radii for each level further up (measured on the oracle's
-  // poses).
-  static constexpr double kForALevel = 0.1;
+  // Added to the distance over the sum of radii per level above the leaves (measured on the
+  // oracle's poses).
+  static constexpr double kPerLevel = 0.1;
   static constexpr double kLast = 1e6;
 
   struct Run {
