@@ -209,22 +209,34 @@ class Meeting {
     return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side), blur_);
   }
   /// A's triangles that those of B keep apart, found when they are asked for first.
-  struct Columns {
-    std::uint32_t apart[kWidth];
-    std::uint32_t known = 0;
-
+  class Columns {
+   public:
     template <class Find>
     std::uint32_t without(std::uint32_t i, std::uint32_t lanes, const Find& find) {
-      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
-        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
-        if ((known >> j & 1) == 0) {
-          known |= 1u << j;
-          apart[j] = find(j);
-        }
-        lanes &= ~((apart[j] >> i & 1) << j);
-      }
-      return lanes;
+      for (std::uint32_t left = lanes & ~known_; left != 0; left &= left - 1)
+        add(static_cast<std::uint32_t>(std::countr_zero(left)), find);
+      known_ |= lanes;
+      return lanes & ~apart_[i];
     }
+
+   private:
+    template <class Find>
+    HWY_INLINE void add(std::uint32_t j, const Find& find) {
+      const hn::CappedTag<std::uint16_t, kWidth> d;
+      const auto rows = hn::Set(d, static_cast<std::uint16_t>(find(j))),
+                 bit = hn::Set(d, static_cast<std::uint16_t>(1u << j));
+      for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+        const auto one = hn::Load(d, kRow + l), before = hn::Load(d, apart_ + l);
+        hn::Store(hn::Or(before, hn::And(bit, hn::VecFromMask(d, hn::And(rows, one) == one))), d,
+                  apart_ + l);
+      }
+    }
+
+    alignas(32) static constexpr std::uint16_t kRow[kWidth] = {
+        1 << 0, 1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+        1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+    alignas(32) std::uint16_t apart_[kWidth] = {};  ///< of a row, a bit a column
+    std::uint32_t known_ = 0;
   };
 
   const CrossingSearch& search_;
