@@ -94,7 +94,8 @@ struct EdgeTally {
 class Meeting {
  public:
   /// `margin`: where a sign is not settled, a plane does not keep them apart unless both blocks are
-  /// marked as near anyway. Planes through edges keep apart what is further than `reach`.
+  /// marked as near anyway. Planes through edges keep apart what is further than `reach`, or, of
+  /// blocks that are marked, what does not cross.
   Meeting(const CrossingSearch& search, ExactScratch& scratch, std::uint32_t a, std::uint32_t b,
           Margin margin, float reach)
       : search_(search), scratch_(scratch), margin_(margin), reach_(reach), number_{a, b} {
@@ -105,7 +106,9 @@ class Meeting {
       apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
                                     std::min(of_a.all_low[k], of_b.all_low[k]));
     apart_ += search.room;
-    blur_ = 1e-6f * (of_a.reach + of_b.reach) + reach;
+    // Four roundings each of a height, and of the offset that it is compared with.
+    beyond_ = exact::kFilter * (double{of_a.reach} + double{of_b.reach}) +
+              (margin == Margin::rounding ? 0.0 : double{reach});
   }
 
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
@@ -206,7 +209,9 @@ class Meeting {
   }
   /// And beyond an edge of it.
   std::uint32_t beyond(int side, std::uint32_t t) const {
-    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side), blur_);
+    const double moved = margin_ != Margin::rounding ? 0.0 : side == 0 ? 1.0 : -1.0;
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side),
+                           moved * search_.aside, beyond_);
   }
   /// A's triangles that those of B keep apart, found when they are asked for first.
   class Columns {
@@ -247,7 +252,7 @@ class Meeting {
   const PlacedVertices* vertices_[2];
   mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
   float apart_ = 0;                             ///< no coordinates of both blocks differ by more
-  float blur_;                                  ///< and planes through edges are floats
+  double beyond_;                               ///< what planes through edges keep apart by
   bool flat_[2] = {};                           ///< whose edges are asked
   Columns columns_, edges_, touch_, flush_;
 };

@@ -21,17 +21,15 @@ class PiercingEdges {
   /// Of pair n, whose edges [A's, B's] are `pierced`: two of them, if signs agree with each other.
   HWY_INLINE void add(const TrianglePairs& pairs, const PairHeights& heights,
                       const std::uint32_t (&pierced)[2][3], std::uint32_t n) {
-    // Edges, and those of which a crossing ends at: an edge that goes down enters the other solid,
-    // A's at the end, B's at the start.
-    std::uint32_t edges = 0, ends = 0;
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      edges |= (pierced[0][k] >> n & 1) << k | (pierced[1][k] >> n & 1) << (3 + k);
-      ends |= (heights.positive[0][k] >> n & 1) << k | (~heights.positive[1][k] >> n & 1) << (3 + k);
-    }
+    // Edges, and those that a crossing ends at: an edge that goes down enters the other solid, A's
+    // at the end, B's at the start.
+    const std::uint32_t edges = bits_of(pierced[0], n) | bits_of(pierced[1], n) << 3,
+                        ends = bits_of(heights.positive[0], n) |
+                               (bits_of(heights.positive[1], n) ^ 7) << 3;
     const std::uint32_t of_end[2] = {edges & ~ends, edges & ends};
     for (int e = 0; e < 2; ++e) {
       const auto number = static_cast<std::uint32_t>(std::countr_zero(of_end[e] | 32u));
-      const std::uint32_t s = number >= 3 ? 1 : 0, k = number - 3 * s, next = (1u + k) % 3;
+      const std::uint32_t s = number >= 3 ? 1 : 0, k = number - 3 * s, next = k == 2 ? 0 : k + 1;
       const auto put = [&](Number to, double value) { of_[e][to][count_] = value; };
       for (int x = 0; x < 3; ++x) {
         of_[e][kP + x][count_] = pairs.corner[s][k][x][n];
@@ -71,6 +69,9 @@ class PiercingEdges {
     kNumbers
   };
 
+  static std::uint32_t bits_of(const std::uint32_t (&pairs)[3], std::uint32_t n) {
+    return (pairs[0] >> n & 1) | (pairs[1] >> n & 1) << 1 | (pairs[2] >> n & 1) << 2;
+  }
   HWY_INLINE void write_end(int e, std::uint32_t l, std::uint32_t at, Crossings& out) const {
     const D d;
     const auto load = [&](int number) { return hn::Load(d, of_[e][number] + l); };
@@ -88,9 +89,9 @@ class PiercingEdges {
     put(Crossings::kT, hn::IfThenElse(end.from_second, one - end.share, end.share));
     // Which of two places comes first is asked with B moved aside.
     put(Crossings::kTError,
-        hn::IfThenElse(end.flat, one,
-                       (two * (load(kError) + two * load(kShift))) / end.heights +
-                           hn::Set(d, 1e-15)));
+        hn::IfThenElse(
+            end.flat, one,
+            (two * (load(kError) + two * load(kShift))) / end.heights + hn::Set(d, 1e-15)));
     put(Crossings::kHeightError, load(kError));
     put(Crossings::kEdge,
         hn::IfThenElse(end.from_second, load(kEdge), load(kEdge) + hn::Set(d, 8.0)));

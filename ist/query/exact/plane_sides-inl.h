@@ -101,18 +101,17 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
   return out;
 }
 
-/// Which triangles of the other block have all corners further than `blur` beyond an edge of
-/// triangle t, in its plane.
+/// Which triangles of the other block, moved by `aside`, have all corners further than `by` beyond
+/// an edge of triangle t, in its plane.
 HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32_t t,
                                          const PlacedVertices& other, const MeshBlock& block,
-                                         float blur) {
+                                         const exact::Point& aside, double by) {
   const D d;
   std::uint32_t out = 0;
   for (int e = 0; e < 3; ++e) {
-    const V least = hn::Set(d, double{planes.edge_offset[e][t] + blur});
-    const Vec3 away = {hn::Set(d, double{planes.edge[e][0][t]}),
-                       hn::Set(d, double{planes.edge[e][1][t]}),
-                       hn::Set(d, double{planes.edge[e][2][t]})};
+    const exact::Point n = {planes.edge[e][0][t], planes.edge[e][1][t], planes.edge[e][2][t]};
+    const V least = hn::Set(d, (planes.edge_offset[e][t] - dot(aside, n)) + by);
+    const Vec3 away = {hn::Set(d, n.x), hn::Set(d, n.y), hn::Set(d, n.z)};
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       const Vec3 at = {hn::Load(d, other.at[0] + l), hn::Load(d, other.at[1] + l),
@@ -159,19 +158,13 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     store(p[0], out.at);
     store(normal, out.normal);
     hn::Store(hn::Max(largest(u), largest(v)), d, out.longest + l);
-    const hn::Rebind<float, D> floats;
     for (int e = 0; e < 3; ++e) {
       const Vec3 across = cross(p[(e + 1) % 3] - p[e], normal);
-      const V size = length_bound(across), least = hn::Set(d, 1e-300);
-      const V factor = hn::Set(d, 1.0) / hn::Max(size, least);
-      const auto rounded = [&](V x, int k) {
-        const auto f = hn::DemoteTo(floats, factor * x);
-        hn::Store(f, floats, out.edge[e][k] + l);
-        return hn::PromoteTo(d, f);
-      };
-      const Vec3 out_of = {rounded(across.x, 0), rounded(across.y, 1), rounded(across.z, 2)};
-      hn::Store(hn::DemoteTo(floats, max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2]))),
-                floats, out.edge_offset[e] + l);
+      const Vec3 out_of =
+          (hn::Set(d, 1.0) / hn::Max(length_bound(across), hn::Set(d, 1e-300))) * across;
+      store(out_of, out.edge[e]);
+      hn::Store(max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2])), d,
+                out.edge_offset[e] + l);
     }
     hn::Store(length_bound(normal), d, length + l);
   }
