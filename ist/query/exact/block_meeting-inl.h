@@ -159,7 +159,7 @@ class Meeting {
   std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
     const auto in_plane = [&](int side, std::uint32_t t) {
       const PlaneSides off = sides_by(side, t, flush_distance(search_.touch));
-      return triangles_of(~(off.above | off.below), block(1 - side));
+      return triangles_of(~(off.above | off.below), *vertices_[1 - side]);
     };
     const std::uint32_t others = lanes & ~in_plane(0, i);
     return lanes & ~flush_.without(i, others, [&](std::uint32_t j) { return in_plane(1, j); });
@@ -175,9 +175,6 @@ class Meeting {
   }
 
  private:
-  const MeshBlock& block(int side) const {
-    return (side == 0 ? search_.a : search_.b)->blocks[number_[side]];
-  }
   const PlacedPlanes& planes_of(int side) const {
     const PlacedPlanes*& planes = planes_[side];
     if (planes == nullptr)
@@ -201,7 +198,8 @@ class Meeting {
                     Margin::rounding, 0);
   }
   std::uint32_t kept_apart(int side, const PlaneSides& found) const {
-    return triangles_of(found.above, block(1 - side)) | triangles_of(found.below, block(1 - side));
+    return triangles_of(found.above, *vertices_[1 - side]) |
+           triangles_of(found.below, *vertices_[1 - side]);
   }
   /// Which of the other block's triangles lie beside the plane of triangle t.
   std::uint32_t beside(int side, std::uint32_t t) const {
@@ -210,8 +208,8 @@ class Meeting {
   /// And beyond an edge of it.
   std::uint32_t beyond(int side, std::uint32_t t) const {
     const double moved = margin_ != Margin::rounding ? 0.0 : side == 0 ? 1.0 : -1.0;
-    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side),
-                           moved * search_.aside, beyond_);
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], moved * search_.aside,
+                           beyond_);
   }
   /// A's triangles that those of B keep apart, found when they are asked for first.
   class Columns {

@@ -93,6 +93,10 @@ class TriangleSearch : PairSigns {
     const PlacedTriangles& b = placed_.triangles(true, number_b);
     const OneBox all(b.all_low, b.all_high, reach_);
     std::uint32_t rows = meeting(a.low, a.high, all.low, all.high);
+    if (rows == 0) return;
+    const OneBox all_a(a.all_low, a.all_high, reach_);
+    std::uint32_t in_a = meeting(b.low, b.high, all_a.low, all_a.high);
+    if (in_a == 0) return;
     const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
     const PlacedBoxes& box_b =
         placed_boxes(b_, 1, number_b / kWidth, search_.a_from_b, pad_b_, *scratch_.placed_b);
@@ -101,12 +105,9 @@ class TriangleSearch : PairSigns {
                                box_a.normal[2][lane_a]};
     const float normal_b[3] = {box_b.normal[0][lane_b], box_b.normal[1][lane_b],
                                box_b.normal[2][lane_b]};
-    if (rows != 0)
-      rows &=
-          in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
+    rows &= in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
     if (rows == 0) return;
-    std::uint32_t in_a =
-        in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
+    in_a &= in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
     std::optional<Meeting> made;
     const auto now = [&]() -> Meeting& {

@@ -25,7 +25,8 @@ struct alignas(64) PlacedBoxes {
 
 /// The vertices of a block in A's unit frame.
 struct alignas(64) PlacedVertices {
-  double at[3][kWidth];  ///< [axis] B's: rounded once after the motion
+  double at[3][kWidth];           ///< [axis] B's: rounded once after the motion
+  std::uint16_t corners[kWidth];  ///< of a triangle: a bit a vertex
 };
 
 /// The triangles of a block in A's unit frame, in floats.
