@@ -108,7 +108,7 @@ class Meeting {
     apart_ += search.room;
     // Four roundings each of a height, and of the offset that it is compared with.
     beyond_ = exact::kFilter * (double{of_a.reach} + double{of_b.reach}) +
-              (margin == Margin::rounding ? 0.0 : double{reach});
+              (margin == Margin::rounding ? 0.0 : (1 + 1e-6) * double{reach});
   }
 
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }

@@ -58,11 +58,10 @@ IST_FORMULA CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const
       high = greater(high, at[s][c].y);
     }
   Real twice = zero, moment_x = zero, moment_y = zero;
-  const FlatEdge of_b[3] = {flat_edge(at[1][0], at[1][1]), flat_edge(at[1][1], at[1][2]),
-                            flat_edge(at[1][2], at[1][0])};
   for (int i = 0; i < 3; ++i) {
     const FlatEdge e = flat_edge(at[0][i], at[0][(i + 1) % 3]);
-    for (const FlatEdge& f : of_b) {
+    for (int j = 0; j < 3; ++j) {
+      const FlatEdge f = flat_edge(at[1][j], at[1][(j + 1) % 3]);
       const Real from = greater(e.low, f.low), to = lesser(e.high, f.high);
       // Beside both edges nothing is below.
       const Mask over = less(from, to);
