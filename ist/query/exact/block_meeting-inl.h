@@ -94,7 +94,8 @@ struct EdgeTally {
 class Meeting {
  public:
   /// `margin`: where a sign is not settled, a plane does not keep them apart unless both blocks are
-  /// marked as near anyway. Planes through edges keep apart what is further than `reach`.
+  /// marked as near anyway. Planes through edges keep apart what is further than `reach`, or, of
+  /// blocks that are marked, what does not cross.
   Meeting(const CrossingSearch& search, ExactScratch& scratch, std::uint32_t a, std::uint32_t b,
           Margin margin, float reach)
       : search_(search), scratch_(scratch), margin_(margin), reach_(reach), number_{a, b} {
@@ -105,7 +106,9 @@ class Meeting {
       apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
                                     std::min(of_a.all_low[k], of_b.all_low[k]));
     apart_ += search.room;
-    blur_ = 1e-6f * (of_a.reach + of_b.reach) + reach;
+    // Four roundings each of a height, and of the offset that it is compared with.
+    beyond_ = exact::kFilter * (double{of_a.reach} + double{of_b.reach}) +
+              (margin == Margin::rounding ? 0.0 : (1 + 1e-6) * double{reach});
   }
 
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
@@ -156,7 +159,7 @@ class Meeting {
   std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
     const auto in_plane = [&](int side, std::uint32_t t) {
       const PlaneSides off = sides_by(side, t, flush_distance(search_.touch));
-      return triangles_of(~(off.above | off.below), block(1 - side));
+      return triangles_of(~(off.above | off.below), *vertices_[1 - side]);
     };
     const std::uint32_t others = lanes & ~in_plane(0, i);
     return lanes & ~flush_.without(i, others, [&](std::uint32_t j) { return in_plane(1, j); });
@@ -172,9 +175,6 @@ class Meeting {
   }
 
  private:
-  const MeshBlock& block(int side) const {
-    return (side == 0 ? search_.a : search_.b)->blocks[number_[side]];
-  }
   const PlacedPlanes& planes_of(int side) const {
     const PlacedPlanes*& planes = planes_[side];
     if (planes == nullptr)
@@ -198,7 +198,8 @@ class Meeting {
                     Margin::rounding, 0);
   }
   std::uint32_t kept_apart(int side, const PlaneSides& found) const {
-    return triangles_of(found.above, block(1 - side)) | triangles_of(found.below, block(1 - side));
+    return triangles_of(found.above, *vertices_[1 - side]) |
+           triangles_of(found.below, *vertices_[1 - side]);
   }
   /// Which of the other block's triangles lie beside the plane of triangle t.
   std::uint32_t beside(int side, std::uint32_t t) const {
@@ -206,25 +207,39 @@ class Meeting {
   }
   /// And beyond an edge of it.
   std::uint32_t beyond(int side, std::uint32_t t) const {
-    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], block(1 - side), blur_);
+    const double moved = margin_ != Margin::rounding ? 0.0 : side == 0 ? 1.0 : -1.0;
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], moved * search_.aside,
+                           beyond_);
   }
   /// A's triangles that those of B keep apart, found when they are asked for first.
-  struct Columns {
-    std::uint32_t apart[kWidth];
-    std::uint32_t known = 0;
-
+  class Columns {
+   public:
     template <class Find>
     std::uint32_t without(std::uint32_t i, std::uint32_t lanes, const Find& find) {
-      for (std::uint32_t left = lanes; left != 0; left &= left - 1) {
-        const auto j = static_cast<std::uint32_t>(std::countr_zero(left));
-        if ((known >> j & 1) == 0) {
-          known |= 1u << j;
-          apart[j] = find(j);
-        }
-        lanes &= ~((apart[j] >> i & 1) << j);
-      }
-      return lanes;
+      for (std::uint32_t left = lanes & ~known_; left != 0; left &= left - 1)
+        add(static_cast<std::uint32_t>(std::countr_zero(left)), find);
+      known_ |= lanes;
+      return lanes & ~apart_[i];
     }
+
+   private:
+    template <class Find>
+    HWY_INLINE void add(std::uint32_t j, const Find& find) {
+      const hn::CappedTag<std::uint16_t, kWidth> d;
+      const auto rows = hn::Set(d, static_cast<std::uint16_t>(find(j))),
+                 bit = hn::Set(d, static_cast<std::uint16_t>(1u << j));
+      for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
+        const auto one = hn::Load(d, kRow + l), before = hn::Load(d, apart_ + l);
+        hn::Store(hn::Or(before, hn::And(bit, hn::VecFromMask(d, hn::And(rows, one) == one))), d,
+                  apart_ + l);
+      }
+    }
+
+    alignas(32) static constexpr std::uint16_t kRow[kWidth] = {
+        1 << 0, 1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+        1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+    alignas(32) std::uint16_t apart_[kWidth] = {};  ///< of a row, a bit a column
+    std::uint32_t known_ = 0;
   };
 
   const CrossingSearch& search_;
@@ -235,7 +250,7 @@ class Meeting {
   const PlacedVertices* vertices_[2];
   mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
   float apart_ = 0;                             ///< no coordinates of both blocks differ by more
-  float blur_;                                  ///< and planes through edges are floats
+  double beyond_;                               ///< what planes through edges keep apart by
   bool flat_[2] = {};                           ///< whose edges are asked
   Columns columns_, edges_, touch_, flush_;
 };

@@ -14,90 +14,93 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// An edge of a lane each, from p to q, that goes through the other triangle.
-struct PiercingEdges {
-  Vec3 p, q;
-  V height_p, height_q, error, shift;
-  V number;  ///< A's 0 … 2, B's 3 … 5
-
-  /// Another edge in some lanes.
-  HWY_INLINE void take(hn::Mask<D> lanes, const PiercingEdges& from) {
-    const auto put = [&](V& to, V value) { to = hn::IfThenElse(lanes, value, to); };
-    for (Vec3 PiercingEdges::*of : {&PiercingEdges::p, &PiercingEdges::q}) {
-      put((this->*of).x, (from.*of).x);
-      put((this->*of).y, (from.*of).y);
-      put((this->*of).z, (from.*of).z);
-    }
-    for (V PiercingEdges::*of :
-         {&PiercingEdges::height_p, &PiercingEdges::height_q, &PiercingEdges::error,
-          &PiercingEdges::shift, &PiercingEdges::number})
-      put(this->*of, from.*of);
-  }
-};
-
-/// End `e` of crossings `at` …, of some lanes.
-HWY_INLINE void write_ends(const PiercingEdges& from, const Compressor<D>& chosen, int e,
-                           std::uint32_t at, Crossings& out) {
-  const D d;
-  const EdgeEnd end = edge_end(from.p, from.q, from.height_p, from.height_q);
-  const auto put = [&](int number, V value) {
-    hn::StoreU(chosen(value), d, out.end(e, number) + at);
-  };
-  const auto put_point = [&](int number, const Vec3& x) {
-    put(number, x.x), put(number + 1, x.y), put(number + 2, x.z);
-  };
-  put_point(Crossings::kFrom, end.from);
-  put_point(Crossings::kOffset, end.offset);
-  const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
-  put(Crossings::kT, hn::IfThenElse(end.from_second, one - end.share, end.share));
-  // Which of two places comes first is asked with B moved aside.
-  put(Crossings::kTError,
-      hn::IfThenElse(end.flat, one,
-                     (two * (from.error + two * from.shift)) / end.heights + hn::Set(d, 1e-15)));
-  put(Crossings::kHeightError, from.error);
-  put(Crossings::kEdge,
-      hn::IfThenElse(end.from_second, from.number, from.number + hn::Set(d, 8.0)));
-}
-
-/// Writes crossings `at` …: of pairs that are `crossing`, a bit each, whose edges [A's, B's] are
-/// `pierced`.
-inline void write_crossings(const TrianglePairs& pairs, const PairHeights& heights,
-                            const std::uint32_t (&pierced)[2][3], std::uint32_t crossing,
-                            std::uint32_t at, Crossings& out) {
-  for (std::uint32_t left = crossing, i = at; left != 0; left &= left - 1, ++i)
-    for (int s = 0; s < 2; ++s) out.triangle(s, i) = pairs.triangle[s][std::countr_zero(left)];
-  const D d;
-  const std::uint32_t lanes = (1u << hn::Lanes(d)) - 1;
-  for (std::size_t l = 0; l < 8; l += hn::Lanes(d)) {
-    const std::uint32_t here = crossing >> l & lanes;
-    if (here == 0) continue;
-    const V zero = hn::Zero(d);
-    const PiercingEdges none = {
-        {zero, zero, zero}, {zero, zero, zero}, zero, zero, zero, zero, zero};
-    PiercingEdges end[2] = {none, none};
-    for (int s = 0; s < 2; ++s)
-      for (int k = 0; k < 3; ++k) {
-        const std::uint32_t through = pierced[s][k] >> l & here;
-        if (through == 0) continue;
-        const int next = (k + 1) % 3;
-        const PiercingEdges edge = {
-            corner_of(pairs, s, k, l),
-            corner_of(pairs, s, next, l),
-            hn::Load(d, heights.value[s][k] + l),
-            hn::Load(d, heights.value[s][next] + l),
-            hn::Load(d, heights.error[s][k] + l) + hn::Load(d, heights.error[s][next] + l),
-            hn::Load(d, heights.shift[s] + l),
-            hn::Set(d, 3.0 * s + k)};
-        // An edge that goes down enters the other solid: A's at the end, B's at the start.
-        const std::uint32_t down = heights.positive[s][k] >> l, ends = s == 0 ? down : ~down;
-        end[0].take(mask_of_bits(d, through & ~ends), edge);
-        end[1].take(mask_of_bits(d, through & ends), edge);
+/// Edges that go through triangles, of crossings that wait until there are eight: they are written
+/// together, without a branch by which edge of which triangle it is.
+class PiercingEdges {
+ public:
+  /// Of pair n, whose edges [A's, B's] are `pierced`: two of them, if signs agree with each other.
+  HWY_INLINE void add(const TrianglePairs& pairs, const PairHeights& heights,
+                      const std::uint32_t (&pierced)[2][3], std::uint32_t n) {
+    // Edges, and those that a crossing ends at: an edge that goes down enters the other solid, A's
+    // at the end, B's at the start.
+    const std::uint32_t edges = bits_of(pierced[0], n) | bits_of(pierced[1], n) << 3,
+                        ends = bits_of(heights.positive[0], n) |
+                               (bits_of(heights.positive[1], n) ^ 7) << 3;
+    const std::uint32_t of_end[2] = {edges & ~ends, edges & ends};
+    for (int e = 0; e < 2; ++e) {
+      const auto number = static_cast<std::uint32_t>(std::countr_zero(of_end[e] | 32u));
+      const std::uint32_t s = number >= 3 ? 1 : 0, k = number - 3 * s, next = k == 2 ? 0 : k + 1;
+      const auto put = [&](Number to, double value) { of_[e][to][count_] = value; };
+      for (int x = 0; x < 3; ++x) {
+        of_[e][kP + x][count_] = pairs.corner[s][k][x][n];
+        of_[e][kQ + x][count_] = pairs.corner[s][next][x][n];
       }
-    const Compressor<D> chosen(d, mask_of_bits(d, here));
-    for (int e = 0; e < 2; ++e) write_ends(end[e], chosen, e, at, out);
-    at += static_cast<std::uint32_t>(chosen.count());
+      put(kHeightP, heights.value[s][k][n]);
+      put(kHeightQ, heights.value[s][next][n]);
+      put(kError, heights.error[s][k][n] + heights.error[s][next][n]);
+      put(kShift, heights.shift[s][n]);
+      put(kEdge, number);
+    }
+    for (int s = 0; s < 2; ++s) triangle_[s][count_] = pairs.triangle[s][n];
+    ++count_;
   }
-}
+  bool full() const { return count_ == 8; }
+
+  /// Writes what waits, as the last of `end` crossings.
+  void write(std::uint32_t end, Crossings& out) {
+    const std::uint32_t at = end - count_;
+    for (std::uint32_t i = 0; i < count_; ++i)
+      for (int s = 0; s < 2; ++s) out.triangle(s, at + i) = triangle_[s][i];
+    for (int e = 0; e < 2; ++e)
+      for (std::uint32_t l = 0; l < count_; l += static_cast<std::uint32_t>(hn::Lanes(D())))
+        write_end(e, l, at + l, out);
+    count_ = 0;
+  }
+
+ private:
+  enum Number {
+    kP = 0,  ///< an edge from p to q
+    kQ = 3,
+    kHeightP = 6,
+    kHeightQ,
+    kError,
+    kShift,
+    kEdge,  ///< A's 0 … 2, B's 3 … 5
+    kNumbers
+  };
+
+  static std::uint32_t bits_of(const std::uint32_t (&pairs)[3], std::uint32_t n) {
+    return (pairs[0] >> n & 1) | (pairs[1] >> n & 1) << 1 | (pairs[2] >> n & 1) << 2;
+  }
+  HWY_INLINE void write_end(int e, std::uint32_t l, std::uint32_t at, Crossings& out) const {
+    const D d;
+    const auto load = [&](int number) { return hn::Load(d, of_[e][number] + l); };
+    const auto point = [&](int number) -> Vec3 {
+      return {load(number), load(number + 1), load(number + 2)};
+    };
+    const EdgeEnd end = edge_end(point(kP), point(kQ), load(kHeightP), load(kHeightQ));
+    const auto put = [&](int number, V value) { hn::StoreU(value, d, out.end(e, number) + at); };
+    const auto put_point = [&](int number, const Vec3& x) {
+      put(number, x.x), put(number + 1, x.y), put(number + 2, x.z);
+    };
+    put_point(Crossings::kFrom, end.from);
+    put_point(Crossings::kOffset, end.offset);
+    const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
+    put(Crossings::kT, hn::IfThenElse(end.from_second, one - end.share, end.share));
+    // Which of two places comes first is asked with B moved aside.
+    put(Crossings::kTError,
+        hn::IfThenElse(
+            end.flat, one,
+            (two * (load(kError) + two * load(kShift))) / end.heights + hn::Set(d, 1e-15)));
+    put(Crossings::kHeightError, load(kError));
+    put(Crossings::kEdge,
+        hn::IfThenElse(end.from_second, load(kEdge), load(kEdge) + hn::Set(d, 8.0)));
+  }
+
+  alignas(64) double of_[2][kNumbers][8] = {};  // finite where none waits, computed too
+  std::uint32_t triangle_[2][8];
+  std::uint32_t count_ = 0;
+};
 
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

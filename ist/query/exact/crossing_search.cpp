@@ -81,6 +81,7 @@ class TriangleSearch : PairSigns {
 
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
+    ends_.write(found_.crossings, scratch_.crossings);
     // Sums go over eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
@@ -92,6 +93,10 @@ class TriangleSearch : PairSigns {
     const PlacedTriangles& b = placed_.triangles(true, number_b);
     const OneBox all(b.all_low, b.all_high, reach_);
     std::uint32_t rows = meeting(a.low, a.high, all.low, all.high);
+    if (rows == 0) return;
+    const OneBox all_a(a.all_low, a.all_high, reach_);
+    std::uint32_t in_a = meeting(b.low, b.high, all_a.low, all_a.high);
+    if (in_a == 0) return;
     const BoxBlock& box_a = a_.level[1].boxes[number_a / kWidth];
     const PlacedBoxes& box_b =
         placed_boxes(b_, 1, number_b / kWidth, search_.a_from_b, pad_b_, *scratch_.placed_b);
@@ -100,12 +105,9 @@ class TriangleSearch : PairSigns {
                                box_a.normal[2][lane_a]};
     const float normal_b[3] = {box_b.normal[0][lane_b], box_b.normal[1][lane_b],
                                box_b.normal[2][lane_b]};
-    if (rows != 0)
-      rows &=
-          in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
+    rows &= in_slab(a, normal_b, box_b.slab_low[lane_b] - slack_, box_b.slab_high[lane_b] + slack_);
     if (rows == 0) return;
-    std::uint32_t in_a =
-        in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
+    in_a &= in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
     std::optional<Meeting> made;
     const auto now = [&]() -> Meeting& {
@@ -197,8 +199,12 @@ class TriangleSearch : PairSigns {
     find_ways_round<false>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
     std::uint32_t parts[2][3], pierced[2][3];
     heights.find_parts(parts);
-    for (std::uint32_t left = round.undecided(all, parts, round.certain); left != 0;
-         left &= left - 1)
+    std::uint32_t left = round.undecided(all, parts, round.certain);
+    if (left != 0) {
+      find_ways_closer(pairs, left, round);
+      left = round.undecided(left, parts, round.certain);
+    }
+    for (; left != 0; left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
     round.pierced(parts, pierced);
     // Two edges pierce where triangles cross, none else.
@@ -265,10 +271,11 @@ class TriangleSearch : PairSigns {
       found_.complete = false;
       return;
     }
-    write_crossings(pairs, heights, pierced, crossing, found_.crossings, scratch_.crossings);
-    found_.crossings += added;
     for (; crossing != 0; crossing &= crossing - 1) {
-      const int n = std::countr_zero(crossing);
+      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
+      ends_.add(pairs, heights, pierced, n);
+      ++found_.crossings;
+      if (ends_.full()) ends_.write(found_.crossings, scratch_.crossings);
       set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
       set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
     }
@@ -280,6 +287,7 @@ class TriangleSearch : PairSigns {
   PlacedMeshes placed_;
   float pad_b_, reach_, slack_;
   EdgeTally edges_;
+  PiercingEdges ends_;
   KeptPairs* keep_ = nullptr;   ///< what is near is kept, and not tested yet
   std::uint32_t gathered_ = 0;  ///< for it
   CrossingsFound found_;

@@ -62,13 +62,13 @@ class ExactQuery {
   }
   /// The edge of a triangle that is opposite to its apex.
   static std::uint32_t opposite_edge(const CrossedBlock& crossed, std::uint32_t triangle) noexcept {
-    return crossed.apex[triangle] == 2 ? 0 : crossed.apex[triangle] + 1u;
+    return 9u >> 2 * crossed.apex[triangle] & 3;  // the next one, without a branch
   }
   /// Whether the middle of a triangle's edge is inside: 1 or 0, if nothing pierces it on the way
   /// from its ends but what is counted from there.
   static int middle_of(const MeshBlock& mesh, const CrossedBlock& crossed, std::uint32_t edge) {
     return static_cast<int>(crossed.inside >> mesh.corner[edge % 3][edge / 3] & 1) +
-           (crossed.pierced >> edge & 1 ? crossed.middle[edge] : 0);
+           (crossed.middle[edge] & -static_cast<int>(crossed.pierced >> edge & 1));
   }
 
   /// How often the cone over the edge opposite to each lane's apex counts.

@@ -25,7 +25,8 @@ struct alignas(64) PlacedBoxes {
 
 /// The vertices of a block in A's unit frame.
 struct alignas(64) PlacedVertices {
-  double at[3][kWidth];  ///< [axis] B's: rounded once after the motion
+  double at[3][kWidth];           ///< [axis] B's: rounded once after the motion
+  std::uint16_t corners[kWidth];  ///< of a triangle: a bit a vertex
 };
 
 /// The triangles of a block in A's unit frame, in floats.
@@ -47,9 +48,9 @@ struct alignas(64) PlacedPlanes {
   double normal[3][kWidth];  ///< product of two sides
   double size[kWidth];       ///< no sum of the absolute products in it is larger
   double longest[kWidth];    ///< no coordinate of these sides is larger
-  /// [edge][axis]: about one long, along the plane out of the triangle, which lies below the
-  /// offset.
-  float edge[3][3][kWidth], edge_offset[3][kWidth];
+  /// [edge][axis]: along the plane out of the triangle, which lies below the offset; its absolute
+  /// coordinates add up to 1, but for rounding.
+  double edge[3][3][kWidth], edge_offset[3][kWidth];
   /// The block's vertices lie between these heights over the plane of `widest`, times the length of
   /// its normal.
   double low, high;

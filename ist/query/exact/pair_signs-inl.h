@@ -227,6 +227,35 @@ class PairSigns {
     }
   }
 
+  /// Of signs that are not certain, by bounds that are as close as exact::FilteredPlane has them:
+  /// products of coordinates that are 0 round nothing.
+  HWY_NOINLINE void find_ways_closer(const TrianglePairs& pairs, std::uint32_t which,
+                                     WaysRound& out) const {
+    const D d;
+    const V filter = hn::Set(d, exact::kFilter);
+    const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
+                        hn::Set(d, search_.aside.z)};
+    for (std::size_t l = 0; which >> l != 0; l += hn::Lanes(d))
+      for (int i = 0; i < 3; ++i) {
+        const Vec3 p = corner_of(pairs, 0, i, l), u = corner_of(pairs, 0, (i + 1) % 3, l) - p;
+        for (int j = 0; j < 3; ++j) {
+          const Vec3 at = corner_of(pairs, 1, j, l), v = corner_of(pairs, 1, (j + 1) % 3, l) - at;
+          const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
+                  bz = u.y * v.x;
+          const Vec3 normal = {ax - bx, ay - by, az - bz}, r = at - p;
+          const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
+                             hn::Abs(az) + hn::Abs(bz)};
+          const V value = dot(r, normal) + dot(aside, normal);
+          const V error = filter * absolute_dot(r, size) + filter * absolute_dot(aside, size);
+          const std::uint32_t fresh =
+              (mask_bits(d, hn::Abs(value) > error) << l) & ~out.certain[i][j];
+          out.positive[i][j] =
+              (out.positive[i][j] & ~fresh) | ((mask_bits(d, value > hn::Zero(d)) << l) & fresh);
+          out.certain[i][j] |= fresh;
+        }
+      }
+  }
+
   HWY_NOINLINE void find_round_exactly(const TrianglePairs& pairs,
                                        const std::uint32_t (&parts)[2][3], std::uint32_t n,
                                        WaysRound& out) const {

@@ -112,6 +112,9 @@ inline const PlacedVertices& placed_vertices(const MeshTree& tree, std::uint32_t
     const double* x = tree.vertices + std::size_t{3} * block.vertex[v];
     for (int k = 0; k < 3; ++k) out.at[k][v] = x[k];
   }
+  for (std::uint32_t t = 0; t < kWidth; ++t)
+    out.corners[t] = static_cast<std::uint16_t>(
+        1u << block.corner[0][t] | 1u << block.corner[1][t] | 1u << block.corner[2][t]);
   if (map == nullptr) return out;
   const hn::CappedTag<double, 8> d;
   for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {

@@ -22,30 +22,13 @@ namespace ist::HWY_NAMESPACE {
 enum class Margin { rounding, room, reach };
 
 /// Which of a block's triangles have all corners among some of its vertices, a bit each.
-HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const MeshBlock& block) {
-#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertices& block) {
+  const hn::CappedTag<std::uint16_t, kWidth> d;
+  const auto others = hn::Set(d, static_cast<std::uint16_t>(~vertices));
   std::uint32_t out = 0;
-  for (std::uint32_t t = 0; t < kWidth; ++t)
-    out |= (vertices >> block.corner[0][t] & vertices >> block.corner[1][t] &
-            vertices >> block.corner[2][t] & 1)
-           << t;
+  for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d))
+    out |= mask_bits(d, hn::And(hn::Load(d, block.corners + l), others) == hn::Zero(d)) << l;
   return out;
-#else
-  const hn::FixedTag<std::uint8_t, kWidth> d;
-  alignas(16) static constexpr std::uint8_t kByte[kWidth] = {0, 0, 0, 0, 0, 0, 0, 0,
-                                                             1, 1, 1, 1, 1, 1, 1, 1};
-  alignas(16) static constexpr std::uint8_t kBit[kWidth] = {1, 2, 4, 8, 16, 32, 64, 128,
-                                                            1, 2, 4, 8, 16, 32, 64, 128};
-  const auto both = hn::BitCast(d, hn::Set(hn::Repartition<std::uint16_t, decltype(d)>(),
-                                           static_cast<std::uint16_t>(vertices)));
-  const auto bits = hn::Load(d, kBit);
-  const auto in =
-      hn::VecFromMask(d, (hn::TableLookupBytes(both, hn::Load(d, kByte)) & bits) == bits);
-  const auto at = [&](int c) { return hn::TableLookupBytes(in, hn::LoadU(d, block.corner[c])); };
-  std::uint8_t out[8] = {};
-  hn::StoreMaskBits(d, hn::MaskFromVec(at(0) & (at(1) & at(2))), out);
-  return out[0] | static_cast<std::uint32_t>(out[1]) << 8;
-#endif
 }
 
 /// The plane of a triangle, and what lies along it.
@@ -101,25 +84,24 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
   return out;
 }
 
-/// Which triangles of the other block have all corners further than `blur` beyond an edge of
-/// triangle t, in its plane.
+/// Which triangles of the other block, moved by `aside`, have all corners further than `by` beyond
+/// an edge of triangle t, in its plane.
 HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32_t t,
-                                         const PlacedVertices& other, const MeshBlock& block,
-                                         float blur) {
+                                         const PlacedVertices& other, const exact::Point& aside,
+                                         double by) {
   const D d;
   std::uint32_t out = 0;
   for (int e = 0; e < 3; ++e) {
-    const V least = hn::Set(d, double{planes.edge_offset[e][t] + blur});
-    const Vec3 away = {hn::Set(d, double{planes.edge[e][0][t]}),
-                       hn::Set(d, double{planes.edge[e][1][t]}),
-                       hn::Set(d, double{planes.edge[e][2][t]})};
+    const exact::Point n = {planes.edge[e][0][t], planes.edge[e][1][t], planes.edge[e][2][t]};
+    const V least = hn::Set(d, (planes.edge_offset[e][t] - dot(aside, n)) + by);
+    const Vec3 away = {hn::Set(d, n.x), hn::Set(d, n.y), hn::Set(d, n.z)};
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       const Vec3 at = {hn::Load(d, other.at[0] + l), hn::Load(d, other.at[1] + l),
                        hn::Load(d, other.at[2] + l)};
       beyond |= mask_bits(d, dot(at, away) > least) << l;
     }
-    out |= triangles_of(beyond, block);
+    out |= triangles_of(beyond, other);
   }
   return out;
 }
@@ -159,19 +141,13 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     store(p[0], out.at);
     store(normal, out.normal);
     hn::Store(hn::Max(largest(u), largest(v)), d, out.longest + l);
-    const hn::Rebind<float, D> floats;
     for (int e = 0; e < 3; ++e) {
       const Vec3 across = cross(p[(e + 1) % 3] - p[e], normal);
-      const V size = length_bound(across), least = hn::Set(d, 1e-300);
-      const V factor = hn::Set(d, 1.0) / hn::Max(size, least);
-      const auto rounded = [&](V x, int k) {
-        const auto f = hn::DemoteTo(floats, factor * x);
-        hn::Store(f, floats, out.edge[e][k] + l);
-        return hn::PromoteTo(d, f);
-      };
-      const Vec3 out_of = {rounded(across.x, 0), rounded(across.y, 1), rounded(across.z, 2)};
-      hn::Store(hn::DemoteTo(floats, max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2]))),
-                floats, out.edge_offset[e] + l);
+      const Vec3 out_of =
+          (hn::Set(d, 1.0) / hn::Max(length_bound(across), hn::Set(d, 1e-300))) * across;
+      store(out_of, out.edge[e]);
+      hn::Store(max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2])), d,
+                out.edge_offset[e] + l);
     }
     hn::Store(length_bound(normal), d, length + l);
   }

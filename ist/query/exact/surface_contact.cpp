@@ -48,7 +48,7 @@ class ContactSearch : PairSigns {
     const auto meet = [&](std::uint32_t number_a, std::uint32_t number_b) -> Meeting& {
       const std::uint64_t met = std::uint64_t{number_a} << 32 | number_b;
       if (std::exchange(blocks, met) != met)
-        now.emplace(search_, scratch_, number_a, number_b, Margin::rounding, search_.near);
+        now.emplace(search_, scratch_, number_a, number_b, Margin::reach, search_.near);
       return *now;
     };
     visit_near(
