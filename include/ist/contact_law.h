@@ -386,12 +386,14 @@ class SupportPolygon {
   struct Plane {
     double height = 0, slope[2] = {0, 0};
     double at(const Corner& x) const { return height + x.u * slope[0] + x.v * slope[1]; }
+    bool is_along(const Plane& other) const;
   };
   struct Side {
     std::array<Face, kFaces> faces;
     std::size_t count = 0;
     bool endless = false;
-    Plane plane;  // of an endless one, or of the first face
+    Plane plane;  // of an endless one, or of a face in the middle, or of the first one
+    bool has_middle = false;
   };
   struct Hull;
 
@@ -399,6 +401,8 @@ class SupportPolygon {
   static Plane plane_of(const Face& face);
   bool choose_plane(bool of_b, Plane& plane) const;
   bool is_near(const Face& face, const Plane& plane) const;
+  /// Away from the middle, where a flat contact by Measure::exact may be rounded or have a step.
+  bool is_at_rim(const Face& face) const;
   void add_mesh(bool of_b, const PlacedAsset& solid) noexcept;
 
   Penetration whole_;

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <ist/asset_layout.h>
 #include <ist/contact_law.h>
@@ -30,8 +31,11 @@ constexpr double kTurnedAgainst = 1e-3;  // [rad] two faces at a larger angle ar
 constexpr double kNearMiddle = 2;
 /// A face is in the plane of the outermost one within this fraction of that distance.
 constexpr double kInPlane = 0.05;
+/// Within this fraction of the radius of a disc of the contact's area around the middle, a contact
+/// is flat or round.
+constexpr double kMiddle = 0.25;
 /// The largest area of a contact over that of its faces: beyond it a part is not flat.
-constexpr double kMostArea = 1.5, kMostExactArea = 1.1;
+constexpr double kMostArea = 1.5;
 constexpr double kAlike = 5e-3;              // fraction of the polygon's width
 constexpr std::size_t kMostPairs = 1 << 14;  // of faces
 
@@ -146,16 +150,24 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
   if ((p - middle_).squaredNorm() > (reach_ + radius) * (reach_ + radius)) return;
   if (!(square > kFacing * kFacing)) {
     const auto is_here = [&](const Corner& x) { return std::abs(x.z) <= near_; };
-    flat_ = std::none_of(face.begin(), face.end(), is_here);
+    flat_ = is_at_rim(face) || std::none_of(face.begin(), face.end(), is_here);
     return;
   }
   if (!(std::abs((p - middle_).dot(normal)) <= near_ * facing)) return;
   Side& side = sides_[of_b];
   const Plane plane = plane_of(face);
-  if (side.count == 0) side.plane = plane;
-  const double turned = std::max(std::abs(plane.slope[0] - side.plane.slope[0]),
-                                 std::abs(plane.slope[1] - side.plane.slope[1]));
-  flat_ = flat_ && side.count < kFaces && (turned < kTurnedAgainst || is_near(face, side.plane));
+  const bool at_rim = is_at_rim(face);
+  if (side.count == 0 && !side.has_middle) side.plane = plane;
+  const bool fits = plane.is_along(side.plane) || is_near(face, side.plane);
+  if (!at_rim && !side.has_middle) {
+    side.plane = plane;
+    side.has_middle = true;
+    if (!fits) side.count = 0;
+  } else if (!fits) {
+    flat_ = at_rim;
+    return;
+  }
+  flat_ = side.count < kFaces;
   if (flat_) side.faces[side.count++] = face;
 }
 
@@ -250,10 +262,30 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
       }
     }
   };
-  // The middle suffices to reject most round surfaces.
+  // The middle suffices to reject most round surfaces, and shows the plane of flat ones.
   visit(near);
   sides_[of_b].count = 0;
   visit(reach_ / unit);
+}
+
+bool SupportPolygon::Plane::is_along(const Plane& other) const {
+  return std::max(std::abs(slope[0] - other.slope[0]), std::abs(slope[1] - other.slope[1])) <
+         kTurnedAgainst;
+}
+
+bool SupportPolygon::is_at_rim(const Face& face) const {
+  if (blurred_) return false;  // the middle is not known well enough
+  bool inside = true;
+  double nearest = std::numeric_limits<double>::infinity();  // to the middle, squared
+  for (int k = 0; k < 3; ++k) {
+    const Corner &from = face[k], &to = face[(k + 1) % 3];
+    const double u = to.u - from.u, v = to.v - from.v;
+    const double t = std::clamp(-(from.u * u + from.v * v) / (u * u + v * v), 0.0, 1.0);
+    const double x = from.u + t * u, y = from.v + t * v;
+    nearest = std::min(nearest, x * x + y * y);
+    inside = inside && cross(from.u, from.v, u, v) >= 0;
+  }
+  return !inside && std::numbers::pi * nearest > kMiddle * kMiddle * area_;
 }
 
 /// The plane of the face that is outermost under the middle.
@@ -262,7 +294,9 @@ bool SupportPolygon::choose_plane(bool of_b, Plane& plane) const {
   plane = side.plane;
   for (std::size_t i = 0; i < side.count && !side.endless; ++i) {
     const Plane found = plane_of(side.faces[i]);
-    if (of_b ? found.height < plane.height : found.height > plane.height) plane = found;
+    if (found.is_along(side.plane) &&
+        (of_b ? found.height < plane.height : found.height > plane.height))
+      plane = found;
   }
   return side.endless || side.count > 0;
 }
@@ -303,7 +337,7 @@ std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patch
   if (!(area_ < kMostArea * facing.area)) return std::nullopt;
   const bool apart = blurred_ && !(overlapping.area > 0);
   const Hull& hull = apart ? facing : overlapping;
-  if (!blurred_ && !(area_ < kMostExactArea * hull.area && hull.area < kMostExactArea * area_))
+  if (!blurred_ && !(area_ < kMostArea * hull.area && hull.area < kMostArea * area_))
     return std::nullopt;
   // The point and direction of the force.
   const double mean[2] = {0.5 * (plane[0].slope[0] + plane[1].slope[0]),
