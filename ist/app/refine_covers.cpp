@@ -12,14 +12,15 @@
 #include <utility>
 #include <vector>
 
+#include "robots/covers/triangles.h"
+
 namespace ist::app {
 namespace {
 
 constexpr double kEnough = 0.1;           ///< of the free poses
-constexpr std::size_t kMostOfALink = 40;  ///< on average
-constexpr std::size_t kMostOfAll = 60;    ///< the same, where kEnough are given up
+constexpr std::size_t kMostOfALink = 60;  ///< on average
 constexpr double kGivenUp = 0.05;         ///< share of the free poses, at least
-constexpr double kHopeless = 0.6;    ///< share that is given up where it takes too many spheres
+constexpr double kHopeless = 0.8;    ///< share that is given up where it takes too many spheres
 constexpr double kElsewhere = 0.6;   ///< of the first protrusion, where no link is near
 constexpr double kHalf = 0.5;        ///< of a gap, where both links' spheres change
 constexpr double kLess = 0.4;        ///< of a gap, where half of it was not enough
@@ -139,15 +140,10 @@ class LinkRoom {
     constexpr std::size_t kFew = 8;
     if (cell.near.size() <= kFew || cell.half < kSmallCell * root_.half) return;
     for (int k = 0; k < 8; ++k) {
-      const double h = cell.half / 2;
-      Cell part{cell.middle + Eigen::Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h,
-                                              (k & 4) != 0 ? h : -h),
-                h,
-                {},
-                {}};
+      Cell part{middle_of_part(cell.middle, cell.half, k), cell.half / 2, {}, {}};
       for (const std::uint32_t i : cell.near)
         if (reaches(near_[i], near_[i].in_other * part.middle,
-                    (1 + near_[i].ratio()) * most_ + std::sqrt(3.0) * h))
+                    (1 + near_[i].ratio()) * most_ + std::sqrt(3.0) * part.half))
           part.near.push_back(i);
       divide(cell.parts.emplace_back(std::move(part)));
     }
@@ -244,9 +240,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
       settings.max_protrusion = std::max(settings.max_protrusion, kElsewhere * protrusion);
   }
   settings.count = kMostCoverSpheres;
-  const auto budget = [&](double given_up) {
-    return std::max(before, (given_up < kEnough ? kMostOfALink : kMostOfAll) * robot.links.size());
-  };
+  const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
   const std::vector<LinkSpheres> first = robot.covers();
   std::vector<LinkRoom> rooms;
   const auto room_of = [&](std::size_t i) {
@@ -277,17 +271,16 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     while (true) {
       lost = dearest(meetings, given_up(share));
       rooms = rooms_of(links, first, meetings, lost, narrow);
-      const std::vector<std::size_t> counts = needed(budget(kEnough));
+      const std::vector<std::size_t> counts = needed(budget);
       total = 0;
       for (std::size_t i = 0; i < links.size(); ++i)
         total += counts[i] > 0 ? counts[i] : links[i].own;
-      const double too_many = static_cast<double>(total) / static_cast<double>(budget(share));
-      double next = share * std::clamp(std::pow(too_many, 1.5), 1.1, 2.0);
-      if (share < kEnough) next = std::min(next, kEnough);
-      if (total <= budget(share) || next > kHopeless) break;
+      const double too_many = static_cast<double>(total) / static_cast<double>(budget);
+      const double next = share * std::clamp(std::pow(too_many, 1.5), 1.1, 2.0);
+      if (total <= budget || next > kHopeless) break;
       share = next;
     }
-    if (total > budget(share)) break;
+    if (total > budget) break;
     std::vector<ClosedMesh> meshes;
     std::vector<std::size_t> changed;
     settings.room.clear();
