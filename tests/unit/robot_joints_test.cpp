@@ -207,13 +207,13 @@ TEST(SelfCollision, FalseMeetingsAreOfSpheresWhileNoSolidsOverlap) {
 }
 
 TEST(SelfCollision, FreePosesAreDrawnWhereFewAre) {
-  const Chain fat = chain(0.45);
-  const SelfCollision self = study(fat.robot, fat.spheres, 0.42);
-  ASSERT_LT(self.samples - self.colliding, 950u);
-  EXPECT_EQ(self.free, 1000u);
+  const Chain fat = chain(0.7);
+  const SelfCollision self = study(fat.robot, fat.spheres, 0.65);
+  ASSERT_LT(self.samples - self.colliding, 180u);
+  EXPECT_EQ(self.free, 200u);
   std::size_t drawn = 0;
   for (const FalseMeeting& one : self.meetings) {
-    EXPECT_FALSE(balls(fat.spheres, 0.42)(one.a, one.b, one.b_in_a));
+    EXPECT_FALSE(balls(fat.spheres, 0.65)(one.a, one.b, one.b_in_a));
     drawn += one.sample >= 2 * self.samples ? 1 : 0;
   }
   EXPECT_GT(drawn, 0u);

@@ -25,7 +25,7 @@ constexpr std::size_t kMoreSamples = 5;  ///< times as many of the joints betwee
 constexpr double kTests = 1e9;           ///< of spheres, about, at most
 constexpr double kLimitShare = 0.1;      ///< of positions drawn that are a limit
 constexpr double kWorthIgnoring = 0.01;  ///< share of positions in which spheres overlap
-constexpr std::size_t kFree = 1000;      ///< positions without a collision that are to decide
+constexpr std::size_t kFree = 200;       ///< positions without a collision that are to decide
 constexpr std::size_t kDraws = 100'000;  ///< for them, at most
 constexpr int kPosesACount = 40;         ///< searched with so many joints moved
 
