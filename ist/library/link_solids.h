@@ -38,7 +38,7 @@ class LinkSolids {
 
  private:
   struct Workspaces;
-  std::vector<std::unique_ptr<const Asset>> assets_;  ///< null: there is no exact solid
+  std::vector<std::unique_ptr<const Asset>> assets_;      ///< null: there is no exact solid
   std::vector<std::unique_ptr<const MeshSolid>> meshes_;  ///< the same
   std::unique_ptr<Workspaces> workspaces_;
 };
