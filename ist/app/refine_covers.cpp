@@ -9,19 +9,21 @@
 #include <tuple>
 #include <utility>
 
+#include "robots/covers/triangles.h"
+
 namespace ist::app {
 namespace {
 
 constexpr double kEnough = 0.1;           ///< of the free poses
-constexpr std::size_t kMostOfALink = 40;  ///< on average
-constexpr std::size_t kMostOfAll = 60;    ///< the same, where kEnough are given up
+constexpr std::size_t kMostOfALink = 60;  ///< on average
 constexpr double kGivenUp = 0.05;         ///< share of the free poses, at least
-constexpr double kHopeless = 0.6;   ///< share that is given up where it takes too many spheres
-constexpr double kElsewhere = 0.6;  ///< of the first protrusion, where no link is near
-constexpr double kHalf = 0.5;       ///< of a gap, where both links' spheres change
-constexpr double kLess = 0.4;       ///< of a gap, where half of it was not enough
-constexpr double kWhole = 0.95;     ///< of a gap, where the other link's spheres stay
-constexpr int kBisections = 3;      ///< of the free distance in a direction
+constexpr double kHopeless = 0.8;    ///< share that is given up where it takes too many spheres
+constexpr double kElsewhere = 0.6;   ///< of the first protrusion, where no link is near
+constexpr double kHalf = 0.5;        ///< of a gap, where both links' spheres change
+constexpr double kLess = 0.4;        ///< of a gap, where half of it was not enough
+constexpr double kWhole = 0.95;      ///< of a gap, where the other link's spheres stay
+constexpr int kBisections = 3;       ///< of the free distance in a direction
+constexpr double kSmallCell = 0.03;  ///< of the link
 constexpr int kRounds = 2;
 constexpr std::size_t kFewest = 50;  ///< free poses, of fewer a share tells nothing
 constexpr std::size_t kTold = 3;     ///< pairs that are named as obstacles
@@ -64,30 +66,43 @@ std::set<std::size_t> dearest(const std::vector<Meeting>& all, std::size_t count
 }
 
 /// How far a link's spheres may protrude, so that they meet no others falsely.
-struct LinkRoom {
+class LinkRoom {
+ public:
   struct Near {
     std::size_t other;
     Eigen::Isometry3d in_other;               ///< of the link's frame
     double share;                             ///< of the distance
     const std::vector<CoverSphere>* spheres;  ///< that contain the other
+
+    /// What points of the other are nearer, over the distance to the link, and belong to it.
+    double ratio() const { return (1 - share) / share; }
   };
+
+  explicit LinkRoom(double most) : most_(most) {}
+
+  bool is_free() const { return near_.empty(); }
+  void add(const Near& near) { near_.push_back(near); }
+
+  /// To be called when all are added: sorts them by places of the link, which lies in `box`.
+  void sort(const Eigen::AlignedBox3d& box) {
+    root_ = {box.center(), box.sizes().maxCoeff() / 2, {}, {}};
+    for (std::uint32_t i = 0; i < near_.size(); ++i) root_.near.push_back(i);
+    divide(root_);
+  }
 
   /// Points between two links belong to that of which they are nearer, by shares.
   double operator()(const LinkSolids& solids, const Eigen::Vector3d& place,
                     const Eigen::Vector3d& outward) const {
-    double room = most;
-    for (const Near& one : near) {
-      const double other = (1 - one.share) / one.share;
+    double room = most_;
+    for (const std::uint32_t i : cell_of(place).near) {
+      const Near& one = near_[i];
+      const double other = one.ratio();
       const Eigen::Vector3d from = one.in_other * place, out = one.in_other.linear() * outward;
       const auto is_ours = [&](double t) {
         const Eigen::Vector3d at = from + t * out;
         // Its spheres contain it.
-        const bool is_near =
-            std::any_of(one.spheres->begin(), one.spheres->end(), [&](const CoverSphere& s) {
-              const double reach = s.radius + other * t;
-              return (at - s.centre).squaredNorm() < reach * reach;
-            });
-        return !is_near || solids.distance(one.other, at, other * t) >= other * t;
+        return !reaches(one, at, other * t) ||
+               solids.distance(one.other, at, other * t) >= other * t;
       };
       if (outward.isZero()) {
         room = one.share * solids.distance(one.other, from, room / one.share);
@@ -102,8 +117,48 @@ struct LinkRoom {
     return room;
   }
 
-  double most;  ///< [u]
-  std::vector<Near> near = {};
+ private:
+  /// A cube, and what may matter for places in it.
+  struct Cell {
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    double half = 0;
+    std::vector<std::uint32_t> near;
+    std::vector<Cell> parts;
+  };
+
+  static bool reaches(const Near& one, const Eigen::Vector3d& at, double by) {
+    return std::any_of(one.spheres->begin(), one.spheres->end(), [&](const CoverSphere& s) {
+      const double reach = s.radius + by;
+      return (at - s.centre).squaredNorm() < reach * reach;
+    });
+  }
+
+  void divide(Cell& cell) {
+    constexpr std::size_t kFew = 8;
+    if (cell.near.size() <= kFew || cell.half < kSmallCell * root_.half) return;
+    for (int k = 0; k < 8; ++k) {
+      Cell part{middle_of_part(cell.middle, cell.half, k), cell.half / 2, {}, {}};
+      for (const std::uint32_t i : cell.near)
+        if (reaches(near_[i], near_[i].in_other * part.middle,
+                    (1 + near_[i].ratio()) * most_ + std::sqrt(3.0) * part.half))
+          part.near.push_back(i);
+      divide(cell.parts.emplace_back(std::move(part)));
+    }
+    cell.near.clear();
+  }
+
+  const Cell& cell_of(const Eigen::Vector3d& place) const {
+    const Cell* cell = &root_;
+    while (!cell->parts.empty()) {
+      const Eigen::Array<bool, 3, 1> above = place.array() > cell->middle.array();
+      cell = &cell->parts[(above[0] ? 1u : 0u) + (above[1] ? 2u : 0u) + (above[2] ? 4u : 0u)];
+    }
+    return *cell;
+  }
+
+  double most_;  ///< [u]
+  std::vector<Near> near_;
+  Cell root_;
 };
 
 struct Refined {
@@ -121,7 +176,7 @@ std::vector<LinkRoom> rooms_of(const std::vector<Refined>& links,
                                const std::set<std::size_t>& given_up,
                                const std::set<Two>& narrow = {}) {
   std::vector<LinkRoom> rooms;
-  for (const Refined& link : links) rooms.push_back({kElsewhere * link.first});
+  for (const Refined& link : links) rooms.emplace_back(kElsewhere * link.first);
   // The tightest first: then the others are soon told to be far.
   std::vector<const Meeting*> order;
   for (const Meeting& one : meetings)
@@ -134,11 +189,19 @@ std::vector<LinkRoom> rooms_of(const std::vector<Refined>& links,
                            : narrow.contains({one->at.a, one->at.b}) ? kLess
                                                                      : kHalf;
       if (links[link].mesh != nullptr)
-        rooms[link].near.push_back({other, in_other, share, &covers[other].spheres});
+        rooms[link].add({other, in_other, share, &covers[other].spheres});
     };
     add(one->at.a, one->at.b, one->at.b_in_a.inverse());
     add(one->at.b, one->at.a, one->at.b_in_a);
   }
+  tbb::parallel_for(std::size_t{0}, links.size(), [&](std::size_t i) {
+    if (links[i].mesh == nullptr) return;
+    Eigen::AlignedBox3d box;
+    const TriangleMesh& mesh = links[i].mesh->mesh;
+    for (const auto& triangle : mesh.triangles)
+      for (const std::uint32_t v : triangle) box.extend(mesh.vertices[v]);
+    rooms[i].sort(box);
+  });
   return rooms;
 }
 
@@ -172,9 +235,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
       settings.max_protrusion = std::max(settings.max_protrusion, kElsewhere * protrusion);
   }
   settings.count = kMostCoverSpheres;
-  const auto budget = [&](double given_up) {
-    return std::max(before, (given_up < kEnough ? kMostOfALink : kMostOfAll) * robot.links.size());
-  };
+  const std::size_t budget = std::max(before, kMostOfALink * robot.links.size());
   const std::vector<LinkSpheres> first = robot.covers();
   std::vector<LinkRoom> rooms;
   const auto room_of = [&](std::size_t i) {
@@ -186,7 +247,7 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
   const auto needed = [&](std::size_t enough) {
     std::vector<std::size_t> counts(links.size());
     tbb::parallel_for(std::size_t{0}, links.size(), [&](std::size_t i) {
-      if (!rooms[i].near.empty())
+      if (!rooms[i].is_free())
         counts[i] = estimated_count(*links[i].mesh, settings.max_protrusion, room_of(i), enough);
     });
     return counts;
@@ -205,22 +266,21 @@ void refine_covers(SphereRobot& robot, SelfCollisionStudy& study, const LinkSoli
     while (true) {
       lost = dearest(meetings, given_up(share));
       rooms = rooms_of(links, first, meetings, lost, narrow);
-      const std::vector<std::size_t> counts = needed(budget(kEnough));
+      const std::vector<std::size_t> counts = needed(budget);
       total = 0;
       for (std::size_t i = 0; i < links.size(); ++i)
         total += counts[i] > 0 ? counts[i] : links[i].own;
-      const double too_many = static_cast<double>(total) / static_cast<double>(budget(share));
-      double next = share * std::clamp(std::pow(too_many, 1.5), 1.1, 2.0);
-      if (share < kEnough) next = std::min(next, kEnough);
-      if (total <= budget(share) || next > kHopeless) break;
+      const double too_many = static_cast<double>(total) / static_cast<double>(budget);
+      const double next = share * std::clamp(std::pow(too_many, 1.5), 1.1, 2.0);
+      if (total <= budget || next > kHopeless) break;
       share = next;
     }
-    if (total > budget(share)) break;
+    if (total > budget) break;
     std::vector<ClosedMesh> meshes;
     std::vector<std::size_t> changed;
     settings.room.clear();
     for (std::size_t i = 0; i < links.size(); ++i) {
-      if (rooms[i].near.empty()) continue;
+      if (rooms[i].is_free()) continue;
       changed.push_back(i);
       meshes.push_back(*links[i].mesh);
       settings.room.push_back(room_of(i));

@@ -64,9 +64,8 @@ void complete_cover(SphereLink& link, bool read);
 
 /// Covers links again whose spheres overlap others' though the solids do not: with as many spheres
 /// as it takes to protrude only into the gaps that the solids leave there, of which the tightest
-/// are given up until 40 spheres a link on average are enough, or 60 for a tenth or more. Nothing
-/// is changed where at most a tenth of the free poses are called colliding, or where that would not
-/// become fewer.
+/// are given up until 60 spheres a link on average are enough. Nothing is changed where at most a
+/// tenth of the free poses are called colliding, or where that would not become fewer.
 ///
 /// `robot.self` is of its covers, and stays so. `fixed`: counts of links by name, which are kept.
 /// `is_open`: whether counts may change; if not, it is told alone what is in the way.

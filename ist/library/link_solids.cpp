@@ -2,11 +2,14 @@
 
 #include <ist/bake.h>
 #include <ist/pose_eigen.h>
-#include <ist/raycast.h>
+#include <ist/types.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "mesh/geometry/closest_point.h"
+#include "mesh/mesh_solid.h"
 #include "robots/description/link_mesh.h"
 
 namespace ist {
@@ -20,18 +23,14 @@ LinkSolids::~LinkSolids() = default;
 
 std::string LinkSolids::add(const ClosedMesh* mesh, std::span<const CoverSphere> spheres) {
   assets_.emplace_back();
-  TriangleMesh all = mesh == nullptr ? TriangleMesh{} : mesh->mesh;
-  for (const CoverSphere& s : spheres)
-    append_mesh(all, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
-  boxes_.emplace_back();
-  for (const Eigen::Vector3d& v : all.vertices) boxes_.back().extend(v);
+  meshes_.emplace_back();
   try {
-    if (spheres.empty()) {
-      assets_.back() = std::make_unique<const Asset>(bake_mesh_only(*mesh));
-      return "";
-    }
-    assets_.back() =
-        std::make_unique<const Asset>(bake_mesh_only(close_mesh(std::move(all), "link")));
+    ClosedMesh all = mesh == nullptr ? ClosedMesh{} : *mesh;
+    for (const CoverSphere& s : spheres)
+      append_mesh(all.mesh, capsule_mesh({s.centre, s.centre, s.radius}).mesh);
+    if (!spheres.empty()) all = close_mesh(std::move(all.mesh), "link");
+    assets_.back() = std::make_unique<const Asset>(bake_mesh_only(all));
+    meshes_.back() = std::make_unique<const MeshSolid>(all);
     return "";
   } catch (const Error& error) {
     return error.what();
@@ -54,10 +53,15 @@ double LinkSolids::gap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_
 }
 
 double LinkSolids::distance(std::size_t link, const Eigen::Vector3d& point, double most) const {
-  if (!assets_[link]) return 0;
-  if (boxes_[link].squaredExteriorDistance(point) >= most * most) return most;
-  const double found = closest_point(PlacedSolid(assets_[link]->view(), Pose{}), point).distance;
-  return std::clamp(found, 0.0, most);
+  if (!meshes_[link]) return 0;
+  const MeshSolid& mesh = *meshes_[link];
+  if (mesh.bounds().squaredExteriorDistance(point) >= most * most) return most;
+  const Eigen::Vector3d at = mesh.frame().to_unit(point);
+  const Eigen::Vector3f p = at.cast<float>();
+  const double scale = mesh.frame().scale(), limit = most / scale;
+  const float found2 =
+      nearest_triangle(mesh.view(), p.data(), static_cast<float>(limit * limit)).distance2;
+  return mesh.inside(at) ? 0 : std::min(most, scale * std::sqrt(double{found2}));
 }
 
 }  // namespace ist

@@ -7,6 +7,8 @@
 
 namespace ist {
 
+class MeshSolid;
+
 /// The solids of a robot's links, to tell exactly whether two of them overlap.
 class LinkSolids {
  public:
@@ -25,13 +27,13 @@ class LinkSolids {
   double gap(std::size_t a, std::size_t b, const Eigen::Isometry3d& b_in_a) const;
 
   /// [u] From a point in the link's frame to the link, or `most` if that is less; 0 inside, and
-  /// where it has no exact solid. Thread-safe.
+  /// where it has no exact solid. To float rounding. Thread-safe.
   double distance(std::size_t link, const Eigen::Vector3d& point, double most) const;
 
  private:
   struct Workspaces;
-  std::vector<std::unique_ptr<const Asset>> assets_;  ///< null: there is no exact solid
-  std::vector<Eigen::AlignedBox3d> boxes_;            ///< around them
+  std::vector<std::unique_ptr<const Asset>> assets_;      ///< null: there is no exact solid
+  std::vector<std::unique_ptr<const MeshSolid>> meshes_;  ///< the same
   std::unique_ptr<Workspaces> workspaces_;
 };
 

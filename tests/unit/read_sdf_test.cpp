@@ -115,7 +115,7 @@ TEST(Sdf, MistakesAreToldWithTheirLines) {
   expect("<link name='a'/><link name='a'/>", "duplicates the link");
   expect(two + joint(""), "has no <axis>");
   expect(two + joint("<axis><xyz>0 0 0</xyz></axis>"), "length 0");
-  expect(two + joint("<axis><xyz>0 0 z</xyz></axis>"), "\"z\" is not a number");
+  expect(two + joint("<axis><xyz>0 0 z</xyz></axis>"), "\"z\" is not a finite number");
   expect(two + joint("<axis><xyz>0 1</xyz></axis>"), "has 2 numbers, not 3");
   expect(two + joint("<axis><xyz>0 0 1</xyz><mimic joint='x'/></axis>"), "moves on its own");
   expect("<link name='a'/>" + joint(""), "its child \"b\" is not a link");

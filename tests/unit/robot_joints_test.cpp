@@ -206,6 +206,19 @@ TEST(SelfCollision, FalseMeetingsAreOfSpheresWhileNoSolidsOverlap) {
   EXPECT_TRUE(study(thin.robot, thin.spheres, 0.2).meetings.empty());
 }
 
+TEST(SelfCollision, FreePosesAreDrawnWhereFewAre) {
+  const Chain fat = chain(0.7);
+  const SelfCollision self = study(fat.robot, fat.spheres, 0.65);
+  ASSERT_LT(self.samples - self.colliding, 180u);
+  EXPECT_EQ(self.free, 200u);
+  std::size_t drawn = 0;
+  for (const FalseMeeting& one : self.meetings) {
+    EXPECT_FALSE(balls(fat.spheres, 0.65)(one.a, one.b, one.b_in_a));
+    drawn += one.sample >= 2 * self.samples ? 1 : 0;
+  }
+  EXPECT_GT(drawn, 0u);
+}
+
 TEST(SelfCollision, NoPairIsIgnoredThatOverlapsInAFewPoses) {
   // The ends meet only where all three joints are folded almost wholly.
   const Chain rare = chain(0.4, "<limit lower='-3.14' upper='3.14'/>");

@@ -70,7 +70,7 @@ TEST(RobotModel, SaysWhatIsWrongAndWhere) {
       "link='a'/></joint></robot>",
       "a cycle");
   expect(with_collision(""), "line 3: <collision>: has no <geometry>");
-  expect(with_collision("<geometry><blob/></geometry>"), "is an unknown shape");
+  expect(with_collision("<geometry><blob/></geometry>"), "is not read. Use mesh, box");
   expect(with_collision("<geometry><box size='1 1'/></geometry>"), "has 2 numbers, not 3");
   expect(with_collision("<geometry><box size='1 1 0'/></geometry>"), "must be above 0");
   expect(with_collision("<geometry><sphere radius='-1'/></geometry>"), "must be above 0");

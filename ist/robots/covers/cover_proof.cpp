@@ -140,10 +140,7 @@ class VoidSearch {
   }
 
   static Cube part(const Cube& cube, int k) {
-    const double h = cube.half / 2;
-    return {
-        cube.middle + Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h, (k & 4) != 0 ? h : -h),
-        h};
+    return {middle_of_part(cube.middle, cube.half, k), cube.half / 2};
   }
 
  private:

@@ -8,22 +8,19 @@
 #include <utility>
 #include <vector>
 
+#include "robots/covers/triangles.h"
+
 namespace ist {
 namespace {
 
 using Eigen::Vector3d;
-using Corners = std::array<Vector3d, 3>;
+using Corners = HalvableTriangle;
 
 constexpr double kFineness =
     0.25;                        ///< a part is no wider than this share of the largest protrusion
 constexpr double kGrowth = 0.1;  ///< by which spheres grow, of the largest protrusion
 constexpr std::size_t kFewest = 8;  ///< spheres that may be added; else as many as there are
 constexpr double kMargin = 1e-12;   ///< for rounding, of the coordinates
-
-double size_of(const Corners& t) {
-  return std::sqrt(std::max(
-      {(t[0] - t[1]).squaredNorm(), (t[1] - t[2]).squaredNorm(), (t[2] - t[0]).squaredNorm()}));
-}
 
 double farthest(const Corners& t, const Vector3d& from) {
   double square = 0;
@@ -48,16 +45,9 @@ class OpenParts {
         best = &sphere;
       }
     }
-    if (size_of(t) > finest_) {
-      std::size_t from = 0;  // of the longest side
-      for (std::size_t k = 1; k < 3; ++k)
-        if ((t[k] - t[(k + 1) % 3]).squaredNorm() > (t[from] - t[(from + 1) % 3]).squaredNorm())
-          from = k;
-      const std::size_t to = (from + 1) % 3;
-      Corners first = t, second = t;
-      first[to] = second[from] = 0.5 * (t[from] + t[to]);
-      look(first);
-      return look(second);
+    if (const LongestSide side = longest_side(t); side.length2 > finest_ * finest_) {
+      for (const Corners& half : halves(t, side.from)) look(half);
+      return;
     }
     // Growing is cheap, and adds up.
     const double grown = best == nullptr ? 0 : grown_[best - spheres_.data()] + least;

@@ -54,43 +54,59 @@ class PointGrid {
     if (size() == 0 || !(radius >= 0)) return;
     const Eigen::Vector3f c = p.cast<float>();
     const auto reach = static_cast<float>(radius);
-    const float reach2 = reach * reach;
     const auto [y_from, y_to] = cells(1, c.y() - reach, c.y() + reach);
     const auto [z_from, z_to] = cells(2, c.z() - reach, c.z() + reach);
-    for (int z = z_from; z <= z_to; ++z) {
-      const float dz = outside(2, z, c.z());
-      for (int y = y_from; y <= y_to; ++y) {
-        const float dy = outside(1, y, c.y());
-        const float left2 = reach2 - dy * dy - dz * dz;
-        if (left2 < 0) continue;
-        const float half = std::sqrt(left2);
-        const auto [x_from, x_to] = cells(0, c.x() - half, c.x() + half);
-        if (x_from > x_to) continue;
-        const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(count_[1]) +
-                                 static_cast<std::size_t>(y)) *
-                                static_cast<std::size_t>(count_[0]);
-        scan(c, in_cells_.first[row + static_cast<std::size_t>(x_from)],
-             in_cells_.first[row + static_cast<std::size_t>(x_to) + 1], reach2, visit);
-      }
-    }
+    for (int z = z_from; z <= z_to; ++z)
+      for (int y = y_from; y <= y_to; ++y) scan_row(c, y, z, reach * reach, visit);
   }
 
-  /// The nearest point no further than `limit`: looked for within `guess`, then further and
-  /// further. The smallest place among equals.
+  /// The nearest point no further than `limit`: looked for within `guess` first. The smallest place
+  /// among equals.
   Nearest nearest(const Eigen::Vector3d& p, double guess, double limit) const {
+    const Eigen::Vector3f c = p.cast<float>();
+    // From the middle to both sides: what is found there leaves less to look at.
+    const auto outward = [](const std::pair<int, int>& range, int middle, const auto& take) {
+      middle = std::clamp(middle, range.first, std::max(range.first, range.second));
+      for (int i = middle; i <= range.second; ++i) take(i);
+      for (int i = middle - 1; i >= range.first; --i) take(i);
+    };
+    const auto middle = [&](std::size_t axis, float x) {
+      return static_cast<int>(
+          std::clamp((x - low_[axis]) * per_cell_, 0.0f, static_cast<float>(count_[axis])));
+    };
     Nearest best;
-    if (size() == 0) return best;
-    for (double reach = std::min(guess, limit);;
-         reach = std::min(std::max(1.3 * reach, static_cast<double>(cell_)), limit)) {
-      within(p, reach, [&](std::uint32_t i, float d2) {
-        if (d2 < best.distance2) best = {d2, i};
+    for (double radius : {std::min(guess, limit), limit}) {
+      if (size() == 0 || !(radius >= 0) || best.place != UINT32_MAX) break;
+      const auto reach = static_cast<float>(radius);
+      best.distance2 = reach * reach;
+      const auto take = [&](std::uint32_t i, float d2) {
+        if (d2 < best.distance2 || i < best.place) best = {d2, i};
+      };
+      outward(cells(2, c.z() - reach, c.z() + reach), middle(2, c.z()), [&](int z) {
+        outward(cells(1, c.y() - reach, c.y() + reach), middle(1, c.y()),
+                [&](int y) { scan_row(c, y, z, best.distance2, take); });
       });
-      if (best.place != UINT32_MAX || reach >= limit) return best;
     }
+    return best;
   }
 
  private:
   static constexpr std::uint32_t kLanes = 8;
+
+  template <class Visit>
+  void scan_row(const Eigen::Vector3f& c, int y, int z, float reach2, const Visit& visit) const {
+    const float dy = outside(1, y, c.y()), dz = outside(2, z, c.z());
+    const float left2 = reach2 - dy * dy - dz * dz;
+    if (left2 < 0) return;
+    const float half = std::sqrt(left2);
+    const auto [x_from, x_to] = cells(0, c.x() - half, c.x() + half);
+    if (x_from > x_to) return;
+    const std::size_t row = (static_cast<std::size_t>(z) * static_cast<std::size_t>(count_[1]) +
+                             static_cast<std::size_t>(y)) *
+                            static_cast<std::size_t>(count_[0]);
+    scan(c, in_cells_.first[row + static_cast<std::size_t>(x_from)],
+         in_cells_.first[row + static_cast<std::size_t>(x_to) + 1], reach2, visit);
+  }
 
   template <class Visit>
   void scan(const Eigen::Vector3f& c, std::uint32_t from, std::uint32_t to, float reach2,

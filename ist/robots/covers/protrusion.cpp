@@ -82,11 +82,7 @@ class ProtrusionSearch {
         see(middle);
     }
     if (bound <= threshold()) return settle(bound);
-    for (int k = 0; k < 8; ++k) {
-      const double h = half / 2;
-      look(middle + Vector3d((k & 1) != 0 ? h : -h, (k & 2) != 0 ? h : -h, (k & 4) != 0 ? h : -h),
-           h, outside);
-    }
+    for (int k = 0; k < 8; ++k) look(middle_of_part(middle, half, k), half / 2, outside);
   }
 
   /// A point of the ball near `middle` is looked at: how far out it is.

@@ -33,11 +33,7 @@ std::vector<Face> faces_of(const MeshView& mesh) {
   std::vector<Face> faces(mesh.triangle_count);
   for (std::uint32_t t = 0; t < mesh.triangle_count; ++t) {
     Face& face = faces[t];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double* const v =
-          mesh.vertices + 3 * std::size_t{mesh.triangles[3 * std::size_t{t} + k]};
-      face.corners[k] = {v[0], v[1], v[2]};
-    }
+    face.corners = triangle_corners(mesh, t);
     const Vector3d across =
         (face.corners[1] - face.corners[0]).cross(face.corners[2] - face.corners[0]);
     const double length = std::sqrt(across.squaredNorm());
@@ -104,9 +100,8 @@ EdgeSamples sample_edges(const MeshView& mesh, const std::vector<Face>& faces, d
     if (sides.size() < 2) continue;
     const Vector3d n = faces[sides[0] / 3].normal, m = faces[sides[1] / 3].normal;
     if (sides.size() == 2 && n.dot(m) > kSharp) continue;
-    const auto at = [&](std::uint32_t v) {
-      const double* const x = mesh.vertices + 3 * std::size_t{v};
-      return Vector3d(x[0], x[1], x[2]);
+    const auto at = [&](std::size_t v) {
+      return Vector3d(Eigen::Map<const Vector3d>(mesh.vertices + 3 * v));
     };
     const Vector3d a = at(edges.low(e)), b = at(edges.high(e));
     const double length = std::sqrt((b - a).squaredNorm());

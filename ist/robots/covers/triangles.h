@@ -35,4 +35,10 @@ inline std::array<HalvableTriangle, 2> halves(const HalvableTriangle& t, std::si
   return {HalvableTriangle{middle, c, a}, HalvableTriangle{b, c, middle}};
 }
 
+/// The middle of one of the eight parts of a cube.
+inline Eigen::Vector3d middle_of_part(const Eigen::Vector3d& middle, double half, int part) {
+  const auto off = [&](int bit) { return (part & bit) != 0 ? half / 2 : -half / 2; };
+  return middle + Eigen::Vector3d(off(1), off(2), off(4));
+}
+
 }  // namespace ist

@@ -25,6 +25,8 @@ constexpr std::size_t kMoreSamples = 5;  ///< times as many of the joints betwee
 constexpr double kTests = 1e9;           ///< of spheres, about, at most
 constexpr double kLimitShare = 0.1;      ///< of positions drawn that are a limit
 constexpr double kWorthIgnoring = 0.01;  ///< share of positions in which spheres overlap
+constexpr std::size_t kFree = 200;       ///< positions without a collision that are to decide
+constexpr std::size_t kDraws = 100'000;  ///< for them, at most
 constexpr int kPosesACount = 40;         ///< searched with so many joints moved
 
 bool overlap(const Body& a, const Body& b, const Eigen::Isometry3d& b_in_a) {
@@ -194,6 +196,39 @@ void SelfCollisionStudy::open_grippers(const std::vector<SphereBody>& bodies) {
   }
 }
 
+/// Draws positions in which no solids overlap, until `free` and these are kFree. `compared`: by
+/// pair.
+void SelfCollisionStudy::draw_free(const std::vector<SphereBody>& bodies,
+                                   const std::vector<std::uint8_t>& compared, std::size_t free) {
+  std::vector<std::pair<std::size_t, const Pair*>> order;  // those that overlap most often first
+  for (std::size_t i = 0; i < pairs_.size(); ++i)
+    if (compared[i] != 0)
+      order.emplace_back(
+          std::count(pairs_[i].truth.begin(), pairs_[i].truth.end(), Pair::Truth::apart),
+          &pairs_[i]);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto& x, const auto& y) { return x.first < y.first; });
+  constexpr std::size_t kBlock = 500;
+  std::mt19937_64 random(2);
+  for (std::size_t draws = 0; draws < kDraws && free + free_.size() < kFree; draws += kBlock) {
+    std::vector<Positions> block;
+    std::vector<std::uint8_t> is_free(kBlock);
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      block.push_back(drawn(robot_, random));
+      for (const auto& [joint, position] : locked_) block.back()[joint] = position;
+    }
+    tbb::parallel_for(std::size_t{0}, kBlock, [&](std::size_t k) {
+      is_free[k] = std::none_of(order.begin(), order.end(), [&](const auto& one) {
+        const Pair& pair = *one.second;
+        const Eigen::Isometry3d b_in_a = pair.b_in_a(robot_, block[k]);
+        return overlap(bodies[pair.a], bodies[pair.b], b_in_a) && overlap_(pair.a, pair.b, b_in_a);
+      });
+    });
+    for (std::size_t k = 0; k < kBlock && free + free_.size() < kFree; ++k)
+      if (is_free[k] != 0) free_.push_back(std::move(block[k]));
+  }
+}
+
 bool SelfCollisionStudy::solids_overlap(Pair& pair, std::size_t sample,
                                         const Eigen::Isometry3d& b_in_a) const {
   Pair::Truth& truth = pair.truth[sample];
@@ -243,6 +278,10 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
   out.locked = locked_;
   out.pairs.resize(pairs_.size());
   std::vector<std::vector<FalseMeeting>> meetings(pairs_.size());
+  const auto opens = [&](const Pair& pair) {  // or closes: no concern of a planner
+    return std::all_of(pair.free.begin(), pair.free.end(),
+                       [&](std::size_t j) { return locked_.contains(j); });
+  };
   std::vector<std::uint8_t> deciding(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
     Pair& pair = pairs_[i];
@@ -254,16 +293,13 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
       return;
     }
     std::size_t solids = 0, spheres = 0;
-    const bool opens = std::all_of(pair.free.begin(), pair.free.end(), [&](std::size_t j) {
-      return locked_.contains(j);
-    });                                          // or closes: no concern of a planner
     told.tried = pair.free.empty() ? 1 : half_;  // one that cannot move is what it is
     for (std::size_t k = 0; k < told.tried; ++k) {
       bool by_spheres = false, by_solids = false;
       look(pair, k, by_spheres, by_solids);
       solids += by_solids ? 1 : 0;
       spheres += by_spheres ? 1 : 0;
-      if (by_spheres && !by_solids && !opens)
+      if (by_spheres && !by_solids && !opens(pair))
         meetings[i].push_back({pair.a, pair.b, k, pair.b_in_a(robot_, samples_[k])});
     }
     const bool always = solids == told.tried;
@@ -282,9 +318,23 @@ SelfCollision SelfCollisionStudy::of(std::span<const LinkSpheres> links, bool co
         std::atomic_ref(deciding[k]).store(1, std::memory_order_relaxed);
   });
   out.free = static_cast<std::size_t>(std::count(deciding.begin(), deciding.end(), 0));
+  std::vector<std::uint8_t> compared;
+  for (std::size_t i = 0; i < pairs_.size(); ++i)
+    compared.push_back(pairs_[i].given == nullptr && !pairs_[i].free.empty() &&
+                       out.pairs[i].ignored != "Always");
+  if (cover && free_.empty()) draw_free(bodies, compared, out.free);
+  out.free += free_.size();
+  tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
+    const Pair& pair = pairs_[i];
+    if (compared[i] == 0 || !out.pairs[i].ignored.empty() || opens(pair)) return;
+    for (std::size_t k = 0; k < free_.size(); ++k)
+      if (const Eigen::Isometry3d b_in_a = pair.b_in_a(robot_, free_[k]);
+          overlap(bodies[pair.a], bodies[pair.b], b_in_a))
+        meetings[i].push_back({pair.a, pair.b, samples_.size() + k, b_in_a});
+  });
   for (const auto& some : meetings)
     for (const FalseMeeting& one : some)
-      if (deciding[one.sample] == 0) out.meetings.push_back(one);
+      if (one.sample >= half_ || deciding[one.sample] == 0) out.meetings.push_back(one);
   choose_pose(bodies, cover, out);
   std::vector<std::uint8_t> calls(half_), truths(half_);
   tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {

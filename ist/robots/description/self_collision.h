@@ -107,6 +107,8 @@ class SelfCollisionStudy {
 
   void open_grippers(const std::vector<struct SphereBody>& bodies);
   void draw_samples(std::span<const LinkSpheres> links);
+  void draw_free(const std::vector<struct SphereBody>& bodies,
+                 const std::vector<std::uint8_t>& compared, std::size_t free);
   bool solids_overlap(Pair& pair, std::size_t sample, const Eigen::Isometry3d& b_in_a) const;
   bool holds(const Pair& pair, bool always, const Apart& apart, std::size_t& tried) const;
   void choose_pose(std::span<const struct SphereBody> bodies, bool cover, SelfCollision& out) const;
@@ -120,6 +122,7 @@ class SelfCollisionStudy {
   std::vector<std::pair<std::string, Positions>> notable_;  ///< poses to begin with, in order
   std::size_t half_ = 0;                                    ///< of samples_: those that decide
   std::vector<Positions> samples_;
+  std::vector<Positions> free_;  ///< drawn beside them, where no solids overlap
 };
 
 }  // namespace ist
