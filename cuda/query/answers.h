@@ -11,7 +11,8 @@
 #include "query/base/world_sums.h"
 #include "query/contact/contact_numbers.h"
 
-// Answers of a batch: a row has the members of its arrays (GpuPenetrations …) by the same names.
+// The answers of a batch. A row has the same members as the arrays that it goes to (GpuPenetrations
+// …).
 
 namespace ist::gpu {
 
@@ -25,7 +26,7 @@ struct PenetrationRow : WorldSums {
   bool touching = false;
 };
 
-/// What another answer becomes where solids touch.
+/// The members of an answer that differ where solids touch.
 struct ContactRow {
   double volume, volume_min, volume_max, contact_area;
   Vec3 centroid, contact_normal;
@@ -53,7 +54,7 @@ IST_HD inline void put(double* column, std::uint64_t i, const Vec3& x) {
   for (int k = 0; k < 3; ++k) column[3 * i + static_cast<std::uint64_t>(k)] = x[k];
 }
 
-/// Sets row i of the arrays that are wanted.
+/// Writes row i of those arrays that the caller wants.
 template <class Arrays, class Row>
 IST_HD void write_row(const Arrays& to, std::uint64_t i, const Row& row) {
   for_each_member(
@@ -63,7 +64,8 @@ IST_HD void write_row(const Arrays& to, std::uint64_t i, const Row& row) {
       to, row);
 }
 
-/// Nothing met: zero. Invalid: every number is NaN, as on the CPU (query/base/no_answer.h).
+/// Writes the answer of a pair without contact: zeros; or, if the status is an error, NaN
+/// everywhere, as on the CPU (query/base/no_answer.h).
 template <class Row>
 IST_HD Row no_row(QueryStatus status) {
   Row row = {};
@@ -91,7 +93,7 @@ IST_HD inline WorldSums world_sums(const PairPlace& place, const double (&t)[kTe
                        sum(kPi / 3, kMoment));
 }
 IST_HD inline WorldSums world_sums(const PairPlace& place, const LensTotals& totals) {
-  // Where nothing met there is nothing to turn.
+  // Without contact there is nothing to transform.
   return totals.spheres > 0 ? world_sums(place, totals.term) : WorldSums{};
 }
 

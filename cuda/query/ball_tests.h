@@ -9,41 +9,41 @@
 #include "cuda/query/part_sums.h"
 #include "cuda/query/seen_triangles.h"
 
-// Balls of leaf blocks tested against triangles, by one team. Those that no triangle meets are
-// inside or outside as a whole, and summed; the others are held, with what may meet them, for
-// DiscSums.
+// One team tests the balls of leaf blocks against triangles. A ball that no triangle intersects is
+// inside or outside as a whole and is summed here. Other balls are kept for DiscSums, with the
+// triangles that may intersect them.
 
 namespace ist::gpu {
 
-/// A leaf block that is tested. Each half of the team's items tests one; or both are the same, and
-/// the halves share its triangles.
+/// A leaf block under test. Each half of the team's items tests one block, or both halves test the
+/// same block and share its triangles.
 struct TestedBlock {
   std::uint32_t block;
-  std::uint32_t triangles;  ///< of those seen, a bit each
+  std::uint32_t triangles;  ///< a bit for each staged triangle
 };
 
 template <class Id>
 struct TestMemory {
   SeenTriangles seen;
-  Id id[kSeen];  ///< of what is seen
+  Id id[kSeen];  ///< of the staged triangles
   TestedBlock tested[2];
   std::uint8_t held_as[kItems];  ///< balls of the blocks that are tested; kNotHeld
   MetBalls<Id> met;
 };
 
-/// Source: what has the triangles.
-///   Id: what it calls one
-///   corners(id, c): of a triangle
-///   settles(x, r, part): whether a ball's part is told without triangles
-///   each_near(team, x, reach, visit): visit(there, id) by all lanes for all triangles near a ball
-///   inside(team, wanted, x): whether a lane's point is inside
+/// Source supplies the triangles:
+///   Id: the type of a triangle's name
+///   corners(id, c): the corners of a triangle
+///   settles(x, r, part): true if a ball's part follows without triangles
+///   each_near(team, x, reach, visit): all lanes call visit(there, id) for all triangles near a
+///   ball inside(team, wanted, x): true if a lane's point is inside
 ///
-/// Blocks are staged, tested, and what may meet is listed, a round at a time by a loop of the
-/// caller's, so that each step is in a kernel's code once:
+/// A loop of the caller stages and tests blocks and lists pairs, so that each step exists once in a
+/// kernel's code:
 ///
 ///   if (step()) continue;
-///   if (full()) …   // take what is met(), forget(false)
-///   else …          // stage() where there is room() for a first test, else take, forget(true)
+///   if (full()) …   // take met(), forget(false)
+///   else …          // stage() if has_space() for a first test, else take met(), forget(true)
 template <class Team, class Source>
 class BallTests {
  public:
@@ -55,25 +55,24 @@ class BallTests {
     for (std::uint32_t& met : met_) met = 0;
   }
 
-  /// Whether the first test of blocks finds room; if not, until forget(true).
-  IST_HD bool room() const { return held_ + kItems <= kHeldBalls && pairs_ <= kPairsAtFirst; }
+  /// True if the first test of further blocks fits. If not, call forget(true).
+  IST_HD bool has_space() const { return held_ + kItems <= kHeldBalls && pairs_ <= kPairsAtFirst; }
 
-  /// Whether what may meet no longer finds room, until forget().
-  IST_HD bool full() const { return lists_ && pairs_ + kItems > kPairRoom; }
+  /// True if the list of pairs may overflow in the next step. Then call forget().
+  IST_HD bool full() const { return lists_ && pairs_ + kItems > kPairCapacity; }
 
-  /// What is held and listed.
+  /// The kept balls and the listed pairs.
   IST_HD MetView<Id> met() const {
     return {m_.met.balls, m_.met.triangles, m_.met.of_ball, held_, pairs_};
   }
-  /// Makes room where that has been taken: for more of the same balls, or for others at the `end`
-  /// of a part.
+  /// Drops what the caller has taken: the pairs, and at the `end` of a part the balls too.
   IST_HD void forget(bool end) {
     pairs_ = 0;
     held_ = end ? 0 : held_;
   }
 
-  /// Readies the test of the balls of m_.tested, two blocks or one by both halves, against what is
-  /// seen: `first` and `last` of one that has triangles for more than one test.
+  /// Stages a test of the balls of m_.tested (two blocks, or one block by both halves) against the
+  /// staged triangles. `first` and `last` mark the tests of a block that has triangles for several.
   IST_HD void stage(bool two, bool first, bool last) {
     two_ = two;
     first_ = first;
@@ -81,7 +80,7 @@ class BallTests {
     tests_ = true;
   }
 
-  /// Goes on with what is staged; false where nothing is, or no room.
+  /// Continues with the staged test. False if there is none, or if the list is full.
   IST_HD bool step() {
     if (full() || (!lists_ && !tests_)) return false;
     if (lists_)
@@ -91,7 +90,7 @@ class BallTests {
     return true;
   }
 
-  /// What an item takes of triangles: all, or every other as the other half does the rest.
+  /// The triangles of an item: all, or every second one if the other half tests the rest.
   struct Share {
     bool shared, second;
     IST_HD Share(int item, bool shared)
@@ -103,7 +102,7 @@ class BallTests {
     }
   };
 
-  /// Which of the triangles that are seen may meet a ball.
+  /// The staged triangles that may intersect a ball, a bit each.
   IST_HD std::uint32_t meet(std::uint32_t triangles, const double (&x)[3], double r,
                             const Share& share) const {
     float end[3];
@@ -118,7 +117,6 @@ class BallTests {
   }
 
  private:
-  /// Tests what is staged.
   IST_HD void test() {
     tests_ = false;
     double x[kItemsALane][3], r[kItemsALane];
@@ -161,7 +159,7 @@ class BallTests {
     team_.sync();
   }
 
-  /// Lists a triangle a ball.
+  /// Lists one triangle for each ball.
   IST_HD void list() {
     bool more = false;
     for (int i = 0; i < kItemsALane; ++i) {
@@ -208,7 +206,7 @@ class BallTests {
   PartSums& sums_;
   int held_ = 0, pairs_ = 0;
   std::uint32_t met_[kItemsALane];  ///< triangles that meet an item's ball and wait to be listed
-  bool two_ = false, first_ = false, last_ = false;  ///< of what is tested
+  bool two_ = false, first_ = false, last_ = false;  ///< of the block under test
   bool tests_ = false, lists_ = false;               ///< something waits
 };
 

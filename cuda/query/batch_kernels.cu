@@ -40,13 +40,14 @@ __global__ void __launch_bounds__(32 * kDetailWarps) sum_detailed_pairs(const Ba
   });
 }
 
-/// Takes pairs of the list or, when there are none left, a task, for which it waits as long as
-/// pairs may leave some: where it is, and how many there are. By a warp's first lane.
+/// Takes pairs from the list or, once it is empty, a task; waits for one as long as pairs in
+/// progress may create tasks. Returns its position and the number taken. Called by a warp's first
+/// lane.
 __device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, std::uint32_t most,
                               bool& is_task, std::uint32_t& at) {
   BatchCounters& counters = *batch.counters;
   if (!is_task) {
-    // One at a time near the end, for all warps to stay busy.
+    // Near the end pairs are taken one at a time so that all warps stay busy.
     const std::uint32_t taken = atomic_load(&counters.taken);
     const bool near_end = taken >= listed || listed - taken <= most;
     const std::uint32_t count = near_end ? 1 : 1 + kPlacedAhead;
@@ -62,8 +63,8 @@ __device__ std::uint32_t take(const BatchArrays& batch, std::uint32_t listed, st
   }
 }
 
-/// Sums pairs, each warp taking the next when it is done with some, and then what pairs left. All
-/// in one loop: the code of a descent is there once and stays in the instruction cache.
+/// Sums pairs, and then the tasks that pairs have left, in one loop. So the code of the traversal
+/// exists once and stays in the instruction cache.
 __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchArrays batch) {
   __shared__ WorkMemory memories[kWarps];
   const WarpTeam team;
@@ -103,7 +104,7 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) sum_pairs(const BatchAr
     const bool hand_out = !memory.is_task && listed - memory.at <= most;
     if (team.lane() == 0) memory.hand_out = hand_out;
     do_work(team, batch, memory);
-    // Tasks that it left are counted by now.
+    // Its tasks are counted by now.
     if (team.lane() == 0 && hand_out) atomic_add(&batch.counters->handed_out, 1);
   }
 }
@@ -124,7 +125,8 @@ void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t str
         batch);
     check_launch("summing pairs of trees at several levels of detail");
   }
-  // Of few pairs no more warps than have work: who waits for tasks keeps others from the device.
+  // A small batch gets no more warps than can have work: warps that wait for tasks would block
+  // other kernels.
   const std::uint64_t wanted =
       (batch.pairs.count * (1 + std::uint64_t{kTasksOfPair}) + kWarps - 1) / kWarps;
   const auto most = static_cast<std::uint64_t>(grids.sum);

@@ -9,9 +9,9 @@
 #include "cuda/query/batch_arrays.h"
 #include "query/lod/coincidence.h"
 
-// A batch of pairs of trees, step by step: what a kernel's threads and warps do, and a test's
-// threads on the host. An answer depends on its pair and on how finely the batch is cut up
-// (BatchArrays::cut_for()) alone: neither on the others nor on who sums what.
+// The steps of a batch of pairs of trees, for the threads and warps of kernels and for tests on the
+// host. An answer depends on its pair and on how finely the batch is split (BatchArrays::cut_for())
+// alone, neither on other pairs nor on which team sums what.
 
 namespace ist::gpu {
 
@@ -22,7 +22,7 @@ IST_HD inline double scale_of(const GpuPlacedSolids& side, std::uint32_t i) {
   return side.scale != nullptr ? side.scale[i] : 1;
 }
 
-/// Copies what is plain words.
+/// Copies an object word by word.
 template <class Team, class T>
 IST_HD void copy_words(const Team& team, const T& from, T& to) {
   const auto* const source = reinterpret_cast<const std::uint32_t*>(&from);
@@ -31,7 +31,7 @@ IST_HD void copy_words(const Team& team, const T& from, T& to) {
     target[k] = source[k];
 }
 
-/// What a pair is of; `missing`: an index names no solid.
+/// The kinds of solids in a pair. `missing`: an index is out of range.
 enum class PairKind { missing, trees, tree_and_field, fields };
 
 IST_HD inline PairKind kind_of(const SolidPairs& batch, std::uint32_t i) {
@@ -48,7 +48,7 @@ IST_HD inline const SolidRef& solid_of(const SolidPairs& batch, const GpuPlacedS
   return batch.solids[side.solid[i]];
 }
 
-/// [u³] No overlap of pair i is larger.
+/// [u³] The smaller solid's volume, an upper bound of the overlap of pair i.
 IST_HD inline double smaller_volume(const SolidPairs& batch, std::uint32_t i) {
   const auto volume = [&](const GpuPlacedSolids& side) {
     const double scale = scale_of(side, i);
@@ -57,7 +57,7 @@ IST_HD inline double smaller_volume(const SolidPairs& batch, std::uint32_t i) {
   return std::fmin(volume(batch.pairs.a), volume(batch.pairs.b));
 }
 
-/// Places B of pair i as A sees it; false if it cannot be.
+/// Computes the pose of B in A's frame for pair i; false if a pose or scale is invalid.
 IST_HD inline bool place_pair(const SolidPairs& batch, const GpuPlacedSolids& a,
                               const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {
   return place.place<Quotients::by_reciprocal>(solid_of(batch, a, i).frame, pose_of(a, i),
@@ -68,7 +68,7 @@ IST_HD inline bool place_pair(const SolidPairs& batch, std::uint32_t i, PairPlac
   return place_pair(batch, batch.pairs.a, batch.pairs.b, i, place);
 }
 
-/// The same by the CPU's divisions, for the CPU's digits.
+/// The same with the CPU's divisions, so that the digits are those of the CPU.
 IST_HD_COLD bool place_exactly(const SolidPairs& batch, const GpuPlacedSolids& a,
                                const GpuPlacedSolids& b, std::uint32_t i, PairPlace& place) {
   return place.place(solid_of(batch, a, i).frame, pose_of(a, i), scale_of(a, i),
@@ -78,7 +78,7 @@ IST_HD inline bool place_exactly(const SolidPairs& batch, std::uint32_t i, PairP
   return place_exactly(batch, batch.pairs.a, batch.pairs.b, i, place);
 }
 
-/// Places pair i; why it is none of two trees if not ok.
+/// Places pair i of two trees. Any other kind of pair has a status that is not ok.
 IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, PairPlace& place) {
   const PairKind kind = kind_of(batch, i);
   if (kind == PairKind::tree_and_field || kind == PairKind::fields)
@@ -90,7 +90,8 @@ IST_HD inline QueryStatus place_trees(const SolidPairs& batch, std::uint32_t i, 
                                                                 : QueryStatus::invalid_input;
 }
 
-/// How many pairs of children of two roots meet, to rounding; no more than `most` are counted.
+/// The number of intersecting pairs of children of two roots, up to rounding. Counting stops at
+/// `most`.
 IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& b,
                                                const Similarity& map, std::uint32_t most) {
   const BallBlock& of_a = in_global_memory(a.blocks[a.top])[0];
@@ -110,7 +111,7 @@ IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& 
     const float r = of_b.r[j] * scale;
     for (std::uint32_t i = 0; i < kWidth; ++i) {
       const float dx = of_a.x[i] - x, dy = of_a.y[i] - y, dz = of_a.z[i] - z;
-      const float reach = (of_a.r[i] + r) * (1 + kRoom);
+      const float reach = (of_a.r[i] + r) * (1 + kTolerance);
       const bool meets =
           of_a.r[i] > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
       meet += meets ? 1 : 0;
@@ -119,7 +120,7 @@ IST_HD inline std::uint32_t children_that_meet(const TreeRef& a, const TreeRef& 
   return meet < most ? meet : most;
 }
 
-/// Square of the distance of B's finest root from A's, A's unit frame.
+/// The squared distance of the finest roots' centres, A's unit frame.
 IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const PairPlace& place) {
   const double centre[3] = {b.root[0], b.root[1], b.root[2]};
   double moved[3], d2 = 0;
@@ -128,8 +129,8 @@ IST_HD inline double root_distance2(const TreeRef& a, const TreeRef& b, const Pa
   return d2;
 }
 
-/// How large the sum of pair i's finest trees is, as children_that_meet() counts; 0: it is
-/// answered.
+/// The size of the sum of pair i's finest trees, as children_that_meet() counts. 0: pair i is
+/// answered already.
 IST_HD inline std::uint32_t sift_finest(const BatchArrays& batch, std::uint32_t i,
                                         const PairPlace& place) {
   const auto measure = static_cast<std::uint32_t>(batch.measure);
@@ -138,34 +139,34 @@ IST_HD inline std::uint32_t sift_finest(const BatchArrays& batch, std::uint32_t 
   const double reach = a.root[3] + b.root[3] * place.a_from_b.scale;
   if (root_distance2(a, b, place) < reach * reach) {
     const std::uint32_t meet =
-        children_that_meet(a, b, place.a_from_b, batch.size_room > 0 ? kWidth * kWidth : 1);
+        children_that_meet(a, b, place.a_from_b, batch.size_capacity > 0 ? kWidth * kWidth : 1);
     if (meet > 0) return meet;
   }
   write_nothing(batch.answers, i, QueryStatus::ok);
   return 0;
 }
 
-/// Lists pair i as the at-th, or among those of its size: sift_finest().
+/// Lists pair i at position `at`, or in the list of its size class (sift_finest()).
 IST_HD inline void list_pair(const BatchArrays& batch, std::uint32_t i, std::uint32_t meet,
                              std::uint32_t at) {
-  std::uint32_t size = batch.size_room > 0 ? kSizes - 1 : 0;
-  if (batch.size_room > 0) {
+  std::uint32_t size = batch.size_capacity > 0 ? kSizes - 1 : 0;
+  if (batch.size_capacity > 0) {
     for (; meet > 1; meet /= 2) --size;
     at = atomic_add(&batch.counters->of_size[size], 1);
   }
-  batch.list[std::uint64_t{size} * batch.size_room + at] = i;
+  batch.list[std::uint64_t{size} * batch.size_capacity + at] = i;
 }
 
-/// The k-th of the pairs that are listed.
+/// The k-th listed pair.
 IST_HD inline std::uint32_t listed_pair(const BatchArrays& batch, std::uint32_t k) {
-  if (batch.size_room == 0) return batch.list[k];
+  if (batch.size_capacity == 0) return batch.list[k];
   std::uint32_t size = 0;
   for (; k >= batch.counters->of_size[size]; ++size) k -= batch.counters->of_size[size];
-  return batch.list[std::uint64_t{size} * batch.size_room + k];
+  return batch.list[std::uint64_t{size} * batch.size_capacity + k];
 }
 
-/// Whether pair i may ask for other levels of detail than the finest: under a budget, as long as
-/// any levels may meet; without one, copies of an asset that all but coincide.
+/// True if pair i may need other levels of detail than the finest: under a budget, if any levels
+/// may intersect; without one, for copies of an asset that nearly coincide.
 IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
                                  const PairPlace& place) {
   if (batch.measure != Measure::matched) return false;
@@ -182,12 +183,12 @@ IST_HD inline bool needs_details(const BatchArrays& batch, std::uint32_t i,
 
 enum class PairUse { answered, summed, detailed };
 
-/// What is to be done of pair i, and how large what is summed is. One thread a pair.
+/// Decides what pair i needs, and the size of its sum. One thread per pair.
 IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i, std::uint32_t& meet) {
   PairPlace place;
   const QueryStatus status = place_trees(batch, i, place);
   if (status != QueryStatus::ok) {
-    // A tree and a field are field_steps.h's.
+    // field_steps.h handles a tree and a field.
     if (kind_of(batch, i) != PairKind::tree_and_field) write_nothing(batch.answers, i, status);
     return PairUse::answered;
   }
@@ -196,7 +197,7 @@ IST_HD inline PairUse sift_pair(const BatchArrays& batch, std::uint32_t i, std::
   return meet > 0 ? PairUse::summed : PairUse::answered;
 }
 
-/// Readies the memory for pair i, whose place is set or is there after the team's next sync.
+/// Loads pair i into memory. Its place is set, or will be after the team's next sync.
 template <class Team, class Memory>
 IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        Memory& memory) {
@@ -206,18 +207,18 @@ IST_HD void load_trees(const Team& team, const BatchArrays& batch, std::uint32_t
   team.sync();
 }
 
-/// What waits is worth about so many pairs of leaves.
+/// The approximate cost of a pending entry, in pairs of leaves.
 IST_HD inline std::uint32_t weight_of(const PairMemory& memory, int entry) {
   constexpr int kMostLeft = 8;  // for all entries' sum to be an int
   const int left = memory.steps.count - 1 - static_cast<int>(memory.stack_a[entry] >> kNodeBits);
   return 1u << 2 * (left < kMostLeft ? left : kMostLeft);
 }
 
-/// Tasks of a pair, about: no more than have warps of their own where pairs are few.
+/// The approximate number of tasks of a pair: no more than get their own warps in a small batch.
 constexpr std::uint32_t kTasksOfPair = 12;
 
-/// Decides how large the tasks are of what waits: no smaller than batch.task_weight, not too many.
-/// All of the team together.
+/// Chooses the size of the tasks for pending entries: at least batch.task_weight, and not too many.
+/// Called by the whole team.
 template <class Team>
 IST_HD void size_tasks(const Team& team, const BatchArrays& batch, PairMemory& memory,
                        int waiting) {
@@ -233,45 +234,46 @@ IST_HD void size_tasks(const Team& team, const BatchArrays& batch, PairMemory& m
 IST_HD inline int task_floor(const PairMemory& memory, int waiting) {
   const int top = waiting;
   std::uint32_t weight = 0;
-  while (waiting > 0 && weight < memory.task_weight && top - waiting < kTaskRoom)
+  while (waiting > 0 && weight < memory.task_weight && top - waiting < kTaskStack)
     weight += weight_of(memory, --waiting);
   return waiting;
 }
 
-/// Where a descent leaves what waits, if it fits.
-struct SplitRoom {
+/// The memory in which a traversal leaves its pending entries, if they fit.
+struct SplitSlots {
   bool fits;
   std::uint32_t split;
   std::uint32_t first_entry;
   std::uint32_t first_task, tasks;  ///< taken, whether it fits or not
 };
 
-/// Takes room for the `waiting` entries of pair i and lists their tasks. All of the team together.
+/// Reserves memory for the `waiting` entries of pair i and lists their tasks. Called by the whole
+/// team.
 ///
 /// `floor_of(top)`: the lowest entry of the task that begins below entry `top`.
 template <class Team, class FloorOf>
-IST_HD SplitRoom take_room(const Team& team, const BatchArrays& batch, BatchCounters& counters,
-                           std::uint32_t i, int waiting, const FloorOf& floor_of) {
+IST_HD SplitSlots reserve_split(const Team& team, const BatchArrays& batch, BatchCounters& counters,
+                                std::uint32_t i, int waiting, const FloorOf& floor_of) {
   std::uint32_t tasks = 0;
   for (int top = waiting; top > 0; ++tasks) top = floor_of(top);
   const auto entries = static_cast<std::uint32_t>(waiting);
   std::uint32_t split = 0, task = 0, entry = 0, fits = 0, taken = 0;
-  // Counters stop soon after the room ends, so that no batch is large enough to turn them over.
-  if (team.lane() == 0 && atomic_load(&counters.splits) < batch.split_room &&
-      atomic_load(&counters.tasks) < batch.task_room &&
-      atomic_load(&counters.entries) < batch.entry_room) {
+  // Counters stop growing soon after memory is full, so that no batch makes them overflow.
+  if (team.lane() == 0 && atomic_load(&counters.splits) < batch.split_capacity &&
+      atomic_load(&counters.tasks) < batch.task_capacity &&
+      atomic_load(&counters.entries) < batch.entry_capacity) {
     taken = tasks;
     split = atomic_add(&counters.splits, 1);
     task = atomic_add(&counters.tasks, tasks);
     entry = atomic_add(&counters.entries, entries);
-    const bool all = split < batch.split_room && task + tasks <= batch.task_room &&
-                     entry + entries <= batch.entry_room;
+    const bool all = split < batch.split_capacity && task + tasks <= batch.task_capacity &&
+                     entry + entries <= batch.entry_capacity;
     fits = all ? 1 : 0;
-    // Room that was taken and does not do stays unused: its tasks hold nothing.
+    // Memory that was reserved but does not suffice stays unused, and its tasks are empty.
     int top = waiting;
     for (std::uint32_t k = 0; k < tasks; ++k) {
       const int floor = floor_of(top);
-      if (task + k < batch.task_room)
+      if (task + k < batch.task_capacity)
         batch.tasks[task + k] = {split, entry + static_cast<std::uint32_t>(floor),
                                  all ? static_cast<std::uint32_t>(top - floor) : 0};
       top = floor;
@@ -282,69 +284,71 @@ IST_HD SplitRoom take_room(const Team& team, const BatchArrays& batch, BatchCoun
           team.broadcast(task, 0), team.broadcast(taken, 0)};
 }
 
-/// Leaves what waits to others; false if there is no room. All of the team together.
+/// Leaves the pending entries to other teams; false if there is no memory. Called by the whole
+/// team.
 template <class Team>
 IST_HD bool split_pair(const Team& team, const BatchArrays& batch, std::uint32_t i,
                        PairMemory& memory, int waiting) {
-  const SplitRoom room = take_room(team, batch, *batch.counters, i, waiting,
-                                   [&](int top) { return task_floor(memory, top); });
-  if (room.fits) {
-    if (team.lane() == 0) batch.totals[room.split] = memory.sum;
-    copy_words(team, memory.place, batch.places[room.split]);
+  const SplitSlots work = reserve_split(team, batch, *batch.counters, i, waiting,
+                                        [&](int top) { return task_floor(memory, top); });
+  if (work.fits) {
+    if (team.lane() == 0) batch.totals[work.split] = memory.sum;
+    copy_words(team, memory.place, batch.places[work.split]);
     for (int k = team.lane(); k < waiting; k += Team::kWidth) {
-      batch.entries_a[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
-      batch.entries_b[room.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
+      batch.entries_a[work.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_a[k];
+      batch.entries_b[work.first_entry + static_cast<std::uint32_t>(k)] = memory.stack_b[k];
     }
   }
   team.sync();
   publish();
-  for (std::uint32_t k = room.first_task + static_cast<std::uint32_t>(team.lane());
-       k < room.first_task + room.tasks; k += static_cast<std::uint32_t>(Team::kWidth))
-    if (k < batch.task_room) atomic_exchange(&batch.posted[k], 1);
-  return room.fits;
+  for (std::uint32_t k = work.first_task + static_cast<std::uint32_t>(team.lane());
+       k < work.first_task + work.tasks; k += static_cast<std::uint32_t>(Team::kWidth))
+    if (k < batch.task_capacity) atomic_exchange(&batch.posted[k], 1);
+  return work.fits;
 }
 
-/// Pairs at the end of a list that may leave tasks: before those nobody has time for them.
+/// The pairs at the end of a list that may leave tasks. Earlier, no team is idle.
 IST_HD inline std::uint32_t pairs_handed_out(std::uint32_t listed, std::uint32_t last) {
   return listed < last ? listed : last;
 }
 
-/// Whether task k can be taken; −1: not yet, 0: there is none. `most`: pairs that may leave tasks.
+/// 1 if task k can be taken, −1 if not yet, 0 if there is none. `most`: the number of pairs that
+/// may leave tasks.
 IST_HD inline int look_for_task(const BatchArrays& batch, std::uint32_t k, std::uint32_t most) {
-  if (k < batch.task_room && atomic_load(&batch.posted[k]) != 0) {
+  if (k < batch.task_capacity && atomic_load(&batch.posted[k]) != 0) {
     publish();
     return 1;
   }
-  if (k < batch.task_room && atomic_load(&batch.counters->handed_out) < most) return -1;
+  if (k < batch.task_capacity && atomic_load(&batch.counters->handed_out) < most) return -1;
   publish();
   const std::uint32_t tasks = atomic_load(&batch.counters->tasks);
-  return k < tasks && k < batch.task_room ? -1 : 0;
+  return k < tasks && k < batch.task_capacity ? -1 : 0;
 }
 
-/// A pair of the list as a team finds it.
+/// A pair of the list and its place.
 struct PlacedPair {
   PairPlace place;
-  std::uint32_t pair;  ///< of the batch
+  std::uint32_t pair;  ///< in the batch
   std::uint32_t at;    ///< in the list
 };
 
-/// Pairs that a team takes beside the one it begins with: placing one or a few, a lane each, takes
-/// as long.
+/// The number of pairs that a team places ahead. Each lane places one, so a few take as long as
+/// one.
 constexpr int kPlacedAhead = 2;
 
-/// What a team needs to sum pairs of the list and tasks. Not in its registers, of which a descent
-/// has none to spare.
+/// The state of a team that sums pairs and tasks. It is not in registers, since the traversal needs
+/// them all.
 struct WorkMemory : PairMemory {
   bool is_task;
-  bool hand_out;       ///< of a pair: what one team is not to do alone goes to others
-  std::uint32_t pair;  ///< of the batch
-  std::uint32_t at;    ///< of a pair in the list, of a task among the tasks
+  bool hand_out;       ///< of a pair: if large, it may leave tasks to other teams
+  std::uint32_t pair;  ///< in the batch
+  std::uint32_t at;    ///< the position of a pair in the list, of a task among tasks
   PairTask task;
   int waiting;  ///< pairs that are placed ahead
   PlacedPair ahead[kPlacedAhead];
 };
 
-/// Places pairs `first` … of the list: the first is in work, the others wait.
+/// Places pairs `first` … of the list: the first becomes current, the others are kept ahead.
 template <class Team>
 IST_HD void place_pairs(const Team& team, const BatchArrays& batch, std::uint32_t first,
                         std::uint32_t count, WorkMemory& memory) {
@@ -360,7 +364,7 @@ IST_HD void place_pairs(const Team& team, const BatchArrays& batch, std::uint32_
   team.sync();
 }
 
-/// Takes a pair that was placed ahead into work.
+/// Makes a pair that was placed ahead the current one.
 template <class Team>
 IST_HD void take_placed(const Team& team, WorkMemory& memory) {
   const int k = memory.waiting - 1;
@@ -375,7 +379,7 @@ IST_HD void take_placed(const Team& team, WorkMemory& memory) {
   team.sync();
 }
 
-/// Takes a task into work; false if it is of a pair that found no room for all of its tasks.
+/// Makes a task the current one; false if its pair found no memory for all of its tasks.
 template <class Team>
 IST_HD bool take_task(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
   const std::uint32_t at = memory.at;
@@ -393,21 +397,21 @@ IST_HD bool take_task(const Team& team, const BatchArrays& batch, WorkMemory& me
   return true;
 }
 
-/// Adds up what a pair's tasks have come to, if this was the last; by a team's first lane.
+/// Adds up the sums of a pair's tasks if this was the last one. Called by a team's first lane.
 IST_HD inline bool end_task(const BatchArrays& batch, WorkMemory& memory) {
   SplitPair& split = batch.splits[memory.task.split];
-  batch.totals[batch.split_room + memory.at] = memory.totals;
+  batch.totals[batch.split_capacity + memory.at] = memory.totals;
   publish();
   if (atomic_add(&split.left, ~0u) != 1) return false;
   publish();
   memory.sum = batch.totals[memory.task.split];
   for (std::uint32_t k = 0; k < split.tasks; ++k)
-    memory.sum.add(batch.totals[batch.split_room + split.first_task + k]);
+    memory.sum.add(batch.totals[batch.split_capacity + split.first_task + k]);
   return true;
 }
 
-/// Sums what is in work: a pair, or as much of it as is not handed out, or a task; who does a
-/// pair's last writes the answer.
+/// Sums the current task, or the current pair except what it leaves to tasks. The team that
+/// finishes a pair's last part writes the answer.
 template <class Team>
 IST_HD void do_work(const Team& team, const BatchArrays& batch, WorkMemory& memory) {
   load_trees(team, batch, memory.pair, memory);
@@ -418,7 +422,8 @@ IST_HD void do_work(const Team& team, const BatchArrays& batch, WorkMemory& memo
   else
     descent.start();
   if (team.lane() == 0) memory.sum.clear();
-  // Tasks that nobody takes are done one by one, their sums added up as if others had done them.
+  // Tasks that are not handed out are done one by one. Their sums are added as if other teams had
+  // done them.
   int floor = 0;
   bool whole = memory.is_task;  // no task is cut again
   for (;;) {

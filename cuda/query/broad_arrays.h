@@ -11,7 +11,7 @@
 
 namespace ist::gpu {
 
-/// What of a body does not change.
+/// The constant part of a body.
 struct BroadBody {
   SolidBox box;  ///< scaled
   double wider;  ///< [u] on each side
@@ -20,7 +20,7 @@ struct BroadBody {
   bool moves;
 };
 
-/// A box of bodies, and the worlds that they are of; of none nothing meets it.
+/// The box of some bodies and the range of their worlds. The box of no bodies intersects nothing.
 struct alignas(16) BroadBox {
   float low[3];
   std::uint32_t first_world;
@@ -37,7 +37,7 @@ struct alignas(16) BroadBox {
   }
 };
 
-/// Children of a node, and bodies of the lowest nodes.
+/// The number of children of a node, and of bodies in a lowest node.
 constexpr std::uint32_t kFan = 32;
 constexpr int kMostLevels = 7;  ///< 32⁷ > 2³¹
 
@@ -50,14 +50,14 @@ struct BroadArrays {
   const std::uint64_t* excluded;  ///< keys of pairs, ascending
   std::uint32_t excluded_count;
   double cells;    ///< [1/u] of the curve
-  int axis_bits;   ///< of a cell's place along an axis
-  int key_bits;    ///< of a place on the curve: the world first
+  int axis_bits;   ///< of a cell's coordinate
+  int key_bits;    ///< of a position on the curve, the world in the highest bits
   int index_bits;  ///< of a body's index
 
   std::uint64_t *keys, *sorted_keys;      ///< [count]
   std::uint32_t *indices, *order;         ///< [count] 0, 1, …; sorted by keys
   BroadBox* placed;                       ///< [count] by index
-  BroadBox* boxes[kMostLevels + 1];       ///< by level, whole nodes' worth
+  BroadBox* boxes[kMostLevels + 1];       ///< by level, padded to whole nodes
   std::uint32_t* still[kMostLevels + 1];  ///< by node: bit k: child k has bodies that do not move
   std::uint32_t nodes[kMostLevels + 1];   ///< by level; of level 0: bodies
   int top;                                ///< the level of one node
@@ -69,7 +69,7 @@ struct BroadArrays {
   Pose *pose_a, *pose_b;
   double *scale_a, *scale_b;
   QueryStatus* status;  ///< [count]
-  std::byte* scratch;   ///< of sorts
+  std::byte* scratch;   ///< for sorting
   std::size_t scratch_bytes;
 
   IST_HD std::uint64_t key(std::uint32_t i, std::uint32_t j) const {

@@ -8,11 +8,11 @@
 
 namespace ist::gpu {
 
-/// [bytes] that sorting takes.
+/// The memory that sorting takes [bytes].
 std::size_t broad_scratch_bytes(const BroadArrays& scene);
-/// Sets what does not change: indices.
+/// Sets the constant indices.
 void ready_broad(const BroadArrays& scene, cudaStream_t stream);
-/// One step.
+/// Launches one step.
 void launch_broad(const BroadArrays& scene, cudaStream_t stream);
 
 }  // namespace ist::gpu

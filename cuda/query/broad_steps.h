@@ -6,12 +6,12 @@
 #include "cuda/base/atomics.h"
 #include "cuda/query/broad_arrays.h"
 
-// The steps of a scene's broad phase, for warps and for teams of 32 on the host: bodies are placed,
-// sorted along a curve, nodes fitted around them from the lowest up, pairs found, sorted, written.
+// The steps of a scene's broad phase, for warps and for teams of 32 on the host: place bodies, sort
+// them along a curve, fit nodes around them from the lowest up, find pairs, sort and write them.
 
 namespace ist::gpu {
 
-/// Bit k of x at bit 3 k; of 21 bits.
+/// Moves bit k of x to bit 3 k, for 21 bits.
 IST_HD inline std::uint64_t spread_by_three(std::uint64_t x) {
   x = (x | x << 32) & 0x001F00000000FFFFull;
   x = (x | x << 16) & 0x001F0000FF0000FFull;
@@ -20,7 +20,7 @@ IST_HD inline std::uint64_t spread_by_three(std::uint64_t x) {
   return (x | x << 2) & 0x1249249249249249ull;
 }
 
-/// The box of body i, and its place on the curve.
+/// Computes the box of body i and its position on the curve.
 IST_HD inline void place_body(const BroadArrays& scene, std::uint32_t i) {
   const BroadBody& body = scene.bodies[i];
   const Pose& pose = scene.poses[i];
@@ -85,7 +85,7 @@ IST_HD void fit_node(const Team& team, const BroadArrays& scene, int level, std:
   if (level < scene.top) scene.boxes[level][j] = box;
 }
 
-/// Whether a pair of bodies whose boxes meet is one.
+/// True if two bodies whose boxes intersect form a pair.
 IST_HD inline bool may_meet(const BroadArrays& scene, std::uint32_t i, std::uint32_t j) {
   const BroadBody &a = scene.bodies[i], &b = scene.bodies[j];
   if ((a.layers & b.meets) == 0 || (b.layers & a.meets) == 0 || (a.box.is_shape && b.box.is_shape))
@@ -102,7 +102,7 @@ IST_HD inline bool may_meet(const BroadArrays& scene, std::uint32_t i, std::uint
   return low == scene.excluded_count || scene.excluded[low] != key;
 }
 
-/// Nodes that wait: all children of one a level.
+/// The pending nodes: for each level all children of one node.
 struct BroadMemory {
   struct Node {
     int level;
@@ -122,8 +122,8 @@ IST_HD BroadBox broadcast(const Team& team, const BroadBox& box, int from) {
   return out;
 }
 
-/// Finds the pairs of the bodies that move of node g of level 1: with all that do not move, and
-/// with those that stand after them on the curve.
+/// Finds the pairs of the moving bodies of node g of level 1: with all bodies that do not move, and
+/// with moving ones that follow on the curve.
 template <class Team>
 IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint32_t g,
                           BroadMemory& memory) {
@@ -151,7 +151,7 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
     const std::uint32_t stills = scene.still[level][j];
     const BroadBox box =
         child < scene.nodes[level - 1] ? scene.boxes[level - 1][child] : BroadBox::none();
-    // Of what stands before these bodies on the curve only what does not move.
+    // Of the bodies before these on the curve only those that do not move count.
     const bool is_still = (stills >> team.lane() & 1) != 0;
     const bool behind = (std::uint64_t{child} + 1) << 5 * (level - 1) > first;
     for (std::uint32_t left = team.ballot((is_still || behind) && all.meets(box)); left != 0;
@@ -160,7 +160,7 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
       const std::uint32_t other = kFan * j + static_cast<std::uint32_t>(lane);
       bool meets = mine.meets(broadcast(team, box, lane));
       if (level > 1) {
-        // (all these bodies together may lie far apart)
+        // (these bodies may be far apart)
         if (!team.any(meets)) continue;
         if (team.lane() == 0) memory.waiting[waiting] = {level - 1, other};
         ++waiting;
@@ -176,7 +176,7 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
   }
 }
 
-/// Writes pair k, or that there is none.
+/// Writes pair k, or marks it as empty.
 IST_HD inline void write_pair(const BroadArrays& scene, std::uint32_t k) {
   const std::uint32_t met = scene.met[0];
   const std::uint32_t count = met <= scene.max_pairs ? met : 0;

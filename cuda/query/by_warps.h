@@ -11,15 +11,15 @@
 
 namespace ist::gpu {
 
-/// Shared memory runs no constructors.
+/// Storage for objects in shared memory, which runs no constructors.
 template <class T, unsigned kCount>
 struct Raw {
   alignas(alignof(T) > 16 ? alignof(T) : 16) std::byte bytes[kCount][sizeof(T)];
   __device__ T& operator[](unsigned warp) { return *reinterpret_cast<T*>(bytes[warp]); }
 };
 
-/// Calls work(team, k) for k < count, each warp taking the next when it is done with one, as long
-/// as goes_on().
+/// Calls work(team, k) for k < count while goes_on(). Each warp takes the next k when it is done
+/// with one.
 template <class Work, class GoesOn>
 __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& work,
                          const GoesOn& goes_on) {
@@ -38,7 +38,7 @@ __device__ void by_warps(std::uint32_t count, std::uint32_t* taken, const Work& 
   by_warps(count, taken, work, [] { return true; });
 }
 
-/// Blocks of a kernel that the current device runs at a time.
+/// The number of blocks of a kernel that the current device runs at a time.
 template <class Kernel>
 int blocks_at_a_time(const Kernel& kernel, unsigned threads) {
   int device = 0, multiprocessors = 0, each = 0;

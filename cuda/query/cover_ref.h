@@ -10,7 +10,7 @@
 
 namespace ist::gpu {
 
-/// The cover radii of an inner tree, where its bytes lie (as TreeRef).
+/// The cover radii of an inner tree, in place like TreeRef.
 struct CoverRef {
   const NodeBlock* nodes[kMaxLevels];  ///< from level 1 on
   const float* spheres;
@@ -26,12 +26,12 @@ struct CoverRef {
     return ref;
   }
 
-  /// Of the children of a node; unit frame.
+  /// The cover radii of a node's children, unit frame.
   IST_HD const float* below(int level, std::uint32_t node) const {
     return level == 0 ? spheres + std::size_t{kWidth} * node : nodes[level][node].cover;
   }
 
-  /// Of a node; `top`: the tree's.
+  /// The cover radius of a node. `top`: the level of the tree's root.
   IST_HD double of_node(int level, std::uint32_t node, int top) const {
     return level == top ? root
                         : static_cast<double>(below(level + 1, node / kWidth)[node % kWidth]);

@@ -4,10 +4,10 @@
 
 namespace ist::gpu {
 
-/// A region of a tree as TreeCuts (query/contact/tree_cuts.h) divides it: into the node that comes
-/// next and the rest.
+/// A region of a tree, which TreeCuts (query/contact/tree_cuts.h) divides into the next node and
+/// the rest.
 struct CutNode {
-  std::uint64_t id;          ///< of a patch of it
+  std::uint64_t id;          ///< of its patch
   std::uint32_t begin, end;  ///< bins, by rank
   std::uint32_t rest;        ///< node of the other side; 0: one bin, which is not divided
 };
@@ -15,7 +15,7 @@ struct CutNode {
 /// All regions of a tree, the root first.
 struct CutsRef {
   const CutNode* node;
-  const std::uint16_t* rank;  ///< of a bin, so that every region's are consecutive
+  const std::uint16_t* rank;  ///< of a bin; those of a region are consecutive
   std::uint32_t bins;
   int shift;  ///< a sphere's number >> shift is its bin
 };

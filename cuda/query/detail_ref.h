@@ -23,14 +23,14 @@ struct FilledBall {
 
 constexpr int kMostFilled = 64;
 
-/// What a batch knows of an asset's levels of detail; lengths in its unit frame.
+/// An asset's levels of detail. Lengths are in its unit frame.
 struct AssetDetails {
   const DetailRef* level;    ///< [coarser + 1], the finest first
-  const FilledBall* filled;  ///< of the coarsest
+  const FilledBall* filled;  ///< of the coarsest level
   std::uint32_t filled_count;
   std::uint32_t coarser;
   std::uint32_t first_alike;  ///< the first asset of the batch that has the same bytes
-  double mean_radius;         ///< of the finest
+  double mean_radius;         ///< of the finest level
   double reach;               ///< about the finest root's centre: all levels' spheres lie within
   double filled_reach;        ///< about the coarsest root's centre
 };

@@ -10,9 +10,9 @@
 #include "query/lod/coincidence.h"
 #include "query/lod/level_chain.h"
 
-// Pairs of trees that are asked at several levels of detail: under a pair budget, and copies of one
-// asset that all but coincide. blend_levels() (query/lod/level_blend.h) by one team, in
-// double, of sums in A's unit frame.
+// Pairs of trees that need several levels of detail: under a pair budget, and copies of one asset
+// that nearly coincide. This is blend_levels() (query/lod/level_blend.h) by one team, in double,
+// with sums in A's unit frame.
 
 namespace ist::gpu {
 
@@ -20,7 +20,7 @@ struct FilledMemory {
   FilledBall ball[2][kMostFilled];
 };
 
-/// What two assets overlap by as a quick look at their coarsest levels sees them, A's unit frame.
+/// The overlap of two assets as estimated by a quick look at their coarsest levels, A's unit frame.
 struct QuickLook {
   double volume;
   PoseSlope slope;
@@ -52,7 +52,7 @@ class QuickLooker {
       const double d[3] = {b.x[0] - a.x[0], b.x[1] - a.x[1], b.x[2] - a.x[2]};
       const double reach = a.r + b.r, step = a.r > b.r ? a.r - b.r : b.r - a.r;
       double distance = sqrt((d[0] * d[0] + d[1] * d[1]) + d[2] * d[2]);
-      // A ball that the other holds overlaps as one that touches it from inside.
+      // A ball inside the other counts as one that touches it from inside.
       distance = distance > step ? distance : step;
       if (!(distance < reach)) continue;
       distance = distance > kLeastDistance ? distance : kLeastDistance;
@@ -80,7 +80,7 @@ class QuickLooker {
   }
 
  private:
-  /// Lists the balls of a side that come within a reach of a point; returns how many.
+  /// Lists the balls of a side that come within a reach of a point, and returns their number.
   IST_HD int place(int side, const double (&middle)[3], double reach) {
     const AssetDetails& asset = side == 0 ? a_ : b_;
     int count = 0;
@@ -117,10 +117,10 @@ class QuickLooker {
 struct DetailMemory {
   PairMemory pair;
   LevelChain chain;
-  LevelWeight share[LevelChain::kMost];  ///< of the pairs of levels, by the coarse sum
+  LevelWeight share[LevelChain::kMost];  ///< of the pairs of levels, from the coarse sum
   FilledMemory filled;
   LensTotals coarse, part, result;
-  std::uint32_t spheres, visits;  ///< of all that was asked
+  std::uint32_t spheres, visits;  ///< of all sums together
 };
 
 template <class Team>
@@ -135,7 +135,7 @@ class DetailSums {
         a_(solid_of(batch, batch.pairs.a, pair).details),
         b_(solid_of(batch, batch.pairs.b, pair).details) {}
 
-  /// False if the pair is one for the finest levels' lenses alone.
+  /// False if the finest levels alone answer the pair.
   IST_HD bool run() {
     const double budget = batch_.pair_budget;
     if (team_.lane() == 0) {
@@ -156,9 +156,10 @@ class DetailSums {
       m_.coarse.clear();
       m_.result.clear();
     }
-    double slope = 0, sure_slope = 0;  // of the blend by the coarse sum, and by the quick look
-    // The coarse sum, then the order of the CPU's additions: one call of ask() for all of them, or
-    // its code is too long for the instruction cache.
+    double slope = 0,
+           sure_slope = 0;  // derivatives of the blend by the coarse sum and by the quick look
+    // The coarse sum comes first, then the CPU's order of additions. A single call of ask() serves
+    // all of them, since several would not fit the instruction cache.
     IST_ROLLED
     for (std::size_t i = blends ? size + 1 : 1; i-- > 0;) {
       const bool estimates = i == size;
@@ -205,7 +206,7 @@ class DetailSums {
     for (int k = 0; k < kTerms; ++k) sum.term[k] += weight * part.term[k];
   }
 
-  /// `step`: what the sum grows by as what has the slope goes from 0 to 1.
+  /// `step`: the change of the sum as the weight with this slope goes from 0 to 1.
   IST_HD static void add_slope(const PoseSlope& slope, double step, LensTotals& sum) {
     for (int k = 0; k < 3; ++k) {
       sum.term[kForce + k] += -1 / (2 * kPi) * step * slope.by_translation[k];
@@ -220,8 +221,8 @@ class DetailSums {
                               m_.pair.place.a_from_b);
   }
 
-  /// The sum of two levels, or of unlike ones where copies all but coincide and it is no estimate:
-  /// to m_.part.
+  /// Writes the sum of two levels to m_.part. If copies nearly coincide and this is no estimate,
+  /// unlike levels are summed.
   IST_HD void ask(const LevelPair& levels, bool estimates) {
     const CoincidenceWeight same = estimates ? CoincidenceWeight() : coincidence(levels);
     const std::uint32_t a = levels.a, b = levels.b, other = a < a_.coarser ? a + 1 : a - 1;
@@ -244,7 +245,7 @@ class DetailSums {
     team_.sync();
   }
 
-  /// The whole sum of two levels: to m_.pair.totals.
+  /// Writes the complete sum of two levels to m_.pair.totals.
   IST_HD void descend(std::uint32_t a, std::uint32_t b) {
     team_.sync();
     copy_words(team_, a_.level[a].tree, m_.pair.tree[0]);
@@ -277,7 +278,7 @@ class DetailSums {
   const AssetDetails& b_;
 };
 
-/// Sums pair i at the levels that it needs, or lists it with the others.
+/// Sums pair i at the levels that it needs, or lists it among those of the finest levels.
 template <class Team>
 IST_HD void sum_details(const Team& team, const BatchArrays& batch, std::uint32_t i,
                         DetailMemory& memory) {

@@ -10,15 +10,15 @@
 #include "query/asset/shared_constants.h"
 #include "query/ball_triangle/disc.h"
 
-// Balls met by triangles, by one team: their parts inside the closed surface, exactly, as
-// add_patch() and total_of() (query/ball_triangle/patch_sums.h, query/shape/probe_sum.h) have them.
-// What edges cut goes to a list, so that the lanes of a warp are full where the work is.
+// One team computes, for balls that triangles intersect, the exact part inside the closed surface,
+// as add_patch() and total_of() do (query/ball_triangle/patch_sums.h, query/shape/probe_sum.h).
+// Discs that edges cut go to a list, so that all lanes of a warp work on the expensive case.
 
 namespace ist::gpu {
 
 constexpr std::uint32_t kNoBall = ~0u;
-constexpr int kCutRoom = 64;  ///< what is left after a round of a warp, and what a round may add
-static_assert(kCutRoom >= 2 * 32 - 1);
+constexpr int kCutCapacity = 64;  ///< the rest of a round of a warp, and what a round may add
+static_assert(kCutCapacity >= 2 * 32 - 1);
 template <class Id>
 struct BallTriangle {
   std::uint32_t ball;
@@ -29,9 +29,9 @@ template <class Id>
 struct DiscMemory {
   double x[3][kHeldBalls], r[kHeldBalls];
   double cones[kHeldBalls], angle[kHeldBalls];
-  std::uint32_t inside[kHeldBalls];  ///< whether its centre is
+  std::uint32_t inside[kHeldBalls];  ///< true if the centre is inside
   std::uint32_t on_edge[kHeldBalls];
-  BallTriangle<Id> cut[kCutRoom];
+  BallTriangle<Id> cut[kCutCapacity];
 };
 
 /// Source: as BallTests has it.
@@ -44,8 +44,8 @@ class DiscSums {
                   const Source& source, PartSums& sums)
       : team_(team), probe_(probe), m_(memory), source_(source), sums_(sums) {}
 
-  /// Sums what is listed; at the `end` of a part what is held, for which the source's room is to be
-  /// free. More of the same part may follow before.
+  /// Sums the listed pairs and, at the `end` of a part, the kept balls; then the source's memory
+  /// must be free. Several calls may belong to one part.
   IST_HD void add(const MetView<Id>& met, bool end) {
     load(met);
     int next = 0;
@@ -58,7 +58,7 @@ class DiscSums {
   }
 
  private:
-  /// Places balls that are held since the last time.
+  /// Places the balls that were added since the last call.
   IST_HD void load(const MetView<Id>& met) {
     IST_ROLLED
     for (int ball = held_ + team_.lane(); ball < met.ball_count; ball += Team::kWidth) {
@@ -73,8 +73,8 @@ class DiscSums {
     team_.sync();
   }
 
-  /// Takes as much of what is listed as the team is wide, or whatever is left. What comes near is
-  /// sorted: it misses, is summed, or waits among what edges cut.
+  /// Takes a team's width of listed pairs, or the rest. A pair is discarded, summed, or listed
+  /// again if edges cut its disc.
   IST_HD void drain(const MetView<Id>& met, bool of_cut, int& next) {
     const int listed = of_cut ? cut_ : met.pair_count - next;
     const int take = listed < Team::kWidth ? listed : Team::kWidth;
@@ -110,7 +110,7 @@ class DiscSums {
     share_out(of_cut || kind == DiscKind::whole ? pair.ball : kNoBall, part);
   }
 
-  /// Sums what is held: nothing is listed any more.
+  /// Sums the kept balls, once no pair is listed.
   IST_HD void finish(const MetView<Id>& met) {
     for (int ball = team_.lane(); ball < held_; ball += Team::kWidth)
       m_.inside[ball] = met.balls[ball] >= kCentreInside ? 1 : 0;
@@ -135,7 +135,7 @@ class DiscSums {
     team_.sync();
   }
 
-  /// What is linear in the surface: the lane's own sums.
+  /// Adds the terms that are linear in the surface to the lane's own sums.
   IST_HD void add_pull(const TrianglePlane& t, const double (&x)[3], const DiscPart& part) {
     double at[3], push[3], shift[3];
     for (int k = 0; k < 3; ++k) {
@@ -146,7 +146,7 @@ class DiscSums {
     sums_.add(at, 0, push, shift);
   }
 
-  /// Adds the lanes' cones and angles to their balls', in the order of the lanes.
+  /// Adds the lanes' cones and angles to those of their balls, in the order of the lanes.
   IST_HD void share_out(std::uint32_t of_ball, const DiscPart& part) {
     const bool shares = of_ball != kNoBall;
     std::uint32_t alike = team_.alike(of_ball);
@@ -168,8 +168,8 @@ class DiscSums {
     team_.sync();
   }
 
-  /// Cones, angle and side of a ball whose centre lies on an edge, from beside it: put_right()
-  /// (query/ball_triangle/patch_sums.h).
+  /// Computes the cones, angle and side of a ball whose centre lies on an edge from a point beside
+  /// it: put_right() (query/ball_triangle/patch_sums.h).
   IST_HD_COLD static void put_right(const Team team, DiscMemory<Id>& m, const Source source,
                                     int ball) {
     const double r = m.r[ball];

@@ -6,19 +6,19 @@
 
 #include "cuda/query/exact_memory.h"
 
-// How boxes, slabs and triangles of two meshes are placed and met, in floats.
+// Boxes, slabs and triangles of two meshes, placed in one frame and tested in float.
 
 namespace ist::gpu {
 
-/// How far B may move while what a search has found still holds all that it would find. A's unit
-/// frame, with what floats round.
+/// How far B may move before a search could find candidates that the list of a former one lacks.
+/// A's unit frame; rounding of floats is included.
 struct ExactAhead {
   float centre[3];  ///< of B's box
-  float shift;      ///< the centre moves by no more
-  float turn;       ///< nor does what is turned about it, by its distance
-  float of_b;       ///< nor does a point of B
+  float shift;      ///< bound of the centre's motion
+  float turn;       ///< bound of the rotation's motion per distance from the centre
+  float of_b;       ///< bound of the motion of any point of B
 
-  /// Nor does, as B sees it, a point of a box of A.
+  /// A bound of the motion of points of a box of A as seen from B.
   IST_HD float of_a(const float (&low)[3], const float (&high)[3]) const {
     float square = 0;
     for (int k = 0; k < 3; ++k) {
@@ -29,12 +29,12 @@ struct ExactAhead {
   }
 };
 
-/// A pair, and how far a search is to look ahead.
+/// A pair, and how far its search looks ahead.
 struct ExactAheadPair : ExactPair {
   ExactAhead ahead;
 };
 
-/// `Pair`: ExactAheadPair where a search looks ahead; else ExactPair.
+/// `Pair`: ExactAheadPair if the search looks ahead, else ExactPair.
 template <class Pair>
 class ExactBoxes {
  public:
@@ -42,8 +42,8 @@ class ExactBoxes {
 
   IST_HD explicit ExactBoxes(const Pair& pair) : pair_(pair) {}
 
-  /// Which of two nodes are opened. Nodes tile a surface: squares of their sizes, times both
-  /// counts.
+  /// Decides which of two nodes are opened. Nodes tile a surface, so the comparison is of squared
+  /// sizes times both counts.
   IST_HD void open(const MeshNode (&node)[2], bool (&opens)[2]) const {
     const int level[2] = {node[0].level(), node[1].level()};
     const auto scale = static_cast<float>(pair_.place.a_from_b.scale);
@@ -54,12 +54,12 @@ class ExactBoxes {
     opens[1] = level[1] > 0 && (level[0] == 0 || size[0] <= kAlone * size[1]);
   }
 
-  /// A node's box in its own frame and, with what rounding does, in the other's.
+  /// A node's box in its own frame and, widened by rounding, in the other's.
   struct Box {
     float low[3], high[3], other_low[3], other_high[3];
   };
 
-  /// Places a side's node; whether its box meets that of the other side's node.
+  /// Places a side's node. True if its box intersects that of the other side's node.
   IST_HD bool place_child(int side, MeshNode node, MeshNode other, Box& box) const {
     Box by;
     place(side, node.level(), node.number(), box);
@@ -76,7 +76,7 @@ class ExactBoxes {
     return meets;
   }
 
-  /// A side's node as meet() takes it; `l`: its lane.
+  /// Writes a side's node as meet() takes it. `l`: its lane.
   IST_HD void keep(int side, MeshNode node, std::uint32_t l, const Box& box, ExactBox& out) const {
     const int level = node.level();
     const std::uint32_t n = node.number();
@@ -121,7 +121,7 @@ class ExactBoxes {
     for (int k = 0; k < 3; ++k)
       meets = meets && b_low.x[k] <= a_to.x[k] && b_high.x[k] >= a_at.x[k];
     if (!meets) return false;
-    // Whether each reaches into the other's slab.
+    // Each must reach into the other's slab.
     const Quad normal = a.normal, turned = a.turned, normal_b = b.normal;
     float along = 0, reach = pair_.slack, along_b = 0, reach_b = pair_.slack;
     if constexpr (kAhead) reach += normal_b.x[3], reach_b += normal.x[3];
@@ -135,7 +135,7 @@ class ExactBoxes {
            along_b - reach_b <= b_high.x[3] && along_b + reach_b >= b_low.x[3];
   }
 
-  /// A vertex of a side in A's frame.
+  /// Maps a vertex of a side to A's frame.
   IST_HD void place_vertex(int side, float (&at)[3]) const {
     if (side == 0) return;
     const float own[3] = {at[0], at[1], at[2]};
@@ -146,13 +146,14 @@ class ExactBoxes {
     }
   }
 
-  /// What boxes of triangles are widened by.
+  /// The margin of triangles' boxes.
   IST_HD float slack() const {
     if constexpr (kAhead) return pair_.slack + pair_.ahead.of_b;
     return pair_.slack;
   }
 
-  /// A triangle's plane, for heights of points of a box, which may move by `ahead`.
+  /// Computes a triangle's plane and the error of heights of points in a box that may move by
+  /// `ahead`.
   IST_HD void place_plane(const float (&p)[3], const float (&q)[3], const float (&r)[3],
                           const Quad& low, const Quad& high, float ahead,
                           ExactTriangle& out) const {
@@ -169,20 +170,20 @@ class ExactBoxes {
       n.x[k] = std::fma(u[l], v[m], -(u[m] * v[l]));
     }
     n.x[3] = -std::fma(n.x[0], p[0], std::fma(n.x[1], p[1], n.x[2] * p[2]));
-    // What moves points, as in by_plane(), and places them in floats; and what floats round.
+    // The error has the motion of points, as in by_plane(), their placement in float, and rounding.
     const float moved = 0.5f * pair_.slack;
     longest += moved;
     farthest += moved;
     if constexpr (kAhead) farthest += 2 * ahead;
     out.margin() = longest * (12 * moved * (2 * farthest + longest) + 4e-6f * longest * farthest);
-    // What is apart by more stays so, and doubles tell: floats need not.
+    // Planes that separate by more than the margin still do after the motion. What floats leave
+    // open doubles decide.
     if constexpr (kAhead)
       out.margin() +=
           1.00001f * ahead * std::sqrt(n.x[0] * n.x[0] + n.x[1] * n.x[1] + n.x[2] * n.x[2]);
   }
 
-  /// Whether a triangle's plane has a triangle, whose k-th corner is corner(k, x), on one side for
-  /// certain.
+  /// True if a triangle, whose k-th corner is corner(k, x), is certainly on one side of the plane.
   template <class Corner>
   IST_HD static bool apart_by(const ExactTriangle& plane, const Corner& corner) {
     const Quad n = plane.plane;
@@ -199,8 +200,8 @@ class ExactBoxes {
   }
 
  private:
-  static constexpr float kError = 4e-7f;  ///< relative, of a few operations
-  static constexpr float kFar = 3e38f;    ///< beyond any slab
+  static constexpr float kError = 4e-7f;  ///< relative error of a few operations
+  static constexpr float kFar = 3e38f;    ///< larger than any coordinate
 
   IST_HD void place(int side, int level, std::uint32_t n, Box& box) const {
     const MeshTree& mesh = pair_.mesh[side];

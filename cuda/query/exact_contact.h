@@ -11,11 +11,11 @@
 #include "cuda/query/exact_search.h"
 #include "query/exact/overlap_formulas.h"
 
-// How two solids touch that have no volume in common: as the CPU's find_contact().
+// How two solids without common volume touch, as find_contact() has it on the CPU.
 
 namespace ist::gpu {
 
-/// A lane's pair of triangles in one plane that face each other: adds what they have in common.
+/// Adds the common area of a lane's triangles, which are in one plane and face each other.
 IST_HD_COLD void add_common_area(const CornerView& view, ContactSums& sums) {
   const exact::Point a[3] = {view.corner(0, 0), view.corner(0, 1), view.corner(0, 2)},
                      b[3] = {view.corner(1, 0), view.corner(1, 1), view.corner(1, 2)};
@@ -31,7 +31,7 @@ IST_HD_COLD void add_common_area(const CornerView& view, ContactSums& sums) {
   }
 }
 
-/// Whether a lane's triangles, which do not cross, come as near.
+/// True if a lane's triangles, which do not cross, are nearer than `distance`.
 IST_HD_COLD bool come_within(double distance, const CornerView& view) {
   exact::Flat flat[2];
   for (int s = 0; s < 2; ++s) {
@@ -42,8 +42,8 @@ IST_HD_COLD bool come_within(double distance, const CornerView& view) {
   return exact::nearest_points(flat[0], flat[1], 0, unclear).squared < distance * distance;
 }
 
-/// Whether a lane's triangles lie in one plane, to a distance, and face each other. In that of
-/// either: the plane of a sliver may be any.
+/// True if a lane's triangles are within `distance` of one plane and face each other. Either
+/// triangle's plane will do, since that of a sliver may be any.
 IST_HD inline bool flush(double distance, const CornerView& view) {
   exact::Point normal[2];
   bool level = false;
@@ -62,8 +62,8 @@ IST_HD inline bool flush(double distance, const CornerView& view) {
   return level && dot(normal[0], normal[1]) < 0;
 }
 
-/// Looks at the next so many pairs of triangles that wait. False where two cross wherever points
-/// move by the room: there is a volume, however small.
+/// Tests the next `count` queued pairs of triangles for contact. False if two cross wherever points
+/// move within the tolerance: then the volume is not 0, however small.
 template <class Team>
 IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactMemory& memory,
                             std::uint32_t first, std::uint32_t count, bool& touches) {
@@ -73,7 +73,7 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
   const CornerView view = {memory.contact.corners, team.lane()};
   for (int side = 0; side < 2; ++side)
     for (int k = 0; k < 3; ++k) view.set(side, k, of.corner(side, slot[side], k));
-  team.sync();  // all have read what waits
+  team.sync();  // all have read the queue
   PiercingEdge end[2];
   const PairSays says =
       has ? cross_pair<Signs::settled>(view, of.aside, end, of.reach[0]) : PairSays::apart;
@@ -83,9 +83,9 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
   return true;
 }
 
-/// Of pair i, whose volume may be nothing and is answered as if it were not: whether the solids
-/// touch, and where; lane 0 says so. What sums round is nothing if it is no thicker than what poses
-/// and vertices round, over the faces that lie on each other or push.
+/// Decides if the solids of pair i, whose volume may be 0, touch, and rewrites the answer if so;
+/// lane 0 returns true then. A volume within the rounding of sums counts as 0 if it is no thicker
+/// than the rounding of poses and vertices, spread over the faces that lie on each other or push.
 template <class Team>
 IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_t i,
                          const ExactPair& pair, ExactContactMemory& memory, const ExactLeft& left,
@@ -111,7 +111,7 @@ IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_
   row.volume_max = std::fmin(smaller_volume(batch, i), left.error * place.unit3());
   row.contact_area = area * (place.unit_a * place.unit_a);
   if (area > 0) row.centroid = place.to_world(vector(ContactSums::kMoment) / area);
-  // Normals that cancel leave what areas round.
+  // Normals that cancel leave only the rounding of areas.
   const Vec3 normal = vector(ContactSums::kNormal);
   if (const double length = norm(normal); length > 1e-9 * area)
     row.contact_normal = turned(place.rotation_a, normal / length);

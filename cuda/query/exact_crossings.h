@@ -9,13 +9,13 @@
 
 namespace ist::gpu {
 
-/// Whether a lane's triangles, which do not cross, might if points moved by the room.
-IST_HD_COLD bool nearly_cross(const CornerView& view, const exact::Point& aside, double room) {
+/// True if a lane's triangles, which do not cross, might if points moved within the tolerance.
+IST_HD_COLD bool nearly_cross(const CornerView& view, const exact::Point& aside, double tolerance) {
   PiercingEdge end[2];
-  return cross_pair<Signs::settled>(view, aside, end, room) != PairSays::apart;
+  return cross_pair<Signs::settled>(view, aside, end, tolerance) != PairSays::apart;
 }
 
-/// What is to be kept of crossings: nothing.
+/// Keeps no crossings.
 struct KeepNone {
   IST_HD bool operator()(bool, const std::uint32_t (&)[2], const PiercingEdge (&)[2],
                          const exact::EdgeEnd (&)[2]) {
@@ -23,15 +23,15 @@ struct KeepNone {
   }
 };
 
-/// Of pairs of triangles those that cross: what their segments add to the sums, and how often each
-/// edge is pierced. In their order, each a team's width at a time.
-/// keep(crosses, pair, end, at) of all lanes together; false where it lacks room.
+/// Finds the crossing pairs among candidates, a team's width at a time and in their order. Adds the
+/// terms of their segments to the sums, and counts how often each edge is pierced. All lanes call
+/// keep(crosses, pair, end, at), which is false if its memory is full.
 template <class Team, bool kExactly, class Keep = KeepNone>
 class ExactCrossings {
  public:
   IST_HD ExactCrossings(const Team& team, const ExactPair& pair, ExactSumMemory& memory,
-                        const ExactRoom& room, const Keep& keep = {})
-      : team_(team), pair_(pair), memory_(memory), room_(room), keep_(keep) {}
+                        const ExactWorkspace& work, const Keep& keep = {})
+      : team_(team), pair_(pair), memory_(memory), work_(work), keep_(keep) {}
 
   IST_HD ExactState run(const ExactPool& pool, const ExactChain& crossing, const ExactChain& near) {
     const auto each = [&](const ExactChain& chain, const auto& work) {
@@ -45,7 +45,7 @@ class ExactCrossings {
         if (has)
           for (int side = 0; side < 2; ++side) {
             const std::uint32_t block = pair[side] / kWidth;
-            atomic_or(&room_.near[side][block / 32], 1u << block % 32);
+            atomic_or(&work_.near[side][block / 32], 1u << block % 32);
           }
         work(has, pair);
       }
@@ -58,31 +58,31 @@ class ExactCrossings {
 
   IST_HD std::uint32_t count() const { return crossings_; }
   IST_HD std::uint32_t records() const { return records_; }
-  /// Whether triangles cross, or nearly do.
+  /// True if some triangles cross, or nearly do.
   IST_HD bool nearly() const { return nearly_; }
 
  private:
   static constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
   static_assert(ExactChunk::kPairs % kBatch == 0);
 
-  /// Blocks of which triangles cross others get records, in the order of the lanes.
+  /// Makes records of the blocks of crossing triangles, in the order of the lanes.
   IST_HD void mark(int side, bool crosses, std::uint32_t block) {
-    bool fresh = crosses && room_.record[side][block] == 0;
+    bool fresh = crosses && work_.record[side][block] == 0;
     for (;;) {
       int waiting = 0;
       const int next = team_.first(fresh, waiting);
       if (next < 0) break;
-      if (records_ == room_.most_records) {
-        state_ = ExactState::no_room;
+      if (records_ == work_.most_records) {
+        state_ = ExactState::out_of_memory;
         return;
       }
       const std::uint32_t made = team_.broadcast(block, next);
-      auto* const words = reinterpret_cast<std::uint32_t*>(room_.records + records_);
+      auto* const words = reinterpret_cast<std::uint32_t*>(work_.records + records_);
       constexpr int kWords = sizeof(CrossedRef) / 4;
       for (int w = team_.lane(); w < kWords; w += Team::kWidth)
         words[w] = w == 0 ? made : w == 1 ? static_cast<std::uint32_t>(side) << 16 : 0;
       ++records_;
-      if (team_.lane() == 0) room_.record[side][made] = records_;
+      if (team_.lane() == 0) work_.record[side][made] = records_;
       fresh = fresh && block != made;
     }
     team_.sync();
@@ -134,14 +134,14 @@ class ExactCrossings {
       if (state_ != ExactState::ok) return;
     }
     if (crosses) add(pair, view, end, at);
-    if (!keep_(crosses, pair, end, at)) state_ = ExactState::no_room;
+    if (!keep_(crosses, pair, end, at)) state_ = ExactState::out_of_memory;
   }
 
   IST_HD void add(const std::uint32_t (&pair)[2], const CornerView& view,
                   const PiercingEdge (&end)[2], const exact::EdgeEnd (&at)[2]) {
     const exact::Point o = memory_.origin;
     exact::Point apex[2];
-    std::uint32_t opposite[2];  // the edge opposite to it
+    std::uint32_t opposite[2];  // the edge opposite to the apex
     for (int s = 0; s < 2; ++s) {
       const auto far = [&](int k) { return exact::length_bound(view.corner(s, k) - o); };
       const auto which = static_cast<int>(exact::apex_of(far(0), far(1), far(2)));
@@ -168,16 +168,16 @@ class ExactCrossings {
     memory_.add(lane, ExactSum::kTurn, terms.torque);
   }
 
-  /// Of both ends' heights together.
+  /// The error of both ends' heights together.
   IST_HD static double error_of(const CornerView& view, const PiercingEdge& edge) {
     const int s = static_cast<int>(edge.of_b), k = static_cast<int>(edge.edge);
     return view.error(s, k) + view.error(s, k == 2 ? 0 : k + 1);
   }
 
-  /// An edge is pierced.
+  /// Counts that an edge is pierced.
   IST_HD void note(std::uint32_t of_b, std::uint32_t triangle, std::uint32_t edge, bool enters,
                    bool from_first) {
-    CrossedRef& record = room_.records[room_.record[of_b][triangle / kWidth] - 1];
+    CrossedRef& record = work_.records[work_.record[of_b][triangle / kWidth] - 1];
     const std::uint32_t number = 3 * (triangle % kWidth) + edge;
     const std::uint32_t sign = enters ? 1u : ~0u;
     atomic_or(&record.pierced[number / 32], 1u << number % 32);
@@ -187,7 +187,7 @@ class ExactCrossings {
   const Team& team_;
   const ExactPair& pair_;
   ExactSumMemory& memory_;
-  const ExactRoom& room_;
+  const ExactWorkspace& work_;
   Keep keep_;
   ExactState state_ = ExactState::ok;
   std::uint32_t crossings_ = 0, records_ = 0;

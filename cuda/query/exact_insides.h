@@ -8,8 +8,8 @@
 
 namespace ist::gpu {
 
-/// Whether all or none of the blocks below a lane of a level are inside, of which there is a bit
-/// each.
+/// Tells if all or none of the blocks below a lane of a level are inside. `inside` has a bit for
+/// each block.
 IST_HD inline void look_below(const std::uint32_t* inside, const MeshTree& mesh, int level,
                               std::uint32_t number, bool& all, bool& none) {
   const std::uint32_t shift = 4 * static_cast<std::uint32_t>(level - 1);
@@ -26,20 +26,21 @@ IST_HD inline void look_below(const std::uint32_t* inside, const MeshTree& mesh,
   }
 }
 
-/// What lies inside of each mesh once all crossings are known, and what it adds to the sums.
+/// Finds the parts of each mesh that are inside the other once all crossings are known, and adds
+/// their terms to the sums.
 template <class Team, bool kExactly>
 class ExactInsides {
  public:
   IST_HD ExactInsides(const Team& team, const ExactPair& pair, ExactSumMemory& memory,
-                      const ExactRoom& room, std::uint32_t records, bool crossed)
+                      const ExactWorkspace& work, std::uint32_t records, bool crossed)
       : team_(team),
         pair_(pair),
         memory_(memory),
-        room_(room),
+        work_(work),
         records_(records),
         crossed_(crossed) {}
 
-  /// False where doubles do not tell what is inside.
+  /// False if doubles do not decide what is inside.
   IST_HD bool run() {
     settle();
     for (int side = 0; side < 2; ++side) {
@@ -55,7 +56,7 @@ class ExactInsides {
   IST_HD bool has(const std::uint32_t* bits, std::uint32_t b) const {
     return (bits[b / 32] >> b % 32 & 1) != 0;
   }
-  /// All of the team together.
+  /// Called by the whole team.
   IST_HD bool is_inside_other(int side, std::uint32_t vertex) {
     const MeshTree& other = pair_.mesh[1 - side];
     const MeshOfPair solid = side == 1
@@ -65,7 +66,7 @@ class ExactInsides {
                                unsure_);
   }
 
-  /// Which vertices of records are inside.
+  /// Decides which vertices of the records are inside.
   IST_HD void settle() {
     const auto lane = static_cast<std::uint32_t>(team_.lane());
     for (std::uint32_t first = 0; first < records_;
@@ -76,7 +77,7 @@ class ExactInsides {
       int side = 0;
       std::uint32_t block = 0;
       if (r < records_) {
-        const CrossedRef& record = room_.records[r];
+        const CrossedRef& record = work_.records[r];
         side = record.of_b;
         block = record.block;
         if (record.all_pierced() != 0) {
@@ -85,7 +86,7 @@ class ExactInsides {
               mesh, record.all_pierced(), [&](std::uint32_t e) { return record.sum(e); },
               [](std::uint32_t) { return 0; });
           unknown = found.unknown(mesh);
-          atomic_or(&room_.pierced[side][block / 32], 1u << block % 32);
+          atomic_or(&work_.pierced[side][block / 32], 1u << block % 32);
         }
       }
       for (;;) {
@@ -100,20 +101,20 @@ class ExactInsides {
           unknown = found.unknown(mesh);
         }
       }
-      if (r < records_) room_.records[r].inside = static_cast<std::uint16_t>(found.inside);
+      if (r < records_) work_.records[r].inside = static_cast<std::uint16_t>(found.inside);
     }
     team_.sync();
   }
 
-  /// A block lies inside as a whole.
+  /// Marks a block that is inside as a whole, and queues it.
   IST_HD void wait(int side, std::uint32_t block) {
-    if (has(room_.pierced[side], block)) return;
+    if (has(work_.pierced[side], block)) return;
     const std::uint32_t bit = 1u << block % 32;
-    if ((atomic_or(&room_.inside[side][block / 32], bit) & bit) != 0) return;
-    room_.flood[atomic_add(&memory_.flooded, 1)] = block;
+    if ((atomic_or(&work_.inside[side][block / 32], bit) & bit) != 0) return;
+    work_.flood[atomic_add(&memory_.flooded, 1)] = block;
   }
 
-  // A block's neighbours are looked at by lanes side by side: each waits for memory twice.
+  // Several lanes visit a block's neighbours together, since each waits for memory twice.
   static constexpr std::uint32_t kOfGroup = Team::kWidth < 8 ? 1 : 8;
   static constexpr std::uint32_t kGroups = static_cast<std::uint32_t>(Team::kWidth) / kOfGroup;
   IST_HD std::uint32_t group() const { return static_cast<std::uint32_t>(team_.lane()) / kOfGroup; }
@@ -121,16 +122,16 @@ class ExactInsides {
     return static_cast<std::uint32_t>(team_.lane()) % kOfGroup;
   }
 
-  /// From blocks whose edges are pierced on, and whole shells.
+  /// Floods the inside from blocks with pierced edges, and from whole shells.
   IST_HD void flood(int side) {
     const MeshTree& mesh = pair_.mesh[side];
     const std::uint32_t shells = mesh.header->shell_count;
-    team_.sync();  // all have read what the other side left there
+    team_.sync();  // all have read the other side's list
     if (team_.lane() == 0) memory_.flooded = 0;
     team_.sync();
     bool any = false;
     for (std::uint32_t r = group(); r < records_; r += kGroups) {
-      const CrossedRef& record = room_.records[r];
+      const CrossedRef& record = work_.records[r];
       if (record.of_b != side || record.all_pierced() == 0) continue;
       any = true;
       const MeshBlock& block = mesh.blocks[record.block];
@@ -139,7 +140,7 @@ class ExactInsides {
         if ((record.inside >> entry % kWidth & 1) != 0) wait(side, entry / kWidth);
       }
     }
-    // A solid of one shell that is pierced has no whole one.
+    // A solid whose only shell is pierced has no whole shell inside.
     any = team_.any(any);
     for (std::uint32_t s = 0; s < shells && !(any && shells == 1); ++s) {
       const std::uint32_t block = mesh.shells[s].block;
@@ -160,7 +161,7 @@ class ExactInsides {
       if (done == flooded) break;
       team_.sync();
       for (std::uint32_t i = done + group(); i < flooded; i += kGroups) {
-        const MeshBlock& block = mesh.blocks[room_.flood[i]];
+        const MeshBlock& block = mesh.blocks[work_.flood[i]];
         for (std::uint32_t k = place_in_group(); k < block.neighbours; k += kOfGroup)
           wait(side, mesh.neighbours[block.first_neighbour + k] / kWidth);
       }
@@ -169,19 +170,19 @@ class ExactInsides {
     }
   }
 
-  /// Whether edges of a shell are pierced.
+  /// True if an edge of the shell is pierced.
   IST_HD bool is_pierced(int side, std::uint32_t shell) const {
     bool pierced = false;
     for (std::uint32_t r = static_cast<std::uint32_t>(team_.lane()); r < records_;
          r += static_cast<std::uint32_t>(Team::kWidth)) {
-      const CrossedRef& record = room_.records[r];
+      const CrossedRef& record = work_.records[r];
       pierced = pierced || (record.of_b == side && record.all_pierced() != 0 &&
                             pair_.mesh[side].blocks[record.block].shell == shell);
     }
     return team_.any(pierced);
   }
 
-  /// Blocks inside as a whole, as few lanes of boxes as hold them.
+  /// Adds the blocks that are inside as a whole, by as few nodes as contain them.
   IST_HD void sum_inside(int side) {
     const MeshTree& mesh = pair_.mesh[side];
     if (memory_.flooded == 0) return;
@@ -200,7 +201,7 @@ class ExactInsides {
         const auto l = static_cast<std::uint32_t>(first + team_.lane());
         bool all = false, none = true;
         if (l < kWidth && l < used)
-          look_below(room_.inside[side], mesh, level, kWidth * number + l, all, none);
+          look_below(work_.inside[side], mesh, level, kWidth * number + l, all, none);
         if (all) add_lane(side, level, number, l);
         int total = 0;
         const int before = team_.exclusive_count(!all && !none, total);
@@ -224,21 +225,21 @@ class ExactInsides {
         moved_layer(pair_.moved[side], found.area, found.width);
   }
 
-  /// What rounding and deviations of blocks that are near the other surface do to the volume.
+  /// Bounds the error of the volume from rounding and deviations of blocks near the other surface.
   IST_HD void bound_near() {
     for (int side = 0; side < 2; ++side)
-      for (std::uint32_t w = static_cast<std::uint32_t>(team_.lane()); w < room_.words;
+      for (std::uint32_t w = static_cast<std::uint32_t>(team_.lane()); w < work_.words;
            w += static_cast<std::uint32_t>(Team::kWidth))
-        for (std::uint32_t left = room_.near[side][w]; left != 0; left &= left - 1)
+        for (std::uint32_t left = work_.near[side][w]; left != 0; left &= left - 1)
           bound(side, 32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
   }
 
-  /// Of triangles of crossed blocks the cones over the edges opposite to their apexes.
+  /// Adds, for triangles of crossed blocks, the cones over the edges opposite to their apexes.
   IST_HD void sum_records() {
     const std::uint32_t triangles = kWidth * records_;
     for (std::uint32_t n = static_cast<std::uint32_t>(team_.lane()); n < triangles;
          n += static_cast<std::uint32_t>(Team::kWidth)) {
-      const CrossedRef& record = room_.records[n / kWidth];
+      const CrossedRef& record = work_.records[n / kWidth];
       const std::uint32_t t = n % kWidth;
       const int side = record.of_b;
       const MeshBlock& block = pair_.mesh[side].blocks[record.block];
@@ -250,7 +251,7 @@ class ExactInsides {
       const auto apex = static_cast<std::uint32_t>(exact::apex_of(exact::length_bound(corner[0]),
                                                                   exact::length_bound(corner[1]),
                                                                   exact::length_bound(corner[2])));
-      // Whether the middle of the edge opposite to the apex is inside.
+      // The count says if the middle of the edge opposite to the apex is inside.
       const std::uint32_t k = (apex + 1) % 3, edge = 3 * t + k;
       const int count =
           static_cast<int>(record.inside >> block.corner[k][t] & 1) + record.near_first(edge);
@@ -278,9 +279,9 @@ class ExactInsides {
   const Team& team_;
   const ExactPair& pair_;
   ExactSumMemory& memory_;
-  const ExactRoom& room_;
+  const ExactWorkspace& work_;
   std::uint32_t records_;
-  bool crossed_;  ///< there is an origin
+  bool crossed_;  ///< the origin is set
   bool unsure_ = false;
 };
 

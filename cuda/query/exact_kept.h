@@ -10,18 +10,20 @@
 #include "cuda/query/exact_search.h"
 #include "cuda/query/exact_steps.h"
 
-// How exact batches find triangles among what they keep (exact_kept_arrays.h): as a search would,
-// box by box, so that they find the same in the same order.
+// Finds triangles among the candidates that exact batches keep (exact_kept_arrays.h). The tests are
+// those of a search, box by box, so that the same pairs are found in the same order.
 
 namespace ist::gpu {
 
-/// Steps that a margin is made for: the fewer, the less is kept, and the more is searched.
+/// The number of steps that a margin allows for. Fewer steps keep fewer candidates and need more
+/// searches.
 constexpr double kMostKeptSteps = 6, kLeastKeptSteps = 1.5;
 
-/// Whether what is kept of pair i holds at this place, or is to be made anew. Once a call.
+/// Decides if the kept candidates of pair i are valid at this place or must be renewed. Called once
+/// per batch.
 IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const MeshTree& a,
                                 const MeshTree& b, const Similarity& now) {
-  // As the CPU's KeptRing: margins of so many steps, within parts of a triangle's side.
+  // Margins of some steps, within fractions of a triangle's side, as KeptRing has them on the CPU.
   constexpr double kLeast = 0.05, kMost = 0.3;
   KeptHead& head = kept.head(i);
   const bool known =
@@ -61,7 +63,7 @@ IST_HD inline void look_at_kept(const ExactKept& kept, std::uint32_t i, const Me
   head.state = KeptState::fresh;
 }
 
-/// sift_exact(), and what is kept of what is to be asked.
+/// sift_exact(), followed by look_at_kept() for a pair that needs a search.
 IST_HD inline bool sift_kept(const ExactArrays& batch, const ExactKept& kept, std::uint32_t i) {
   PairPlace place;
   if (!sift_exact(batch, i, place)) return false;
@@ -70,14 +72,14 @@ IST_HD inline bool sift_kept(const ExactArrays& batch, const ExactKept& kept, st
   return true;
 }
 
-/// Lists the k-th query of the n-th round if what is kept is to be made anew.
+/// Lists the k-th query of round n if its candidates must be renewed.
 IST_HD inline void list_fresh(const ExactArrays& batch, const ExactKept& kept, std::uint32_t n,
                               std::uint32_t k) {
   if (kept.head(batch.queries[k].pair).state == KeptState::fresh)
     kept.list[atomic_add(&kept.round(n).fresh, 1)] = k;
 }
 
-/// How far a search is to look ahead. Wider by what floats round, then as now.
+/// Sets how far a search looks ahead. The rounding of floats, then and now, is included.
 IST_HD inline void look_ahead(const KeptMotion& margin, ExactAheadPair& pair) {
   const MeshTree& b = pair.mesh[1];
   const Similarity& map = pair.place.a_from_b;
@@ -96,8 +98,8 @@ IST_HD inline void look_ahead(const KeptMotion& margin, ExactAheadPair& pair) {
       static_cast<float>(1.00001 * (shift + margin.turn * map.scale * std::sqrt(square)));
 }
 
-/// Appends the triangles that wait to the list of a pair; false where it has no room. All of a
-/// block's come one after the other.
+/// Appends queued triangles to the list of a pair. False if the list is full. Triangles of a pair
+/// of blocks are consecutive.
 template <class Team>
 class KeptWriter {
  public:
@@ -108,7 +110,7 @@ class KeptWriter {
     const bool has = lane < count;
     const std::uint32_t(&pair)[2] = memory.queue[(first + (has ? lane : 0)) % kExactWaiting];
     const std::uint32_t a = pair[0], b = pair[1], block_a = a / kWidth, block_b = b / kWidth;
-    // The lane before, or the last one before these.
+    // The previous lane, or the last of the previous batch.
     const int before = lane > 0 ? static_cast<int>(lane) - 1 : 0;
     const std::uint32_t before_a = team_.broadcast(block_a, before),
                         before_b = team_.broadcast(block_b, before);
@@ -142,7 +144,7 @@ class KeptWriter {
   std::uint32_t last_[2] = {~0u, ~0u};
 };
 
-/// Searches the k-th query of a round and keeps what B's next motions may need.
+/// Searches the k-th query of a round and keeps the candidates for B's next motions.
 template <class Team>
 IST_HD void keep_query(const Team& team, const ExactArrays& batch, const ExactKept& kept,
                        std::uint32_t k, ExactAheadPair& pair, ExactSearchMemory& memory) {
@@ -167,7 +169,7 @@ IST_HD void keep_query(const Team& team, const ExactArrays& batch, const ExactKe
   head.steps = kMostKeptSteps;
 }
 
-/// Finds what ExactSearch does, in its order, among what is kept.
+/// Finds the pairs of ExactSearch, in its order, among the kept candidates.
 template <class Team>
 class KeptSearch {
  public:
@@ -216,12 +218,12 @@ class KeptSearch {
   static constexpr auto kBatch = static_cast<std::uint32_t>(Team::kWidth);
   static_assert(kBatch <= 2 * kWidth);
 
-  /// Of a pair of blocks: A's box, and B's as `other`.
+  /// The boxes of a pair of blocks: A's, and B's as `other`.
   IST_HD ExactBox& box(std::uint32_t slot) const {
     return memory_.boxes[slot / kWidth][slot % kWidth];
   }
 
-  /// Whether a search comes to a pair of blocks, by the boxes and slabs of all nodes above.
+  /// True if a search would reach a pair of blocks, by the boxes and slabs of all nodes above.
   IST_HD bool blocks_meet(std::uint32_t n, ExactBox& out) const {
     const std::uint32_t block[2] = {list_.blocks(n)[0], list_.blocks(n)[1]};
     MeshNode node[2] = {MeshNode::at(pair_.mesh[0].top, 0), MeshNode::at(pair_.mesh[1].top, 0)};
@@ -250,8 +252,8 @@ class KeptSearch {
     return true;
   }
 
-  /// Whether the boxes of two triangles meet each other and the other's block, and no plane keeps
-  /// them apart, as floats tell.
+  /// True if the boxes of two triangles intersect each other and the other's block, and no plane
+  /// separates the triangles in float.
   IST_HD bool triangles_meet(std::uint32_t a, std::uint32_t b, const ExactBox& blocks) const {
     float x[2][3][3];  // of a side, a corner
     ExactTriangle of[2];
@@ -297,7 +299,7 @@ class KeptSearch {
   const std::uint32_t blocks_, triangles_;
 };
 
-/// Searches the k-th pair of a round, among what is kept if that holds.
+/// Searches the k-th pair of a round, among its kept candidates if they are valid.
 template <class Team>
 IST_HD void search_kept_query(const Team& team, const ExactArrays& batch, const ExactKept& kept,
                               ExactRound& round, std::uint32_t k, ExactPair& pair,

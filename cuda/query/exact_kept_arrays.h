@@ -7,13 +7,13 @@
 #include "query/base/pair_place.h"
 #include "query/exact/mesh_tree.h"
 
-// What exact batches keep of each pair from call to call: all pairs of triangles that a search may
-// find while B has not moved by more than a margin.
+// Candidates that exact batches keep for each pair from call to call: all pairs of triangles that a
+// search may find until B has moved by more than a margin.
 
 namespace ist::gpu {
 
-/// How far B moves against A: its box's centre, and what is turned about it by its distance. A's
-/// unit frame.
+/// The motion of B relative to A: that of its box's centre, and that of the rotation per distance
+/// from the centre. A's unit frame.
 struct KeptMotion {
   double shift, turn;
 
@@ -24,33 +24,34 @@ struct KeptMotion {
     to.apply(centre, to_at);
     for (int k = 0; k < 3; ++k) shift += (to_at[k] - at[k]) * (to_at[k] - at[k]);
     for (int k = 0; k < 9; ++k) turn += (to.m[k] - from.m[k]) * (to.m[k] - from.m[k]);
-    // Of a rotation less 1 all entries' squares are twice the square of what it does.
+    // The squared entries of a rotation minus the identity sum to twice the square of its largest
+    // motion.
     return {std::sqrt(shift), std::sqrt(0.5 * turn) / from.scale};
   }
 };
 
 enum class KeptState : std::uint32_t {
-  none,   ///< to be searched
-  fresh,  ///< to be searched and kept
+  none,   ///< needs a search
+  fresh,  ///< needs a search that keeps its candidates
   holds,
 };
 
-/// What is kept of a pair. All zero: nothing.
+/// The state of a pair. All zero: nothing is kept.
 struct KeptHead {
   std::uint64_t mesh[2];  ///< hashes of the assets
-  Similarity last;        ///< B in A in the last call
-  Similarity found_at;    ///< when the list was made
-  KeptMotion margin;      ///< that it may have moved since
-  double steps;           ///< that the next margin is made for
+  Similarity last;        ///< the map from B to A in the last call
+  Similarity found_at;    ///< the same when the list was made
+  KeptMotion margin;      ///< the motion that is allowed since then
+  double steps;           ///< the number of steps that the next margin allows for
   KeptState state;
-  std::uint32_t rest;       ///< calls that make no list, after lists that had no room
+  std::uint32_t rest;       ///< calls that make no list, after lists that did not fit
   std::uint32_t blocks;     ///< pairs of blocks
-  std::uint32_t triangles;  ///< of theirs
+  std::uint32_t triangles;  ///< pairs of their triangles
 };
 
-/// Pairs of blocks from the front on, two words each; their pairs of triangles from the end on
-/// backwards, two bytes each: 256 · the place of the pair of blocks modulo 256 + 16 · A's lane +
-/// B's. Each pair of blocks has some.
+/// The memory of a pair's list. Pairs of blocks fill it from the front, two words each. Their pairs
+/// of triangles fill it from the end, two bytes each: 256 · the position of the pair of blocks
+/// modulo 256 + 16 · A's lane + B's. Each pair of blocks has at least one.
 struct KeptList {
   std::byte* memory;
   std::uint32_t bytes;
@@ -66,18 +67,18 @@ struct KeptList {
   }
 };
 
-/// Of a round, in turn.
+/// The counters of a round; two alternate.
 struct KeptRound {
-  std::uint32_t fresh, taken;  ///< queries to be searched and kept
+  std::uint32_t fresh, taken;  ///< queries whose search keeps candidates
 };
 
-/// What batches keep of pairs by their places.
+/// The kept candidates of all pairs, by their position in the batch.
 struct ExactKept {
   std::byte* memory;
   std::uint32_t pairs;
   std::uint32_t bytes;  ///< each
   KeptRound* rounds;    ///< two
-  std::uint32_t* list;  ///< fresh queries of a round
+  std::uint32_t* list;  ///< queries of a round that are `fresh`
 
   IST_HD KeptHead& head(std::uint32_t i) const {
     return *reinterpret_cast<KeptHead*>(memory + std::size_t{bytes} * i);

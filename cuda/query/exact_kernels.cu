@@ -11,16 +11,16 @@
 namespace ist::gpu {
 namespace {
 
-constexpr unsigned kThreadsEach = 128;  ///< of what one thread does of a pair
+constexpr unsigned kThreadsEach = 128;  ///< of kernels with one thread per pair
 constexpr unsigned kWarps = 4;
 constexpr unsigned kThreads = 32 * kWarps;
-constexpr unsigned kWholeWarps = 2;  ///< of kernels that need more memory each
+constexpr unsigned kWholeWarps = 2;  ///< of kernels whose warps need more memory
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
-// A multiprocessor; more leave too few registers.
+// Blocks per multiprocessor; more would leave too few registers.
 constexpr int kSearchBlocks = 6, kKeepBlocks = 5, kSumBlocks = 4, kExactBlocks = 2,
               kWholeBlocks = 4, kTouchBlocks = 5;
 
-/// Lists pairs whose boxes meet: sift(i).
+/// Lists the pairs for which sift(i): those whose boxes intersect.
 template <class Sift>
 __device__ void sift_pairs(const ExactArrays& batch, const Sift& sift) {
   const WarpTeam team;
@@ -37,7 +37,7 @@ __global__ void __launch_bounds__(kThreadsEach)
   sift_pairs(batch, [&](std::uint32_t i) { return sift_kept(batch, kept, i); });
 }
 
-/// Begins the n-th round; then placed(k).
+/// Begins round n, and calls placed(k) for its pairs.
 template <class Placed>
 __device__ void place_round(const ExactArrays& batch, const std::uint32_t n, const Placed& placed) {
   const std::uint32_t first = end_of(round_of(batch, n + 1));
@@ -108,12 +108,12 @@ __global__ void __launch_bounds__(kThreads, kExactly ? kExactBlocks : kSumBlocks
   __shared__ Raw<ExactSumMemory, kWarps> memory;
   const unsigned warp = threadIdx.x / 32;
   ExactRound& round = round_of(batch, n);
-  const ExactRoom room = batch.room(0, blockIdx.x * kWarps + warp);
-  if (!kExactly && n == 0) clear_marks(WarpTeam(), room);
+  const ExactWorkspace work = batch.workspace(0, blockIdx.x * kWarps + warp);
+  if (!kExactly && n == 0) clear_marks(WarpTeam(), work);
   if (kExactly && blockIdx.x == 0 && threadIdx.x == 0) batch.counters->exactly += round.unsure;
   by_warps(kExactly ? round.unsure : searched_of(round), kExactly ? &round.redone : &round.summed,
            [&](const WarpTeam& team, std::uint32_t k) {
-             sum_query<kExactly>(team, batch, round, k, room, pair[warp], memory[warp]);
+             sum_query<kExactly>(team, batch, round, k, work, pair[warp], memory[warp]);
            });
 }
 
@@ -132,22 +132,22 @@ __global__ void __launch_bounds__(kWholeThreads, kWholeBlocks)
     ask_meshes(const ExactArrays batch, const int pass, const std::uint32_t rounds) {
   __shared__ Raw<ExactWholeMemory, kWholeWarps> memory;
   const unsigned warp = threadIdx.x / 32;
-  const ExactRoom room = batch.room(pass, blockIdx.x * kWholeWarps + warp);
+  const ExactWorkspace work = batch.workspace(pass, blockIdx.x * kWholeWarps + warp);
   const std::uint32_t listed = load_fresh(&batch.counters->listed[pass]);
   const std::uint32_t count = pairs_of_pass(batch, pass, rounds);
-  if (count > 0) clear_marks(WarpTeam(), room);
+  if (count > 0) clear_marks(WarpTeam(), work);
   by_warps(count, &batch.counters->taken[pass], [&](const WarpTeam& team, std::uint32_t k) {
-    ask_pass(team, batch, pass, rounds, listed, k, room, memory[warp]);
+    ask_pass(team, batch, pass, rounds, listed, k, work, memory[warp]);
   });
 }
 
-/// Blocks of so many warps for all pairs, of a grid.
+/// The number of blocks of `warps` each for all pairs, at most `grid`.
 unsigned blocks_of(const ExactArrays& batch, unsigned warps, int grid) {
   return std::min(blocks_for(batch.pairs.count, warps), static_cast<unsigned>(grid));
 }
-/// And whose teams of a pass find room.
-unsigned blocks_with_room(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
-                          int grid) {
+/// The same, and whose teams of a pass find memory.
+unsigned blocks_with_memory(const ExactArrays& batch, int pass, std::size_t bytes, unsigned warps,
+                            int grid) {
   const std::size_t all = bytes / (warps * batch.bytes_of_team(pass));
   return static_cast<unsigned>(
       std::clamp(all, std::size_t{1}, std::size_t{blocks_of(batch, warps, grid)}));
@@ -164,16 +164,16 @@ void find_exact_grids(Grids& grids) {
       blocks_at_a_time(ask_meshes, kWholeThreads)};
 }
 
-bool has_room(const ExactArrays& batch) {
-  const auto before = static_cast<std::size_t>(batch.rooms - batch.memory);
+bool has_memory(const ExactArrays& batch) {
+  const auto before = static_cast<std::size_t>(batch.team_memory - batch.memory);
   return before + kWarps * batch.bytes_of_team(0) <= batch.bytes &&
          kWholeWarps * batch.bytes_of_team(kExactPasses - 1) <= batch.bytes;
 }
 
-std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs) {
+std::size_t exact_memory_bytes(const Grids& grids, std::size_t most_pairs) {
   constexpr std::size_t kUsualMesh = 8 << 10;
   const std::size_t teams = static_cast<std::size_t>(grids.exact.sum[0]) * kWarps;
-  return (std::min(teams, most_pairs) + kWarps) * (exact_room(0) + kUsualMesh);
+  return (std::min(teams, most_pairs) + kWarps) * (exact_bytes(0) + kUsualMesh);
 }
 
 void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& grids,
@@ -187,15 +187,16 @@ void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& 
     sift_kept_meshes<<<all, kThreadsEach, 0, stream>>>(batch, *kept);
   }
   check_launch("sifting pairs of meshes");
-  // Of many pairs rounds of 8,192 that keep some 30 chunks each; of few some of a quarter.
+  // Large batches have rounds of 8,192 pairs with some 30 chunks each, small ones rounds of a
+  // quarter.
   constexpr std::uint64_t kLeast = 1 << 13, kFew = 1 << 11;
   const auto rounds = static_cast<std::uint32_t>(
       1 + batch.pairs.count / kLeast + std::min<std::uint64_t>(batch.pairs.count, 8 * kFew) / kFew);
   const unsigned blocks =
-      blocks_for(std::min<std::uint64_t>(batch.pairs.count, batch.query_room), kThreadsEach);
-  const unsigned sums =
-      blocks_with_room(batch, 0, batch.bytes - static_cast<std::size_t>(batch.rooms - batch.memory),
-                       kWarps, grids.exact.sum[0]);
+      blocks_for(std::min<std::uint64_t>(batch.pairs.count, batch.query_capacity), kThreadsEach);
+  const unsigned sums = blocks_with_memory(
+      batch, 0, batch.bytes - static_cast<std::size_t>(batch.team_memory - batch.memory), kWarps,
+      grids.exact.sum[0]);
   for (std::uint32_t n = 0; n < rounds; ++n) {
     if (kept == nullptr) {
       place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
@@ -224,9 +225,9 @@ void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& 
   }
   for (int pass = 1; pass < kExactPasses; ++pass) {
     const unsigned whole =
-        blocks_with_room(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole);
+        blocks_with_memory(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole);
     ask_meshes<<<whole, kWholeThreads, 0, stream>>>(batch, pass, rounds);
-    check_launch("asking what has no room");
+    check_launch("asking the pairs that need more memory");
   }
 }
 

@@ -13,19 +13,19 @@
 
 namespace ist::gpu {
 
-/// Four numbers that are read and written at once.
+/// Four numbers that are loaded and stored together.
 struct alignas(16) Quad {
   float x[4];
 };
 
-constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles to be sifted
+constexpr std::uint32_t kExactWaiting = 64;  ///< pairs of triangles to be tested in double
 
-/// What a team keeps at hand of a pair.
+/// A pair in a team's fast memory.
 struct ExactPair : ExactFrame {
   MeshTree mesh[2];
   const FloatBlock* in_floats[2];
-  Quad row[2][3];   ///< of the map to the other's frame, the shift last
-  Quad turn[2][3];  ///< of the other's axes from one's own
+  Quad row[2][3];   ///< of the map to the other's frame, the translation last
+  Quad turn[2][3];  ///< rotation to the other's axes
 
   /// A vertex in A's frame.
   IST_HD exact::Point vertex(int side, std::uint32_t number) const {
@@ -33,55 +33,56 @@ struct ExactPair : ExactFrame {
     const exact::Point at = {x[0], x[1], x[2]};
     return side == 0 ? at : map_point(place.a_from_b, at);
   }
-  /// Of a triangle, 16 · block + lane, the k-th corner.
+  /// The k-th corner of a triangle (16 · block + lane), A's frame.
   IST_HD exact::Point corner(int side, std::uint32_t triangle, int k) const {
     const MeshBlock& block = in_global_memory(mesh[side].blocks)[triangle / kWidth];
     return vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
 };
 
-/// A child of a node, or a node alone. Own boxes are wider by the reach. Of these, as of triangles,
-/// an odd number of quads, so that lanes that read one each do not meet in a bank.
+/// A child of a node, or a node itself. Its own box is wider by the reach. The number of quads is
+/// odd, as in ExactTriangle, so that lanes that read one object each use different banks.
 struct ExactBox {
-  Quad low, high;              ///< in the solid's own frame; last its slab, A's frame
-  Quad other_low, other_high;  ///< in the other's
+  Quad low, high;  ///< in the solid's own frame; the last number bounds the slab, A's frame
+  Quad other_low, other_high;  ///< in the other's frame
   Quad normal;                 ///< of the slab, A's frame
-  Quad turned;  ///< of A's: what a side of B's box, of length 1, reaches along the normal
+  Quad turned;  ///< for A's: the extent along the normal of a side of B's box of length 1
   std::uint32_t lane;
 };
 
 /// A triangle in A's frame, in floats.
 struct ExactTriangle {
-  Quad low, high;  ///< its box; A's is wider by the slack
-  Quad plane;      ///< a point is so high over it, times twice the area: x · normal + last
+  Quad low, high;  ///< its box, that of A widened by the slack
+  Quad plane;      ///< x · normal + last is a point's height times twice the area
 
-  /// Heights above it are certain, wherever points move by the room.
+  /// Larger heights have a certain sign, wherever points move within the tolerance.
   IST_HD float& margin() { return low.x[3]; }
   IST_HD float margin() const { return low.x[3]; }
-  /// Its lane in its block, and in bytes its corners' places there.
+  /// The lane in its block and, a byte each, the positions of its corners there.
   IST_HD void call(std::uint32_t name) { high.x[3] = float_of(name); }
   IST_HD std::uint32_t name() const { return bits_of(high.x[3]); }
 };
 static_assert(sizeof(ExactBox) % 32 == 16 && sizeof(ExactTriangle) % 32 == 16);
 
-/// What a team that searches keeps beside the pair.
+/// The memory of a team that searches, beside the pair.
 struct ExactSearchMemory {
-  static constexpr std::uint32_t kWaiting = 192;  ///< pairs of nodes, of the first pass
-  ExactBox boxes[2][kWidth];                      ///< of each side what may meet the other
-  ExactTriangle triangles[2][kWidth];             ///< likewise
+  static constexpr std::uint32_t kWaiting = 192;  ///< pending pairs of nodes in the first pass
+  ExactBox boxes[2][kWidth];           ///< the nodes of each side that may intersect the other
+  ExactTriangle triangles[2][kWidth];  ///< the triangles of each side that may intersect the other
   float vertices[3][2]
                 [kWidth];  ///< of two blocks, A's frame: lanes read them from banks of their own
   std::uint64_t waiting[kWaiting];
   ExactPool pool;
-  ExactChain crossing, near;   ///< triangles that may cross; others whose signs are not settled
-  std::uint32_t last_near[2];  ///< blocks of the last lane, if near
-  std::uint32_t inverse[kWidth + 1];      ///< of a number of columns, times 2^16
-  std::uint32_t queue[kExactWaiting][2];  ///< triangles to be sifted, 16 · block + lane
-  std::uint8_t found[kWidth * kWidth];    ///< pairs of boxes of leaves that meet, 16 · A's + B's
-  std::uint8_t met[kWidth * kWidth];      ///< of triangles, likewise
+  ExactChain crossing,
+      near;  ///< triangles that may cross; others whose signs might differ if points moved
+  std::uint32_t last_near[2];             ///< the blocks of the last lane, if near
+  std::uint32_t inverse[kWidth + 1];      ///< 2^16 divided by a number of columns
+  std::uint32_t queue[kExactWaiting][2];  ///< triangles to be tested in double, 16 · block + lane
+  std::uint8_t found[kWidth * kWidth];    ///< intersecting pairs of leaf boxes, 16 · A's + B's
+  std::uint8_t met[kWidth * kWidth];  ///< intersecting pairs of triangles' boxes, 16 · A's + B's
 };
 
-/// What a lane has summed: a volume in two parts, vectors in three.
+/// The sums of a lane: a volume in two parts, vectors of three numbers.
 struct ExactSum {
   enum {
     kHigh,
@@ -95,7 +96,7 @@ struct ExactSum {
   };
 };
 
-/// What a team that sums keeps beside the pair.
+/// The memory of a team that sums, beside the pair.
 struct ExactSumMemory {
   union {
     CornerMemory corners;
@@ -109,7 +110,7 @@ struct ExactSumMemory {
   double sum[ExactSum::kCount][32];
   std::uint32_t flooded;  ///< blocks, of one side
 
-  /// Six times a volume that a lane adds.
+  /// Adds six times a volume to a lane's sum.
   IST_HD void add(int lane, double six) {
     double rest;
     exact::two_sum(sum[ExactSum::kHigh][lane], six, sum[ExactSum::kHigh][lane], rest);
@@ -120,7 +121,7 @@ struct ExactSumMemory {
   }
 };
 
-/// Of faces that lie on each other, a lane's.
+/// The sums of a lane over faces that lie on each other.
 struct ContactSums {
   enum { kArea, kNormal, kMoment = kNormal + 3, kCount = kMoment + 3 };
   double of[kCount][32];
@@ -130,7 +131,7 @@ struct ExactContactMemory : ExactSearchMemory {
   ContactSums contact;
 };
 
-/// Of a team that does all, one after the other.
+/// The memory of a team that does all steps of a pair.
 struct ExactWholeMemory {
   ExactPair pair;
   union {

@@ -8,24 +8,24 @@
 #include "query/exact/overlap_octants.h"
 #include "query/exact/slot_sums.h"
 
-// An exact overlap whose crossings are kept, in the order of the meshes, as the CPU has them: what
-// OverlapParts (query/exact/overlap_parts.h) asks on a GPU.
+// An exact overlap with its crossings in the order of the meshes, as on the CPU: the data of
+// OverlapParts (query/exact/overlap_parts.h) on a GPU.
 
 namespace ist::gpu {
 
 /// Two triangles that cross.
 struct CrossingRef {
-  exact::Point from[2], offset[2];  ///< of an end: see exact::EdgeEnd
-  double way[2];                    ///< of the edge that it is from its first corner
-  std::uint32_t triangle[2];        ///< A's, B's: 16 · block + lane
-  std::uint32_t end[2];             ///< the edge; 4: B's; 8: `from` is its first corner
+  exact::Point from[2], offset[2];  ///< of an end (exact::EdgeEnd)
+  double way[2];              ///< the end's position on the edge, from its first corner: 0 to 1
+  std::uint32_t triangle[2];  ///< A's, B's: 16 · block + lane
+  std::uint32_t end[2];       ///< the edge; 4: B's; 8: `from` is its first corner
 };
 struct CrossingPlace {
-  std::uint64_t key;  ///< in the order of the meshes
+  std::uint64_t key;  ///< orders crossings as the meshes do
   std::uint32_t crossing;
 };
 
-/// Keeps crossings in memory for `most`.
+/// Stores crossings in memory for `most`.
 template <class Team>
 struct KeepCrossings {
   const Team& team;
@@ -53,7 +53,7 @@ struct KeepCrossings {
   }
 };
 
-/// Sorts by a team: `count` is a power of two.
+/// Sorts `count` places, a power of two, by a team.
 template <class Team>
 IST_HD void sort_places(const Team& team, CrossingPlace* places, std::uint32_t count) {
   team.sync();
@@ -71,46 +71,46 @@ IST_HD void sort_places(const Team& team, CrossingPlace* places, std::uint32_t c
     }
 }
 
-/// What lanes of a team have found of a pair, and where they divide it.
+/// The crossings and sums of a pair, and the memory in which a team divides it into parts.
 template <class Team>
 class OverlapRef {
  public:
-  IST_HD OverlapRef(const Team& team, const ExactPair& pair, const ExactRoom& room,
+  IST_HD OverlapRef(const Team& team, const ExactPair& pair, const ExactWorkspace& work,
                     std::uint32_t records, const CrossingRef* crossing, std::uint32_t crossings,
                     const exact::Point& inside, PieceMemory& pieces)
       : team_(team),
         pair_(pair),
-        room_(room),
+        work_(work),
         records_(records),
         crossing_(crossing),
         crossings_(crossings),
         origin_(inside),
         pieces_(pieces) {}
 
-  /// Readies all but the octants' memory; false where the room does not hold it.
-  IST_HD bool place_parts(PartRoom& room) {
+  /// Takes all memory but that for octants; false if the arena is too small.
+  IST_HD bool place_parts(Arena& arena) {
     const std::uint32_t n = crossings_, places = power_from(n);
-    places_ = room.take<CrossingPlace>(places);
-    opposite_ = room.take<std::uint8_t>(kWidth * std::size_t{records_});
-    slots_ = room.take<SlotSums>(1);
-    stack_ = room.take<MeshNode>(kWidth * kMaxLevels);
+    places_ = arena.take<CrossingPlace>(places);
+    opposite_ = arena.take<std::uint8_t>(kWidth * std::size_t{records_});
+    slots_ = arena.take<SlotSums>(1);
+    stack_ = arena.take<MeshNode>(kWidth * kMaxLevels);
     const std::uint32_t inside = inside_vertices();
     const std::uint32_t table = power_from(2 * (n > inside ? n : inside) + 1);
     const std::size_t elements = n + kWidth * std::size_t{records_} + mesh(0).level[0].count +
                                  std::size_t{mesh(1).level[0].count};
-    memory_.ends = room.take<PiercedEnd>(2 * std::size_t{n});
-    memory_.curves = room.take<CurveExtent>(n);
-    memory_.keys = room.take<std::uint64_t>(table);
-    memory_.other_keys = room.take<std::uint64_t>(2 * std::size_t{n});
-    memory_.parent = room.take<std::uint32_t>(elements);
-    memory_.part = room.take<std::uint32_t>(elements);
-    memory_.middles = room.take<std::uint32_t>(3 * kWidth * std::size_t{records_});
-    // No more parts than crossings and shells that nothing crosses.
+    memory_.ends = arena.take<PiercedEnd>(2 * std::size_t{n});
+    memory_.curves = arena.take<CurveExtent>(n);
+    memory_.keys = arena.take<std::uint64_t>(table);
+    memory_.other_keys = arena.take<std::uint64_t>(2 * std::size_t{n});
+    memory_.parent = arena.take<std::uint32_t>(elements);
+    memory_.part = arena.take<std::uint32_t>(elements);
+    memory_.middles = arena.take<std::uint32_t>(3 * kWidth * std::size_t{records_});
+    // There are no more parts than crossings and shells that nothing crosses.
     const std::size_t shells = mesh(0).header->shell_count + mesh(1).header->shell_count;
     memory_.most_parts = n + shells + 1 < PartMemory::kMostParts
                              ? static_cast<std::uint32_t>(n + shells + 1)
                              : PartMemory::kMostParts;
-    memory_.parts = room.take<ExactPart>(memory_.most_parts);
+    memory_.parts = arena.take<ExactPart>(memory_.most_parts);
     if (places_ == nullptr || opposite_ == nullptr || slots_ == nullptr || stack_ == nullptr ||
         memory_.ends == nullptr || memory_.curves == nullptr || memory_.keys == nullptr ||
         memory_.other_keys == nullptr || memory_.parent == nullptr || memory_.part == nullptr ||
@@ -122,10 +122,10 @@ class OverlapRef {
     sum_whole();
     return true;
   }
-  /// And that, for so many parts.
-  IST_HD bool place_octants(PartRoom& room, std::uint32_t parts) {
-    memory_.octants = room.take<ExactPart>(8 * std::size_t{parts});
-    memory_.octant_sums = room.take<OctantSums>(8 * std::size_t{parts});
+  /// Takes the octants' memory for so many parts; false if the arena is too small.
+  IST_HD bool place_octants(Arena& arena, std::uint32_t parts) {
+    memory_.octants = arena.take<ExactPart>(8 * std::size_t{parts});
+    memory_.octant_sums = arena.take<OctantSums>(8 * std::size_t{parts});
     return memory_.octants != nullptr && memory_.octant_sums != nullptr;
   }
 
@@ -161,16 +161,16 @@ class OverlapRef {
   IST_HD double way_of(std::uint32_t i, int e) const { return crossing(i).way[e]; }
   IST_HD exact::Point place_of(std::uint32_t i, int e) const { return place_from(i, e, origin_); }
 
-  // Records of both sides are numbered together.
+  // Records of both sides share one numbering.
   IST_HD std::uint32_t first_record(int) const { return 0; }
   IST_HD std::uint32_t end_record(int) const { return records_; }
-  IST_HD int side_of(std::uint32_t r) const { return room_.records[r].of_b; }
+  IST_HD int side_of(std::uint32_t r) const { return work_.records[r].of_b; }
   IST_HD std::uint32_t record_of(int side, std::uint32_t block) const {
-    return room_.record[side][block] - 1;
+    return work_.record[side][block] - 1;
   }
-  IST_HD std::uint32_t number_of(std::uint32_t r) const { return room_.records[r].block; }
-  IST_HD std::uint32_t inside_of(std::uint32_t r) const { return room_.records[r].inside; }
-  IST_HD std::uint64_t pierced_of(std::uint32_t r) const { return room_.records[r].all_pierced(); }
+  IST_HD std::uint32_t number_of(std::uint32_t r) const { return work_.records[r].block; }
+  IST_HD std::uint32_t inside_of(std::uint32_t r) const { return work_.records[r].inside; }
+  IST_HD std::uint64_t pierced_of(std::uint32_t r) const { return work_.records[r].all_pierced(); }
   IST_HD std::uint32_t opposite_edge(std::uint32_t r, std::uint32_t t) const {
     return opposite_[kWidth * r + t];
   }
@@ -181,22 +181,22 @@ class OverlapRef {
     const std::uint32_t edge = 3 * t + opposite_edge(r, t);
     const MeshBlock& block = mesh(side_of(r)).blocks[number_of(r)];
     return static_cast<int>(inside_of(r) >> block.corner[edge % 3][t] & 1) +
-           room_.records[r].near_first(edge);
+           work_.records[r].near_first(edge);
   }
 
   IST_HD bool is_inside(int side, std::uint32_t b) const {
-    return (room_.inside[side][b / 32] >> b % 32 & 1) != 0;
+    return (work_.inside[side][b / 32] >> b % 32 & 1) != 0;
   }
   IST_HD bool is_pierced(int side, std::uint32_t b) const {
-    return (room_.pierced[side][b / 32] >> b % 32 & 1) != 0;
+    return (work_.pierced[side][b / 32] >> b % 32 & 1) != 0;
   }
   template <class Visit>
   IST_HD void for_each_inside(int side, const Visit& visit) const {
-    for_each_block(side, room_.inside[side], visit);
+    for_each_block(side, work_.inside[side], visit);
   }
   template <class Visit>
   IST_HD void for_each_pierced(int side, const Visit& visit) const {
-    for_each_block(side, room_.pierced[side], visit);
+    for_each_block(side, work_.pierced[side], visit);
   }
 
   IST_HD exact::Point vertex(int side, std::uint32_t number) const {
@@ -247,7 +247,7 @@ class OverlapRef {
   }
 
  private:
-  /// work(l) of the eight lanes that pieces have.
+  /// Calls work(l) for the eight lanes of pieces.
   template <class Work>
   IST_HD void for_each_lane(const Work& work) {
     for (std::uint32_t l = lane(); l < 8; l += width()) work(l);
@@ -265,7 +265,7 @@ class OverlapRef {
     }
   }
 
-  /// What crossing i adds to octants, in the view of lane l.
+  /// Computes the terms that crossing i adds to octants, in the view of lane l.
   IST_HD void see_octants(std::uint32_t i, std::uint32_t l) {
     OctantPieces& out = pieces_.octants;
     const OctantView& view = pieces_.view;
@@ -319,7 +319,8 @@ class OverlapRef {
     return ist::lane_sums(of.boxes[n / kWidth], of.sums[n / kWidth], n % kWidth,
                           side == 0 ? nullptr : &pair_.place.a_from_b, from);
   }
-  /// Of a crossing's triangles the apexes, and how its edges' ends count that are opposite to one.
+  /// The apexes of a crossing's triangles, and the counts of its ends that are on an edge opposite
+  /// to one.
   IST_HD void find_apexes_of(std::uint32_t i, exact::Point (&apex)[2], double (&times)[2]) const {
     std::uint32_t opposite[2];
     for (int s = 0; s < 2; ++s) {
@@ -342,14 +343,14 @@ class OverlapRef {
         visit(32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
   }
 
-  /// No fewer than vertices inside of the crossed blocks of a side.
+  /// An upper bound of the vertices inside of crossed blocks.
   IST_HD std::uint32_t inside_vertices() const {
     int mine = 0;
     for (std::uint32_t r = lane(); r < records_; r += width()) mine += count_bits(inside_of(r));
     return static_cast<std::uint32_t>(team_.sum(mine));
   }
 
-  /// As the CPU finds crossings: by the blocks, then by the triangles in them.
+  /// Sorts crossings as the CPU finds them: by blocks, then by triangles in them.
   IST_HD void sort(std::uint32_t places) {
     for (std::uint32_t i = lane(); i < places; i += width()) {
       std::uint64_t key = ~std::uint64_t{0};
@@ -362,7 +363,7 @@ class OverlapRef {
     sort_places(team_, places_, places);
   }
 
-  /// Of each triangle of a crossed block the edge that is opposite to its apex.
+  /// Finds, for each triangle of a crossed block, the edge opposite to its apex.
   IST_HD void find_apexes() {
     for (std::uint32_t n = lane(); n < kWidth * records_; n += width()) {
       const std::uint32_t r = n / kWidth, t = n % kWidth;
@@ -374,7 +375,7 @@ class OverlapRef {
     meet();
   }
 
-  /// The whole's sums in the CPU's order.
+  /// Sums the whole overlap in the CPU's order.
   IST_HD void sum_whole() {
     if (leads()) *slots_ = SlotSums();
     meet();
@@ -397,7 +398,7 @@ class OverlapRef {
     }
     if (leads()) whole_.add(slots_->total());
   }
-  /// Blocks inside as a whole, as few lanes of boxes as hold them.
+  /// Adds the blocks that are inside as a whole, by as few nodes as contain them.
   IST_HD void add_insides(int side) {
     const MeshTree& all = mesh(side);
     std::uint32_t waiting = 0;
@@ -407,7 +408,7 @@ class OverlapRef {
       const int level = node.level();
       if (level < all.top) {
         bool whole = false, none = true;
-        look_below(room_.inside[side], all, level + 1, node.number(), whole, none);
+        look_below(work_.inside[side], all, level + 1, node.number(), whole, none);
         if (whole) {
           const LaneSums found = lane_sums_at(side, level + 1, node.number(), origin_);
           whole_.six_volumes.add(found.six_volumes);
@@ -423,7 +424,7 @@ class OverlapRef {
 
   const Team& team_;
   const ExactPair& pair_;
-  const ExactRoom& room_;
+  const ExactWorkspace& work_;
   const std::uint32_t records_;
   const CrossingRef* crossing_;
   const std::uint32_t crossings_;
@@ -434,7 +435,7 @@ class OverlapRef {
   std::uint8_t* opposite_ = nullptr;
   SlotSums* slots_ = nullptr;
   MeshNode* stack_ = nullptr;
-  ExactSums whole_;  ///< of the lane that leads
+  ExactSums whole_;  ///< valid in the leading lane
 };
 
 }  // namespace ist::gpu

@@ -6,31 +6,31 @@
 #include "query/exact/crossing.h"
 #include "query/exact/overlap_formulas.h"
 
-// A pair of triangles, by a single lane.
+// Tests of a pair of triangles, each by a single lane.
 
 namespace ist::gpu {
 
-/// By which signs a pair is told.
+/// The signs that decide a pair.
 enum class Signs {
   doubles,
-  settled,  ///< doubles, where they are the same wherever points move by the room
+  settled,  ///< doubles that stay the same wherever points move within the tolerance
 };
 
 enum class PairSays : std::uint32_t {
   apart,
   crosses,
-  unsure,  ///< the signs do not tell
+  unsure,  ///< the signs do not decide
   wrong,   ///< signs contradict each other
 };
 
-/// What lanes index by what they differ in: as arrays of their own it would lie in slow memory.
+/// Arrays that lanes index differently. As local arrays they would be in slow memory.
 struct CornerMemory {
-  double x[2][3][3][32];                    ///< of A, of B: of a corner
-  double value[2][3][32], error[2][3][32];  ///< heights over the other's plane
-  std::uint32_t asked[9];                   ///< of exact signs, by what they are: a bit a lane
+  double x[2][3][3][32];                    ///< A's, B's; of a corner
+  double value[2][3][32], error[2][3][32];  ///< heights above the other's plane
+  std::uint32_t asked[9];                   ///< exact signs that lanes ask for, a bit for each lane
 };
 
-/// A lane's.
+/// A lane's part of CornerMemory.
 struct CornerView {
   CornerMemory& memory;
   int lane;
@@ -44,11 +44,11 @@ struct CornerView {
   }
   IST_HD double value(int s, int k) const { return memory.value[s][k][lane]; }
   IST_HD double error(int s, int k) const { return memory.error[s][k][lane]; }
-  /// Keeps a corner's height; sets a bit where it lies above, or where its sign is not known.
+  /// Stores a corner's height, and sets a bit if the corner is above, or if its sign is unknown.
   IST_HD void keep(int s, int k, const exact::Determinant& height, int bit, std::uint32_t& above,
                    std::uint32_t& unknown) const {
     memory.value[s][k][lane] = height.value;
-    // Where moving aside decides, the plane may lie on the other side of the corner.
+    // If the symbolic translation decides, the plane may be on the other side of the corner.
     memory.error[s][k][lane] =
         height.error + (height.value * height.sign < 0 ? std::abs(height.value) : 0);
     above |= (height.sign > 0 ? 1u : 0u) << bit;
@@ -56,7 +56,7 @@ struct CornerView {
   }
 };
 
-/// An edge that goes through the other triangle; edge k goes from corner k to the next.
+/// An edge that crosses the other triangle. Edge k leads from corner k to the next.
 struct PiercingEdge {
   std::uint32_t of_b, edge;
 };
@@ -64,46 +64,47 @@ struct PiercingEdge {
 IST_HD inline double largest(const exact::Point& x) {
   return std::fmax(std::abs(x.x), std::fmax(std::abs(x.y), std::abs(x.z)));
 }
-/// What moving points by the room does to a height of r: six products of three numbers.
-IST_HD inline double moved_height(double room, double longest, const exact::Point& r) {
-  return 6 * room * longest * (2 * largest(r) + longest);
+/// A bound of the change of r's height if points move within the tolerance: six products of three
+/// numbers.
+IST_HD inline double moved_height(double tolerance, double longest, const exact::Point& r) {
+  return 6 * tolerance * longest * (2 * largest(r) + longest);
 }
 
-/// Which corners of a side lie above the other's triangle, a bit each; those that are `unknown`.
+/// The corners of a side above the other's triangle, a bit each, and those that are `unknown`.
 template <Signs kBy>
 IST_HD std::uint32_t corners_above(const CornerView& pair, int s, const exact::Point& aside,
-                                   double room, std::uint32_t& unknown) {
+                                   double tolerance, std::uint32_t& unknown) {
   const exact::Point o = pair.corner(1 - s, 0), p = pair.corner(1 - s, 1) - o,
                      q = pair.corner(1 - s, 2) - o;
   const exact::FilteredPlane plane(p, q, (s == 1 ? 1 : -1) * aside);
-  const double longest = std::fmax(largest(p), largest(q)) + room;
+  const double longest = std::fmax(largest(p), largest(q)) + tolerance;
   std::uint32_t bits = 0;
   unknown = 0;
-  // Loops stay rolled: what runs seldom must not crowd the device's instruction cache.
+  // Loops stay rolled, since rare code must not fill the instruction cache.
   IST_ROLLED
   for (int k = 0; k < 3; ++k) {
     const exact::Point r = pair.corner(s, k) - o;
-    pair.keep(
-        s, k,
-        kBy == Signs::settled ? plane.height(r, moved_height(room, longest, r)) : plane.height(r),
-        k, bits, unknown);
+    pair.keep(s, k,
+              kBy == Signs::settled ? plane.height(r, moved_height(tolerance, longest, r))
+                                    : plane.height(r),
+              k, bits, unknown);
   }
   return bits;
 }
 
-/// Edges that go through the other's plane, a bit each.
+/// The edges that cross the other's plane, a bit each.
 IST_HD inline std::uint32_t edges_through(std::uint32_t above) {
   return above ^ (above >> 1 | (above & 1) << 2);
 }
 
-/// Which ways round A's edges go about B's, a bit each: 3 · A's + B's.
+/// The signs of the volumes spanned by an edge of A and one of B, at bit 3 · A's + B's.
 struct WaysRound {
   std::uint32_t asked = 0, known = 0, positive = 0;
 };
-/// Asks those of edges that go through the other's plane.
+/// Computes the signs for edges that cross the other's plane.
 template <Signs kBy>
 IST_HD WaysRound ways_round(const CornerView& pair, const std::uint32_t (&through)[2],
-                            const exact::Point& aside, double room) {
+                            const exact::Point& aside, double tolerance) {
   WaysRound ways;
   IST_ROLLED
   for (int n = 0; n < 9; ++n) {
@@ -113,9 +114,9 @@ IST_HD WaysRound ways_round(const CornerView& pair, const std::uint32_t (&throug
     const exact::Point u = pair.corner(0, (i + 1) % 3) - p, v = pair.corner(1, (j + 1) % 3) - r;
     double moved = 0;
     if constexpr (kBy == Signs::settled) {
-      const double of_a = largest(u) + room, of_b = largest(v) + room,
+      const double of_a = largest(u) + tolerance, of_b = largest(v) + tolerance,
                    size = largest(between + aside);
-      moved = 6 * room * (of_a * of_b + size * (of_a + of_b));
+      moved = 6 * tolerance * (of_a * of_b + size * (of_a + of_b));
     }
     const int sign = exact::FilteredPlane(u, v, aside).height(between, moved).sign;
     ways.asked |= 1u << n;
@@ -125,9 +126,9 @@ IST_HD WaysRound ways_round(const CornerView& pair, const std::uint32_t (&throug
   return ways;
 }
 
-/// Where they cross, the edges that leave at the start of the segment that they share, and at its
-/// end: A's edges leave B at the start and enter it at the end; B's enter A at the start.
-/// `above`: of A's corners, of B's.
+/// If the triangles cross, finds the edges at the start and end of their common segment: A's edge
+/// leaves B at the start and enters it at the end, B's edge enters A at the start. `above`: for A's
+/// corners and B's.
 IST_HD inline PairSays find_ends(const std::uint32_t (&above)[2], const std::uint32_t (&through)[2],
                                  const WaysRound& ways, PiercingEdge (&end)[2]) {
   int count[2] = {0, 0};
@@ -135,7 +136,7 @@ IST_HD inline PairSays find_ends(const std::uint32_t (&above)[2], const std::uin
   for (std::uint32_t n = 0; n < 6; ++n) {
     const std::uint32_t s = n / 3, k = n % 3;
     const std::uint32_t all = s == 0 ? 7u << 3 * k : 0b1001001u << k, bits = ways.positive & all;
-    // Ways round that differ from each other keep it outside whatever the others are.
+    // Two different signs prove that the edge misses the triangle, whatever the third is.
     if (((s == 0 ? through[0] : through[1]) >> k & 1) == 0 ||
         (bits != 0 && bits != (ways.known & all)))
       continue;
@@ -149,26 +150,26 @@ IST_HD inline PairSays find_ends(const std::uint32_t (&above)[2], const std::uin
   return count[0] == 1 && count[1] == 1 ? PairSays::crosses : PairSays::wrong;
 }
 
-/// What doubles say of a lane's pair.
+/// Decides a lane's pair by doubles.
 template <Signs kBy>
 IST_HD PairSays cross_pair(const CornerView& pair, const exact::Point& aside,
-                           PiercingEdge (&end)[2], double room = 0) {
+                           PiercingEdge (&end)[2], double tolerance = 0) {
   std::uint32_t above[2], unknown[2];
   IST_ROLLED
   for (int s = 1; s >= 0; --s) {
     std::uint32_t without = 0;
-    const std::uint32_t bits = corners_above<kBy>(pair, s, aside, room, without);
+    const std::uint32_t bits = corners_above<kBy>(pair, s, aside, tolerance, without);
     if (without == 0 && (bits == 0 || bits == 7)) return PairSays::apart;
     (s == 0 ? above[0] : above[1]) = bits;
     (s == 0 ? unknown[0] : unknown[1]) = without;
   }
   if ((unknown[0] | unknown[1]) != 0) return PairSays::unsure;
   const std::uint32_t through[2] = {edges_through(above[0]), edges_through(above[1])};
-  return find_ends(above, through, ways_round<kBy>(pair, through, aside, room), end);
+  return find_ends(above, through, ways_round<kBy>(pair, through, aside, tolerance), end);
 }
 
-/// Calls work(lane, item) → bool for each item of which a lane `asks` a bit, by all lanes together:
-/// what few lanes ask takes as long as what all do. Returns where it is true of this lane's.
+/// Calls work(lane, item) → bool for each item whose bit is set in a lane's `asks`. All lanes share
+/// these calls, since few calls by single lanes take as long as many. Returns this lane's results.
 template <int kItems, class Team, class Work>
 IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::uint32_t asks,
                                   const Work& work) {
@@ -210,7 +211,7 @@ IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::u
   return out;
 }
 
-/// What exact signs say of the pair of each lane that `has` one.
+/// Decides by exact signs the pair of each lane that `has` one.
 template <class Team>
 IST_HD PairSays cross_exactly(const Team& team, bool has, const CornerView& pair,
                               const exact::Point& aside, PiercingEdge (&end)[2]) {

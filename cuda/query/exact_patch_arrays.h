@@ -7,16 +7,16 @@
 
 #include "cuda/query/exact_arrays.h"
 
-// Where contact patches by Measure::exact are worked out.
+// The working memory of contact patches by Measure::exact.
 
 namespace ist::gpu {
 
-/// A team's memory that is handed out piece by piece. All lanes ask alike.
-struct PartRoom {
+/// A team's memory that is handed out piece by piece. All lanes make the same calls.
+struct Arena {
   std::byte* at;
   std::byte* end;
 
-  /// Null where there is no more.
+  /// Null if the rest is too small.
   template <class T>
   IST_HD T* take(std::size_t count) {
     constexpr std::size_t kAlign = 16;
@@ -29,10 +29,10 @@ struct PartRoom {
   }
 };
 
-/// Teams search too, as in the later passes of a batch of penetrations.
+/// Teams also search, as in the later passes of penetrations.
 constexpr int kFirstPatchPass = 0;
-/// [bytes] of a team's memory for crossings and parts: a crossing takes about 1 KB.
-IST_HD constexpr std::size_t patch_room(int pass) {
+/// [bytes] of a team's memory for crossings and parts. A crossing takes about 1 KB.
+IST_HD constexpr std::size_t patch_bytes(int pass) {
   return pass == 0 ? 384u << 10 : pass == 1 ? 2u << 20 : 16u << 20;
 }
 
@@ -40,20 +40,20 @@ struct ExactPatchArrays : ExactArrays {
   GpuContactPatches patches;
 
   IST_HD std::size_t bytes_of_team(int pass) const {
-    return searching(pass) + patch_room(pass) + 16 * std::size_t{most_blocks};
+    return searching(pass) + patch_bytes(pass) + 16 * std::size_t{most_blocks};
   }
   IST_HD std::byte* team(int pass, std::uint32_t n) const {
     return memory + n * bytes_of_team(pass);
   }
-  IST_HD ExactRoom room(int pass, std::uint32_t n) const {
-    return ExactRoom::at(team(pass, n), most_blocks, search_pass(pass));
+  IST_HD ExactWorkspace workspace(int pass, std::uint32_t n) const {
+    return ExactWorkspace::at(team(pass, n), most_blocks, search_pass(pass));
   }
-  IST_HD PartRoom part_room(int pass, std::uint32_t n) const {
+  IST_HD Arena arena(int pass, std::uint32_t n) const {
     return {team(pass, n) + searching(pass), team(pass, n + 1)};
   }
 
  private:
-  /// The first two search in as much memory as each other.
+  /// The first two passes search in equal memory.
   IST_HD static int search_pass(int pass) { return pass == 0 ? 1 : pass; }
   IST_HD std::size_t searching(int pass) const {
     return ExactArrays::bytes_of_team(search_pass(pass));

@@ -10,12 +10,12 @@
 namespace ist::gpu {
 namespace {
 
-constexpr unsigned kThreadsEach = 128;  ///< of what one thread does of a pair
+constexpr unsigned kThreadsEach = 128;  ///< of kernels with one thread per pair
 constexpr unsigned kWarps = 2;
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr int kBlocksEach = 4;  ///< a multiprocessor; more leave too few registers
 
-/// Lists pairs whose boxes meet.
+/// Lists the pairs whose boxes intersect.
 __global__ void __launch_bounds__(kThreadsEach)
     sift_patches_of_meshes(const ExactPatchArrays batch) {
   const WarpTeam team;
@@ -30,12 +30,12 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach)
     divide_meshes(const ExactPatchArrays batch, const int pass) {
   __shared__ Raw<ExactWholeMemory, kWarps> memory;
   const unsigned warp = threadIdx.x / 32, team = blockIdx.x * kWarps + warp;
-  const ExactRoom room = batch.room(pass, team);
-  const PartRoom parts = batch.part_room(pass, team);
+  const ExactWorkspace work = batch.workspace(pass, team);
+  const Arena parts = batch.arena(pass, team);
   const std::uint32_t count = load_fresh(&batch.counters->listed[pass]);
-  if (count > 0) clear_marks(WarpTeam(), room);
+  if (count > 0) clear_marks(WarpTeam(), work);
   by_warps(count, &batch.counters->taken[pass], [&](const WarpTeam& of, std::uint32_t k) {
-    patch_pass(of, batch, pass, k, room, parts, memory[warp]);
+    patch_pass(of, batch, pass, k, work, parts, memory[warp]);
   });
 }
 
@@ -45,7 +45,7 @@ void find_exact_patch_grids(Grids& grids) {
   grids.divide_meshes = blocks_at_a_time(divide_meshes, kThreads);
 }
 
-bool has_room(const ExactPatchArrays& batch) {
+bool has_memory(const ExactPatchArrays& batch) {
   return kWarps * batch.bytes_of_team(kExactPasses - 1) <= batch.bytes;
 }
 

@@ -7,18 +7,18 @@
 #include "cuda/query/exact_steps.h"
 #include "query/exact/keep_largest.h"
 
-// A batch of contact patches by Measure::exact, step by step. A team searches a pair, sums it,
-// keeps its crossings and divides it; exact_steps.h has what it does before it divides.
+// The steps of a batch of contact patches by Measure::exact. A team searches a pair, sums it, keeps
+// its crossings and divides it. exact_steps.h has all steps before the division.
 
 namespace ist::gpu {
 
-/// Whether pair i is to be asked; else it is answered. One thread a pair.
+/// True if pair i needs a search; else writes its answer. One thread per pair.
 IST_HD inline bool sift_exact_patches(const ExactPatchArrays& batch, std::uint32_t i) {
   if (batch.patches.count != nullptr) batch.patches.count[i] = 0;
   return sift_exact(batch, i);
 }
 
-/// Writes the parts that are kept as patches of pair i, in the order of their ids.
+/// Writes the parts that are kept as patches of pair i, in order of their ids.
 template <class Team>
 IST_HD void write_parts(const Team& team, const ExactPatchArrays& batch, std::uint32_t i,
                         const PairPlace& place, const exact::Point& origin, double whole,
@@ -48,15 +48,15 @@ IST_HD void write_parts(const Team& team, const ExactPatchArrays& batch, std::ui
     batch.patches.count[i] = static_cast<std::uint32_t>(count);
 }
 
-/// Divides the overlap of pair i into patches; false where the room does not hold what it takes.
-/// `touching`: there is no volume.
+/// Divides the overlap of pair i into patches; false if the arena is too small. `touching`: there
+/// is no volume.
 template <class Team>
 IST_HD bool divide_pair(const Team& team, const ExactPatchArrays& batch, std::uint32_t i,
                         const PairPlace& place, OverlapOctants<OverlapRef<Team>>& overlap,
-                        bool touching, PartRoom& room) {
+                        bool touching, Arena& arena) {
   const std::uint32_t most = batch.patches.most;
   if (most == 0) return true;
-  if (!overlap.place_parts(room)) return false;
+  if (!overlap.place_parts(arena)) return false;
   if (touching) overlap.whole().six_volumes = {};
   const double whole = team.broadcast(overlap.whole().volume(), 0);
   ExactPart* parts = overlap.parts();
@@ -70,7 +70,7 @@ IST_HD bool divide_pair(const Team& team, const ExactPatchArrays& batch, std::ui
   }
   kept = team.broadcast(kept, 0);
   if (most > 1) {
-    if (!overlap.place_octants(room, kept)) return false;
+    if (!overlap.place_octants(arena, kept)) return false;
     const SolidRef &a = solid_of(batch, batch.pairs.a, i), &b = solid_of(batch, batch.pairs.b, i);
     const double scale_a = scale_of(batch.pairs.a, i), scale_b = scale_of(batch.pairs.b, i);
     const bool by_b =
@@ -85,21 +85,21 @@ IST_HD bool divide_pair(const Team& team, const ExactPatchArrays& batch, std::ui
   return true;
 }
 
-/// A pass over the k-th of its pairs. All of a team together.
+/// The work of a pass on the k-th of its pairs. Called by the whole team.
 template <class Team>
 IST_HD void patch_pass(const Team& team, const ExactPatchArrays& batch, int pass, std::uint32_t k,
-                       const ExactRoom& room, PartRoom parts, ExactWholeMemory& memory) {
+                       const ExactWorkspace& work, Arena parts, ExactWholeMemory& memory) {
   const std::uint32_t i = batch.list[pass][k];
   std::uint32_t visits = 0;
-  ExactState state = ExactState::no_room;
-  if (search_pair(team, batch, i, room, memory, visits)) {
+  ExactState state = ExactState::out_of_memory;
+  if (search_pair(team, batch, i, work, memory, visits)) {
     const ExactChain crossing = memory.search.crossing, near = memory.search.near;
     const std::size_t half = static_cast<std::size_t>(parts.end - parts.at) / 2;
     auto* const kept = reinterpret_cast<CrossingRef*>(parts.at);
     ExactCrossings<Team, true, KeepCrossings<Team>> crossings(
-        team, memory.pair, memory.sum, room,
+        team, memory.pair, memory.sum, work,
         {team, kept, static_cast<std::uint32_t>(half / sizeof(CrossingRef))});
-    state = sum_marked(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing, near,
+    state = sum_marked(team, batch, i, work, memory.pair, memory.sum, work.pool, crossing, near,
                        visits, crossings);
     if (state == ExactState::ok || state == ExactState::nothing) {
       team.sync();  // one lane has written what is left
@@ -107,16 +107,16 @@ IST_HD void patch_pass(const Team& team, const ExactPatchArrays& batch, int pass
       const exact::Point origin = memory.sum.origin;
       const bool touching =
           state == ExactState::nothing && find_contact(team, batch, i, memory.pair, memory.search,
-                                                       left, room.waiting, room.most_waiting);
+                                                       left, work.waiting, work.most_waiting);
       team.sync();
       parts.take<CrossingRef>(crossings.count());
-      OverlapOctants<OverlapRef<Team>> overlap(team, memory.pair, room, crossings.records(), kept,
+      OverlapOctants<OverlapRef<Team>> overlap(team, memory.pair, work, crossings.records(), kept,
                                                crossings.count(), origin, memory.pieces);
       state = divide_pair(team, batch, i, memory.pair.place, overlap, touching, parts)
                   ? ExactState::ok
-                  : ExactState::no_room;
+                  : ExactState::out_of_memory;
     }
-    clear_room(team, room, crossings.records());
+    clear_workspace(team, work, crossings.records());
   }
   if (state != ExactState::ok && team.lane() == 0) leave_to_next(batch, pass, i);
 }

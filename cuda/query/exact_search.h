@@ -11,8 +11,8 @@
 
 namespace ist::gpu {
 
-/// Appends a pair of triangles of each lane that `adds`, in their order. Beyond the pool's room
-/// they are only counted, so that the next round knows what it takes.
+/// Appends a pair of triangles from each lane that `adds`, in the order of lanes. Beyond the pool's
+/// capacity pairs are only counted, so that the next round knows what it needs.
 template <class Team>
 IST_HD void append(const Team& team, const ExactPool& pool, ExactChain& chain, bool adds,
                    std::uint32_t a, std::uint32_t b) {
@@ -25,36 +25,37 @@ IST_HD void append(const Team& team, const ExactPool& pool, ExactChain& chain, b
   const std::uint32_t chunks = (before.count + kPairs - 1) / kPairs;  // so far
   const std::uint32_t last = end > chunks * kPairs ? take(team, pool.taken, 1) : before.last;
   const std::uint32_t to = at < chunks * kPairs ? before.last : last;
-  if (adds && to < pool.room) {
+  if (adds && to < pool.capacity) {
     std::uint32_t(&slot)[2] = pool.chunks[to].pair[at % kPairs];
     slot[0] = a;
     slot[1] = b;
   }
   team.sync();  // all have read the chain
   if (team.lane() == 0) {
-    if (last != before.last && chunks > 0 && before.last < pool.room) pool.next[before.last] = last;
+    if (last != before.last && chunks > 0 && before.last < pool.capacity)
+      pool.next[before.last] = last;
     chain = {chunks == 0 ? last : before.first, last, end};
   }
   team.sync();
 }
-/// Whether the pool had room for all of it.
+/// True if the pool has stored the whole chain.
 IST_HD inline bool held(const ExactPool& pool, const ExactChain& chain) {
-  return chain.count == 0 || chain.last < pool.room;
+  return chain.count == 0 || chain.last < pool.capacity;
 }
 
 enum class Apart {
   no,
-  certain,  ///< as doubles tell, B moved aside
-  settled,  ///< wherever points move by the room, too
+  certain,  ///< by doubles, with B translated symbolically
+  settled,  ///< wherever points move within the tolerance, too
 };
 
-/// Whether the plane of the other side's triangle has a side's on one side.
+/// Tests whether the plane of the other side's triangle separates the pair.
 IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uint32_t (&pair)[2]) {
   const std::uint32_t other = side == 0 ? pair[1] : pair[0], one = side == 0 ? pair[0] : pair[1];
   const exact::Point o = of.corner(1 - side, other, 0);
   const exact::Point u = of.corner(1 - side, other, 1) - o, v = of.corner(1 - side, other, 2) - o;
-  const double room = of.reach[0];
-  const double longest = std::fmax(largest(u), largest(v)) + room;
+  const double tolerance = of.reach[0];
+  const double longest = std::fmax(largest(u), largest(v)) + tolerance;
   const exact::FilteredPlane plane(u, v, (side == 1 ? 1 : -1) * of.aside);
   int sum = 0;
   bool settled = true;
@@ -63,16 +64,17 @@ IST_HD inline Apart apart_by_plane(const ExactPair& of, int side, const std::uin
     const exact::Point r = of.corner(side, one, k) - o;
     const exact::Determinant height = plane.height(r);
     sum += height.sign;
-    const double moved = moved_height(2 * room, longest, r);  // moving aside is within the room
+    const double moved = moved_height(2 * tolerance, longest,
+                                      r);  // the symbolic translation is within the tolerance
     settled = settled && std::abs(height.value) > height.error + moved;
   }
   if (sum != 3 && sum != -3) return Apart::no;
   return settled ? Apart::settled : Apart::certain;
 }
 
-/// Of the next so many pairs of triangles that wait keeps those that no plane keeps apart, and
-/// those whose signs might differ if points moved by the room. A function of its own: the search
-/// needs its registers.
+/// Tests the next `count` queued pairs of triangles. Keeps those that no plane separates, and those
+/// whose signs might differ if points moved within the tolerance. This is a function of its own,
+/// since the search needs its registers.
 template <class Team>
 IST_HD void sift_triangles(const Team& team, const ExactPair& of, ExactSearchMemory& memory,
                            std::uint32_t first, std::uint32_t count) {
@@ -88,30 +90,29 @@ IST_HD void sift_triangles(const Team& team, const ExactPair& of, ExactSearchMem
     const Apart by = apart_by_plane(of, side, pair);
     if (by > apart) apart = by;
   }
-  // Blocks that are near once. Those of pairs that may cross are near anyway, but that these are
-  // not settled tells whether solids may touch.
+  // Each pair of near blocks is listed once. Blocks of crossing triangles are near anyway; the list
+  // of near pairs also decides whether solids may touch.
   const std::uint32_t of_a = apart == Apart::certain ? pair[0] / kWidth : kNone,
                       of_b = pair[1] / kWidth;
   const int leads = lowest_bit(team.alike(of_a) & team.alike(of_b));
   const bool again =
       leads != team.lane() || (memory.last_near[0] == of_a && memory.last_near[1] == of_b);
   team.sync();
-  // Pairs of blocks follow each other: those of the last lane come first in the next batch.
+  // Pairs of blocks are consecutive, so those of the last lane may continue in the next batch.
   if (lane == Team::kWidth - 1 && of_a != kNone)
     memory.last_near[0] = of_a, memory.last_near[1] = of_b;
   append(team, memory.pool, memory.crossing, apart == Apart::no, pair[0], pair[1]);
   append(team, memory.pool, memory.near, apart == Apart::certain && !again, pair[0], pair[1]);
 }
 
-/// Pairs of triangles that wait until a team's width of them can be sifted, in the order in which
-/// they come.
+/// A queue of pairs of triangles, which are tested a team's width at a time.
 template <class Team>
 class WaitingTriangles {
  public:
   IST_HD WaitingTriangles(const Team& team, ExactSearchMemory& memory)
       : team_(team), memory_(memory) {}
 
-  /// Each of a lane that has one, 16 · block + lane.
+  /// Adds a pair from each lane that has one, 16 · block + lane.
   IST_HD void add(bool waits, std::uint32_t a, std::uint32_t b) {
     int total = 0;
     const auto before = static_cast<std::uint32_t>(team_.exclusive_count(waits, total));
@@ -127,7 +128,7 @@ class WaitingTriangles {
   IST_HD bool is_empty() const { return count_ == 0; }
   IST_HD bool is_full() const { return count_ >= kBatch; }
 
-  /// Calls sift(first, count) of the next that wait.
+  /// Calls sift(first, count) for the next pairs of the queue.
   template <class Sift>
   IST_HD bool sift_next(const Sift& sift) {
     const std::uint32_t count = count_ < kBatch ? count_ : kBatch, first = head_;
@@ -145,7 +146,7 @@ class WaitingTriangles {
   std::uint32_t head_ = 0, count_ = 0;
 };
 
-/// Nothing is sifted yet.
+/// Empties the lists of found triangles.
 template <class Team>
 IST_HD void begin_sifting(const Team& team, ExactSearchMemory& memory, const ExactPool& pool) {
   if (team.lane() != 0) return;
@@ -154,13 +155,13 @@ IST_HD void begin_sifting(const Team& team, ExactSearchMemory& memory, const Exa
   memory.last_near[0] = memory.last_near[1] = ~0u;
 }
 
-/// Pairs of triangles of both meshes that may cross. Both trees are opened together, depth first;
-/// of pairs of blocks whose boxes and slabs meet the pairs of triangles whose boxes meet, and that
-/// no plane keeps apart in floats, wait until a team's width of them can be sifted.
+/// Finds pairs of triangles of two meshes that may cross. Both trees are traversed together, depth
+/// first. If the boxes and slabs of two blocks intersect, pairs of triangles whose boxes intersect
+/// and that no plane separates in float are queued for the tests in double.
 template <class Team, class Pair = ExactPair>
 class ExactSearch {
  public:
-  /// `waiting`: room for pairs of nodes.
+  /// `waiting`: memory for pending pairs of nodes.
   IST_HD ExactSearch(const Team& team, const Pair& pair, ExactSearchMemory& memory,
                      std::uint64_t* waiting, std::uint32_t most_waiting, const ExactPool& pool)
       : team_(team),
@@ -177,8 +178,8 @@ class ExactSearch {
       waiting_[0] = pair_of(MeshNode::at(pair_.mesh[0].top, 0), MeshNode::at(pair_.mesh[1].top, 0));
   }
 
-  /// Calls sift(first, count) of pairs of triangles that wait. False where that says so, or where
-  /// the memory does not hold the nodes that wait.
+  /// Calls sift(first, count) for queued pairs of triangles. False if sift() returned false or if
+  /// the memory for pending nodes is full.
   template <class Sift>
   IST_HD bool run(const Sift& sift) {
     while (count_ > 0) {
@@ -209,7 +210,7 @@ class ExactSearch {
     return std::uint64_t{a.word} << 32 | b.word;
   }
 
-  /// Numbers two lists' pairs row by row.
+  /// Numbers the pairs of two lists row by row.
   struct Pairs {
     std::uint32_t columns, inverse;
     IST_HD std::uint32_t row(std::uint32_t k) const { return k * inverse >> 16; }
@@ -263,7 +264,7 @@ class ExactSearch {
     return true;
   }
 
-  /// Of the node of a side the child whose box is the i-th, or the node itself.
+  /// The child of a side's node whose box is the i-th in the list, or the node itself.
   IST_HD MeshNode child(int side, std::uint32_t i) const {
     const MeshNode of = node_[side];
     return opens_[side]
@@ -271,7 +272,7 @@ class ExactSearch {
                : of;
   }
 
-  /// Place of a lane's item in the list of its side, of which there are so many before.
+  /// The position of a lane's item in the list of its side. `of_a`, `of_b`: the lists' lengths.
   IST_HD int listed(bool adds, int side, int& of_a, int& of_b) const {
     int more_a = 0, more_b = 0;
     const int before_a = of_a + team_.exclusive_count(adds && side == 0, more_a);
@@ -281,12 +282,12 @@ class ExactSearch {
     return side == 0 ? before_a : before_b;
   }
 
-  // No array is indexed by what lanes differ in: it would lie in memory that is slow.
+  // No array is indexed differently by lanes: it would be in slow memory.
   IST_HD MeshNode node_of(int side) const { return side == 0 ? node_[0] : node_[1]; }
   IST_HD bool opened(int side) const { return side == 0 ? opens_[0] : opens_[1]; }
 
-  /// Of a side's node the l-th child, or the node alone as the first; whether there is one, and
-  /// its box meets that of the other side's node.
+  /// Places the l-th child of a side's node, or the node itself as child 0. True if it exists and
+  /// its box intersects that of the other side's node.
   IST_HD bool place_child(int side, std::uint32_t l, Box& box) const {
     const MeshNode node = child_of(side, l);
     if (opened(side) ? node.number() >= pair_.mesh[side].level[node.level()].count : l > 0)
@@ -298,8 +299,8 @@ class ExactSearch {
     return opened(side) ? MeshNode::at(node.level() - 1, kWidth * node.number() + l) : node;
   }
 
-  /// Of two blocks the triangles whose boxes meet that of the other; of A's how many, and
-  /// 256 · of B's; 0: of a side none.
+  /// Places the triangles of two blocks whose boxes intersect the other block's. Returns their
+  /// number in A plus 256 times that in B; 0 if a side has none.
   IST_HD std::uint32_t place_blocks(std::uint32_t i, std::uint32_t j) {
     block_[0] = child(0, i).number();
     block_[1] = child(1, j).number();
@@ -332,10 +333,10 @@ class ExactSearch {
         out.low.x[axis] = low - wider;
         out.high.x[axis] = high + wider;
       }
-      // Most pairs of blocks end here.
+      // Most pairs of blocks are rejected here.
       const std::uint32_t lanes = team_.ballot(meets);
       if (Team::kWidth == kBoth && (lanes >> kWidth == 0 || lanes << kWidth == 0)) break;
-      // A's box keeps how far its points may move, and B's.
+      // Boxes of both sides hold how far their points may move.
       float ahead = 0;
       if constexpr (Boxes::kAhead)
         ahead = side == 0 ? memory_.boxes[1][j].normal.x[3] : memory_.boxes[0][i].normal.x[3];
@@ -356,12 +357,12 @@ class ExactSearch {
   IST_HD const FloatBlock& float_block(int side) const {
     return in_global_memory(pair_.in_floats[side])[side == 0 ? block_[0] : block_[1]];
   }
-  /// The vertex of a block that the last byte names.
+  /// The vertex of a block that the last byte of `name` selects.
   IST_HD void vertex(int side, std::uint32_t name, float (&out)[3]) const {
     for (int k = 0; k < 3; ++k) out[k] = memory_.vertices[k][side][name & 0xFF];
   }
 
-  /// Their pairs of triangles whose boxes meet: how many.
+  /// Lists the pairs of triangles whose boxes intersect, and returns their number.
   IST_HD int meet_triangles(int rows, int columns) {
     const Pairs of = pairs_of(columns);
     const int pairs = rows * columns;
@@ -384,7 +385,7 @@ class ExactSearch {
     return met;
   }
 
-  /// Of so many of these what no plane keeps apart, as floats tell, waits.
+  /// Queues those of the listed pairs that no plane separates in float.
   IST_HD void test_planes(int first, int met) {
     const int k = first + team_.lane();
     const std::uint32_t pair = memory_.met[k < met ? k : first];
@@ -395,7 +396,7 @@ class ExactSearch {
                kWidth * block_[1] + b.name() % kWidth);
   }
 
-  /// Whether a triangle's plane has another, of a side, on one side for certain.
+  /// True if a triangle's plane has a triangle of the given side certainly on one side.
   IST_HD bool apart_by(const ExactTriangle& plane, std::uint32_t name, int side) const {
     return Boxes::apart_by(plane,
                            [&](int k, float(&x)[3]) { vertex(side, name >> (8 + 8 * k), x); });
@@ -408,11 +409,11 @@ class ExactSearch {
   WaitingTriangles<Team> queue_;
   std::uint64_t* const waiting_;
   const std::uint32_t most_waiting_;
-  MeshNode node_[2] = {};            ///< that are opened
-  bool opens_[2] = {false, false};   ///< whose children are looked at
-  std::uint32_t count_ = 1;          ///< that wait
-  std::uint32_t found_ = 0;          ///< pairs of blocks
-  std::uint32_t block_[2] = {0, 0};  ///< whose triangles are met
+  MeshNode node_[2] = {};            ///< the opened pair
+  bool opens_[2] = {false, false};   ///< sides whose children are visited
+  std::uint32_t count_ = 1;          ///< pending pairs of nodes
+  std::uint32_t found_ = 0;          ///< pairs of blocks found
+  std::uint32_t block_[2] = {0, 0};  ///< the blocks whose triangles are tested
 };
 
 }  // namespace ist::gpu

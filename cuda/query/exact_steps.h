@@ -10,12 +10,12 @@
 #include "cuda/query/exact_search.h"
 #include "query/exact/exact_in_world.h"
 
-// A batch of pairs by Measure::exact, step by step: what a kernel's threads and warps do, and a
-// test's on the host.
+// The steps of a batch by Measure::exact, for the threads and warps of kernels and for tests on the
+// host.
 
 namespace ist::gpu {
 
-/// Whether the boxes of two meshes meet in A's frame.
+/// True if the boxes of two meshes intersect in A's frame.
 IST_HD inline bool boxes_meet(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b) {
   double middle[3], half[3], at[3];
   for (int k = 0; k < 3; ++k) {
@@ -33,7 +33,7 @@ IST_HD inline bool boxes_meet(const MeshTree& a, const MeshTree& b, const Simila
   return true;
 }
 
-/// Whether pair i is to be asked, and its place; else it is answered. One thread a pair.
+/// True if pair i needs a search, and its place; else writes its answer. One thread per pair.
 IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i, PairPlace& place) {
   const PairKind kind = kind_of(batch, i);
   QueryStatus status = QueryStatus::ok;
@@ -60,7 +60,7 @@ IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i) {
   return sift_exact(batch, i, place);
 }
 
-/// What the steps of pair i begin with, once it is placed. One thread a pair.
+/// Computes the input of pair i's steps from its place. One thread per pair.
 IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, ExactFrame& frame) {
   const PairPlace& place = frame.place;
   const MeshTree& a = solid_of(batch, batch.pairs.a, i).mesh;
@@ -85,7 +85,7 @@ IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, Exac
   frame.slack = 2 * frame.pad[1] + 2 * placing_pad(1, still, a) + 2 * frame.reach[0];
 }
 
-/// Places the k-th pair of a round, `listed` among all. One thread a pair.
+/// Places the k-th pair of a round, which is pair `listed` of the whole list. One thread per pair.
 IST_HD inline void place_query(const ExactArrays& batch, std::uint32_t k, std::uint32_t listed) {
   ExactQuery& query = batch.queries[k];
   query.pair = batch.list[0][listed % batch.pairs.count];
@@ -93,7 +93,7 @@ IST_HD inline void place_query(const ExactArrays& batch, std::uint32_t k, std::u
   frame_exactly(batch, query.pair, query.frame);
 }
 
-/// Readies a team's memory for pair i, whose frame is there.
+/// Loads pair i, whose frame is set, into a team's memory.
 template <class Team>
 IST_HD void load_pair(const Team& team, const ExactArrays& batch, std::uint32_t i,
                       ExactPair& pair) {
@@ -108,13 +108,12 @@ IST_HD void load_pair(const Team& team, const ExactArrays& batch, std::uint32_t 
     const int side = k / 12, row = k % 12 / 4, n = k % 4;
     const Similarity& map = side == 0 ? pair.place.b_from_a : pair.place.a_from_b;
     pair.row[side][row].x[n] = static_cast<float>(n < 3 ? map.m[3 * row + n] : map.t[row]);
-    // The place is A's: what it turns into B's is the transpose of what turns into A's.
     if (n < 3) pair.turn[side][row].x[n] = static_cast<float>(map.m[3 * row + n] / map.scale);
   }
   team.sync();
 }
 
-/// Readies it for the k-th pair of a round.
+/// Loads a query of a round into a team's memory.
 template <class Team>
 IST_HD void load_query(const Team& team, const ExactArrays& batch, const ExactQuery& query,
                        ExactPair& pair) {
@@ -123,8 +122,8 @@ IST_HD void load_query(const Team& team, const ExactArrays& batch, const ExactQu
   load_pair(team, batch, query.pair, pair);
 }
 
-/// Adds what the lanes have summed, always in one order, and answers pair i; whether its volume is
-/// no more than sums round.
+/// Adds the lanes' sums, always in one order, and writes the answer of pair i. True if its volume
+/// is within the rounding of the sums.
 template <class Team>
 IST_HD bool write_exact(const Team& team, const ExactArrays& batch, std::uint32_t i,
                         const ExactPair& pair, ExactSumMemory& memory, std::uint32_t visits,
@@ -169,34 +168,36 @@ IST_HD bool write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   return nothing;
 }
 
-/// Of a room that no pair had yet.
+/// Clears the marks of a workspace that no pair has used yet.
 template <class Team>
-IST_HD void clear_marks(const Team& team, const ExactRoom& room) {
-  const std::ptrdiff_t words = room.flood - room.record[0];
-  for (std::ptrdiff_t w = team.lane(); w < words; w += Team::kWidth) room.record[0][w] = 0;
+IST_HD void clear_marks(const Team& team, const ExactWorkspace& work) {
+  const std::ptrdiff_t words = work.flood - work.record[0];
+  for (std::ptrdiff_t w = team.lane(); w < words; w += Team::kWidth) work.record[0][w] = 0;
   team.sync();
 }
 
-/// Clears what a pair has left in the room.
+/// Clears the marks that a pair has left.
 template <class Team>
-IST_HD void clear_room(const Team& team, const ExactRoom& room, std::uint32_t records) {
+IST_HD void clear_workspace(const Team& team, const ExactWorkspace& work, std::uint32_t records) {
   team.sync();
   for (std::uint32_t r = static_cast<std::uint32_t>(team.lane()); r < records;
        r += static_cast<std::uint32_t>(Team::kWidth))
-    room.record[room.records[r].of_b][room.records[r].block] = 0;
+    work.record[work.records[r].of_b][work.records[r].block] = 0;
   for (int side = 0; side < 2; ++side)
-    for (std::uint32_t w = static_cast<std::uint32_t>(team.lane()); w < room.words;
+    for (std::uint32_t w = static_cast<std::uint32_t>(team.lane()); w < work.words;
          w += static_cast<std::uint32_t>(Team::kWidth))
-      room.near[side][w] = room.pierced[side][w] = room.inside[side][w] = 0;
+      work.near[side][w] = work.pierced[side][w] = work.inside[side][w] = 0;
   team.sync();
 }
 
-/// Answers pair i if it can, ok or nothing, from what was found; marks stay.
+/// Sums pair i from its candidates and writes its answer if the state is `ok` or `nothing`. Marks
+/// remain.
 template <class Team, bool kExactly, class Keep>
 IST_HD ExactState sum_marked(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                             const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
-                             const ExactPool& pool, const ExactChain& crossing,
-                             const ExactChain& near, std::uint32_t visits,
+                             const ExactWorkspace& work, const ExactPair& pair,
+                             ExactSumMemory& memory, const ExactPool& pool,
+                             const ExactChain& crossing, const ExactChain& near,
+                             std::uint32_t visits,
                              ExactCrossings<Team, kExactly, Keep>& crossings) {
   team.sync();
   for (auto& sums : memory.sum)
@@ -206,7 +207,7 @@ IST_HD ExactState sum_marked(const Team& team, const ExactArrays& batch, std::ui
   ExactState state = crossings.run(pool, crossing, near);
   team.sync();
   if (state == ExactState::ok &&
-      !ExactInsides<Team, kExactly>(team, pair, memory, room, crossings.records(),
+      !ExactInsides<Team, kExactly>(team, pair, memory, work, crossings.records(),
                                     crossings.count() > 0)
            .run())
     state = ExactState::unsure;
@@ -217,17 +218,18 @@ IST_HD ExactState sum_marked(const Team& team, const ExactArrays& batch, std::ui
 }
 template <bool kExactly, class Team>
 IST_HD ExactState sum_exactly(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                              const ExactRoom& room, const ExactPair& pair, ExactSumMemory& memory,
-                              const ExactPool& pool, const ExactChain& crossing,
-                              const ExactChain& near, std::uint32_t visits) {
-  ExactCrossings<Team, kExactly> crossings(team, pair, memory, room);
+                              const ExactWorkspace& work, const ExactPair& pair,
+                              ExactSumMemory& memory, const ExactPool& pool,
+                              const ExactChain& crossing, const ExactChain& near,
+                              std::uint32_t visits) {
+  ExactCrossings<Team, kExactly> crossings(team, pair, memory, work);
   const ExactState state =
-      sum_marked(team, batch, i, room, pair, memory, pool, crossing, near, visits, crossings);
-  clear_room(team, room, crossings.records());
+      sum_marked(team, batch, i, work, pair, memory, pool, crossing, near, visits, crossings);
+  clear_workspace(team, work, crossings.records());
   return state;
 }
 
-/// What a pass has no room for goes to the next.
+/// Leaves a pair that needs more memory to the next pass.
 IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32_t i) {
   if (pass + 1 < kExactPasses)
     batch.list[pass + 1][atomic_add(&batch.counters->listed[pass + 1], 1)] = i;
@@ -239,22 +241,22 @@ IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32
 IST_HD inline ExactRound& round_of(const ExactArrays& batch, std::uint32_t n) {
   return batch.counters->round[n % 2];
 }
-/// Pairs of a round that begins with the first-th of those listed.
+/// The number of pairs of a round that begins at `first` of the list.
 IST_HD inline std::uint32_t pairs_from(const ExactArrays& batch, std::uint32_t first) {
   const std::uint32_t left = batch.counters->listed[0] - first;
-  return left < batch.query_room ? left : batch.query_room;
+  return left < batch.query_capacity ? left : batch.query_capacity;
 }
 IST_HD inline std::uint32_t searched_of(const ExactRound& round) {
   return round.searched < round.count ? round.searched : round.count;
 }
-/// Where the round after this one begins.
+/// The position in the list at which the next round begins.
 IST_HD inline std::uint32_t end_of(const ExactRound& round) {
   return round.first + searched_of(round);
 }
 
-/// Whether the n-th round has room for one more pair, as far as can be told: each that is searched
-/// may take as many chunks as those of the last round took; at first, as those that are done. Of
-/// teams that begin at the same time none sees what the others take: each counts those `before` it.
+/// Estimates if round n has memory for one more pair. Each pair in progress may take as many chunks
+/// as one of the last round did or, in the first round, as one that is finished. Teams that begin
+/// at the same time do not see each other's chunks, so each counts the teams `before` it.
 IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint32_t before) {
   constexpr std::uint32_t kLeastChunks = 4;
   const ExactRound &last = round_of(batch, n + 1), &round = round_of(batch, n);
@@ -264,10 +266,11 @@ IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint3
   const std::uint32_t found = atomic_load(&round.found), searched = atomic_load(&round.searched);
   const std::uint32_t busy = searched - found > before ? searched - found : before;
   const std::uint32_t chunks = atomic_load(&round.chunks);
-  return (busy == 0 && chunks == 0) || chunks + std::uint64_t{busy + 1} * each <= batch.pool.room;
+  return (busy == 0 && chunks == 0) ||
+         chunks + std::uint64_t{busy + 1} * each <= batch.pool.capacity;
 }
 
-/// What a search of the k-th pair of a round has found; `all`: its nodes had room.
+/// Stores the result of the search of a round's k-th pair. `all`: its pending nodes fitted.
 template <class Team>
 IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& round,
                        std::uint32_t k, const ExactSearchMemory& memory, bool all,
@@ -276,9 +279,9 @@ IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& r
   ExactQuery& query = batch.queries[k];
   const ExactPool& pool = memory.pool;
   const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
-  query.state = fits ? ExactState::ok : ExactState::no_room;
-  // What others left no chunks for is listed again.
-  if (!fits && round.chunks > batch.pool.room) {
+  query.state = fits ? ExactState::ok : ExactState::out_of_memory;
+  // A pair for which others have left no chunks is listed again.
+  if (!fits && round.chunks > batch.pool.capacity) {
     query.state = ExactState::later;
     batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;
   }
@@ -303,17 +306,17 @@ IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound&
   end_search(team, batch, round, k, memory, all, search.visits);
 }
 
-/// Answers the k-th pair of a round, or of those that doubles do not decide.
+/// Sums the k-th pair of a round, or the k-th of those that doubles do not decide.
 template <bool kExactly, class Team>
 IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& round,
-                      std::uint32_t k, const ExactRoom& room, ExactPair& pair,
+                      std::uint32_t k, const ExactWorkspace& work, ExactPair& pair,
                       ExactSumMemory& memory) {
   if constexpr (kExactly) k = batch.queries[k].unsure;
   ExactQuery& query = batch.queries[k];
   ExactState state = query.state;
   if (state == ExactState::ok) {
     load_query(team, batch, query, pair);
-    state = sum_exactly<kExactly>(team, batch, query.pair, room, pair, memory, batch.pool,
+    state = sum_exactly<kExactly>(team, batch, query.pair, work, pair, memory, batch.pool,
                                   query.crossing, query.near, query.visits);
   }
   if (state == ExactState::ok || state == ExactState::later || team.lane() != 0) return;
@@ -326,7 +329,7 @@ IST_HD void sum_query(const Team& team, const ExactArrays& batch, ExactRound& ro
     leave_to_next(batch, 0, query.pair);
 }
 
-/// Asks the k-th of a round's pairs without a volume whether they touch.
+/// Decides if the k-th of a round's pairs without volume touches.
 template <class Team>
 IST_HD void touch_query(const Team& team, const ExactArrays& batch, std::uint32_t k,
                         ExactPair& pair, ExactContactMemory& memory) {
@@ -336,7 +339,8 @@ IST_HD void touch_query(const Team& team, const ExactArrays& batch, std::uint32_
                ExactSearchMemory::kWaiting);
 }
 
-/// Pairs that a later pass asks; of the first of them also those after the last of `rounds`.
+/// The number of pairs of a later pass. The first of these also takes the pairs after the last of
+/// `rounds`.
 IST_HD inline std::uint32_t pairs_of_pass(const ExactArrays& batch, int pass,
                                           std::uint32_t rounds) {
   const ExactCounters& counters = *batch.counters;
@@ -344,46 +348,49 @@ IST_HD inline std::uint32_t pairs_of_pass(const ExactArrays& batch, int pass,
          (pass == 1 ? counters.listed[0] - end_of(round_of(batch, rounds + 1)) : 0);
 }
 
-/// Pairs of triangles of pair i that may cross, in the room's pool; whether it holds them.
+/// Searches pair i for triangles that may cross, into the workspace's pool. False if they do not
+/// fit.
 template <class Team>
 IST_HD bool search_pair(const Team& team, const ExactArrays& batch, std::uint32_t i,
-                        const ExactRoom& room, ExactWholeMemory& memory, std::uint32_t& visits) {
+                        const ExactWorkspace& work, ExactWholeMemory& memory,
+                        std::uint32_t& visits) {
   team.sync();
   if (team.lane() == 0) {
     place_exactly(batch, i, memory.pair.place);
     frame_exactly(batch, i, memory.pair);
-    *room.pool.taken = 0;
+    *work.pool.taken = 0;
   }
   load_pair(team, batch, i, memory.pair);
-  ExactSearch<Team> search(team, memory.pair, memory.search, room.waiting, room.most_waiting,
-                           room.pool);
+  ExactSearch<Team> search(team, memory.pair, memory.search, work.waiting, work.most_waiting,
+                           work.pool);
   const bool all = search.run([&](std::uint32_t first, std::uint32_t count) {
     sift_triangles(team, memory.pair, memory.search, first, count);
     return true;
   });
   visits = search.visits;
-  return all && held(room.pool, memory.search.crossing) && held(room.pool, memory.search.near);
+  return all && held(work.pool, memory.search.crossing) && held(work.pool, memory.search.near);
 }
 
-/// A later pass over the k-th of its pairs, of which so many are `listed`. All of a team together.
+/// The work of a later pass on the k-th of its pairs. `listed`: their number. Called by the whole
+/// team.
 template <class Team>
 IST_HD void ask_pass(const Team& team, const ExactArrays& batch, int pass, std::uint32_t rounds,
-                     std::uint32_t listed, std::uint32_t k, const ExactRoom& room,
+                     std::uint32_t listed, std::uint32_t k, const ExactWorkspace& work,
                      ExactWholeMemory& memory) {
   const std::uint32_t i =
       k < listed
           ? batch.list[pass][k]
           : batch.list[0][(end_of(round_of(batch, rounds + 1)) + (k - listed)) % batch.pairs.count];
   std::uint32_t visits = 0;
-  const bool all = search_pair(team, batch, i, room, memory, visits);
+  const bool all = search_pair(team, batch, i, work, memory, visits);
   const ExactChain crossing = memory.search.crossing, near = memory.search.near;
-  ExactState state = ExactState::no_room;
+  ExactState state = ExactState::out_of_memory;
   if (all)
-    state = sum_exactly<true>(team, batch, i, room, memory.pair, memory.sum, room.pool, crossing,
+    state = sum_exactly<true>(team, batch, i, work, memory.pair, memory.sum, work.pool, crossing,
                               near, visits);
   if (state == ExactState::nothing) {
     const ExactLeft left = memory.sum.left;
-    find_contact(team, batch, i, memory.pair, memory.search, left, room.waiting, room.most_waiting);
+    find_contact(team, batch, i, memory.pair, memory.search, left, work.waiting, work.most_waiting);
   } else if (state != ExactState::ok && team.lane() == 0)
     leave_to_next(batch, pass, i);
 }

@@ -7,7 +7,7 @@
 #include "cuda/query/ball_tests.h"
 #include "cuda/query/field_walk.h"
 
-// Boxes and terrains: fields whose triangles are made on the spot (query/shape/patch_shapes.h).
+// Boxes and terrains: fields whose triangles are generated on demand (query/shape/patch_shapes.h).
 
 namespace ist::gpu {
 
@@ -20,12 +20,12 @@ struct FacetWalkMemory : WalkMemory {
   TestMemory<FacetId> tests;
 };
 
-/// The triangles of a box or a terrain (BallTests).
+/// The triangles of a box or a terrain, as a Source of BallTests.
 class FacetSource {
  public:
   using Id = FacetId;
 
-  /// `whole`: a ball around all that is asked for.
+  /// `whole`: a ball around all that is queried.
   IST_HD FacetSource(const FieldRef& field, const double (&whole)[4])
       : field_(field), whole_(whole) {}
 
@@ -41,7 +41,7 @@ class FacetSource {
     grid_point(second ? i : i + 1, j + 1, c[2]);
   }
 
-  /// The triangles that may come near a ball, by number.
+  /// The triangles that may be near a ball, by number.
   class Near {
    public:
     Near() = default;
@@ -91,7 +91,7 @@ class FacetSource {
                       x[0], x[1], [&](std::int64_t i, std::int64_t j) { return f.height(i, j); });
   }
 
-  /// A ball that comes near one face of a box, or none, needs no triangles.
+  /// A ball near at most one face of a box needs no triangles.
   IST_HD bool settles(const double (&x)[3], double r, BallPart& part) const {
     if (field_.kind != FieldKind::box) return false;
     int axis;
@@ -117,12 +117,12 @@ class FacetSource {
   const double (&whole_)[4];
 };
 
-/// Finds the balls that the triangles of a box or a terrain meet, part by part; sums those that
-/// lie inside as a whole or come near one face alone.
+/// Finds the balls that the triangles of a box or a terrain intersect, part by part. Sums balls
+/// that are inside as a whole or near a single face.
 template <class Team>
 class FacetWalk {
  public:
-  /// `memory` holds the tree and its place.
+  /// `memory` contains the tree and its place.
   IST_HD FacetWalk(const Team& team, FacetWalkMemory& memory, PartSums& sums)
       : team_(team),
         m_(memory),
@@ -138,8 +138,8 @@ class FacetWalk {
     team_.sync();
   }
 
-  /// take(met, end) takes what is found: more of the same balls follow, or this is the `end` of a
-  /// part. Where it returns false, the rest is gone through without tests.
+  /// Calls take(met, end) with the results. `end`: the part is complete, else more of the same
+  /// balls follow. Once take() returns false, the rest is traversed without tests.
   template <class Take>
   IST_HD void run(const Take& take) {
     FieldWalk<Team> walk(team_, m_, sums_);
@@ -147,7 +147,7 @@ class FacetWalk {
   }
 
  private:
-  /// Tests leaf blocks; none: hands over what is left.
+  /// Tests leaf blocks, or without any hands over the rest.
   template <class Take>
   IST_HD void add(const std::uint32_t* blocks, int have, const Take& take) {
     for (int next = 0; goes_on_;) {
@@ -157,7 +157,7 @@ class FacetWalk {
         stage_more();
       } else if (ends && have > 0 && next == have) {
         return;
-      } else if (ends && have > 0 && tests_.room()) {
+      } else if (ends && have > 0 && tests_.has_space()) {
         begin(blocks[next++]);
       } else {
         goes_on_ = take(tests_.met(), ends);
@@ -182,7 +182,7 @@ class FacetWalk {
     team_.sync();
   }
 
-  /// Readies the block's test against the next of the triangles that may come near it.
+  /// Stages the block's test against the next triangles that may be near it.
   IST_HD void stage_more() {
     std::uint32_t near = 0;
     for (int i = 0; i < kItemsALane; ++i) {
@@ -196,7 +196,7 @@ class FacetWalk {
         m_.tests.id[place] = id;
         m_.tests.seen.see(place, c);
         comes = m_.field.kind == FieldKind::box ||
-                SeenTriangles::meets(m_.tests.seen.from_centre(place), 1 + kSeenRoom);
+                SeenTriangles::meets(m_.tests.seen.from_centre(place), 1 + kSeenTolerance);
       }
       near |= team_.ballot(comes) << (i * Team::kWidth);
     }
@@ -219,11 +219,11 @@ class FacetWalk {
   const FacetSource source_;
   BallTests<Team, FacetSource> tests_;
   bool goes_on_ = true;
-  std::uint32_t block_ = 0;                   ///< in work
+  std::uint32_t block_ = 0;                   ///< the current block
   bool first_ = false;                        ///< it has not been tested
   bool seen_ = false;                         ///< the triangles of a box are, for all blocks
   FacetSource::Near near_;                    ///< triangles that may come near it
-  std::uint64_t near_size_ = 0, staged_ = 0;  ///< how many, and how many were tested
+  std::uint64_t near_size_ = 0, staged_ = 0;  ///< the number of near triangles, and of those staged
 };
 
 }  // namespace ist::gpu

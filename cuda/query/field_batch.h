@@ -8,24 +8,24 @@
 #include "cuda/query/field_walk.h"
 #include "cuda/query/lens_sums.h"
 
-// A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. What is summed is in
-// double. Whichever is A, the field stands first here: the tree is placed as the field sees it.
+// A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. Sums are in double.
+// Whichever is A, the field comes first here: the tree is placed in the field's frame.
 
 namespace ist::gpu {
 
-/// Counters of a round of pairs that triangles meet (triangle_steps.h).
+/// The counters of a round of pairs with triangles (triangle_steps.h).
 struct TriangleRound {
-  std::uint32_t first;   ///< of those listed
+  std::uint32_t first;   ///< its first listed pair
   std::uint32_t walked;  ///< from there on, or more than there are
   std::uint32_t parts, words;
   std::uint32_t summed;  ///< parts
 };
 
-/// Counters of a batch with fields: zero at first.
+/// The counters of a batch with fields, initially zero.
 struct FieldCounters {
   std::uint32_t listed[kFieldGroups];  ///< by FieldGroup
-  std::uint32_t taken[kFieldGroups];   ///< of smooth ones, and of those that are in no round
-  std::uint32_t large;                 ///< pairs that found no room in their round
+  std::uint32_t taken[kFieldGroups];   ///< of smooth fields, and of pairs outside rounds
+  std::uint32_t large;                 ///< pairs that did not fit in their round
   TriangleRound round[2];              ///< the one in work, and the one before
 };
 
@@ -34,37 +34,37 @@ constexpr std::uint32_t kNoPart = ~0u;
 /// A pair of a round.
 struct TriangleQuery {
   PairPlace place;
-  LensTotals walked;  ///< of balls that no triangle meets
+  LensTotals walked;  ///< sums of balls that no triangle intersects
   std::uint32_t pair;
   std::uint32_t first_part;  ///< kNoPart: none
-  bool fits;                 ///< parts found room
+  bool fits;                 ///< its parts fit
 };
 
-/// Balls of a pair that triangles meet, as a walk has left them: MetView, in words.
+/// Balls of a pair that triangles intersect, as a traversal has left them: a MetView in words.
 struct MetPart {
-  std::uint32_t query;  ///< of the round
-  std::uint32_t next;   ///< of the same pair, or kNoPart
+  std::uint32_t query;  ///< in the round
+  std::uint32_t next;   ///< the next part of the same pair, or kNoPart
   std::uint32_t first_word;
   std::uint32_t balls, pairs;
   LensTotals totals;
 };
 
-/// Room for a round.
-struct TriangleRoom {
+/// The memory of a round.
+struct TriangleWorkspace {
   TriangleQuery* queries;
   MetPart* parts;
   std::uint32_t* words;
-  std::uint32_t query_room, part_room, word_room;
+  std::uint32_t query_capacity, part_capacity, word_capacity;
 };
 
-/// A batch's pairs of a tree and a field, and what they are worked on in.
+/// A batch's pairs of a tree and a field, and their working memory.
 struct FieldBatch : SolidPairs {
   FieldCounters* counters;
-  std::uint32_t* list[2];  ///< room for all pairs each
-  TriangleRoom room;
+  std::uint32_t* list[2];  ///< each holds all pairs
+  TriangleWorkspace work;
 };
 
-/// Where the k-th pair of a group is listed: no pair is in two.
+/// The place of a group's k-th pair in the list. No pair is in two groups.
 IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std::uint32_t k) {
   return batch.list[group == kSmooth ? 0 : 1][k];
 }
@@ -100,7 +100,7 @@ IST_HD inline void write_field_answer(const FieldBatch& batch, std::uint32_t i,
   write_answer(batch.answers, i, sums, totals);
 }
 
-/// Readies the memory for pair i, but for its place, which is there or after the team's next sync.
+/// Loads pair i into memory. Its place is set, or will be after the team's next sync.
 template <class Team>
 IST_HD void load_solids(const Team& team, const FieldBatch& batch, std::uint32_t i,
                         ProbeMemory& memory) {

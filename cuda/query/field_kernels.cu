@@ -12,7 +12,7 @@ constexpr unsigned kWarps = 3;  ///< whose memory is what a block may have
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr int kBlocksEach = 6;  ///< on a multiprocessor: what registers allow
 
-/// Places every pair and lists those that are not told at once.
+/// Places every pair and lists those that need a sum.
 __global__ void __launch_bounds__(kSiftThreads) sift_field_pairs(const FieldBatch batch) {
   const WarpTeam team;
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;

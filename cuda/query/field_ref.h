@@ -6,7 +6,8 @@
 
 namespace ist::gpu {
 
-/// Those of ist::Shape that a batch knows; none, and one whose numbers are out of range.
+/// The kinds of ist::Shape that a batch supports, `none`, and a shape whose numbers are out of
+/// range.
 enum class FieldKind : std::uint32_t {
   none,
   unusable,
@@ -19,8 +20,7 @@ enum class FieldKind : std::uint32_t {
   height
 };
 
-/// A field of a batch in plain numbers (ist/shapes.h), what it points to being where the batch is
-/// worked on.
+/// A field of a batch in plain numbers (ist/shapes.h). Its pointers are valid where the batch runs.
 struct FieldRef {
   FieldKind kind;
   union {
@@ -34,7 +34,7 @@ struct FieldRef {
   };
 };
 
-/// Kinds that are summed in the same way.
+/// Groups of kinds that are summed in the same way.
 enum FieldGroup { kSmooth, kFacets, kFieldGroups };
 
 IST_HD inline FieldGroup group_of(FieldKind kind) {

@@ -3,11 +3,11 @@
 #include "base/host_device.h"
 #include "cuda/query/field_ref.h"
 
-// Which of a field's shapes (query/shape/plain_shapes.h) a descent looks at.
+// Dispatches to the kinds of fields (query/shape/plain_shapes.h).
 
 namespace ist::gpu {
 
-/// No nearer to the surface than this, negative inside.
+/// A lower bound of the distance to the surface, negative inside.
 IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:
@@ -29,12 +29,12 @@ IST_HD inline double distance_in(const FieldRef& field, const double (&x)[3], bo
   }
 }
 
-/// By how much distances may be off.
+/// The error of distances.
 IST_HD inline double distance_error(const FieldRef& field) {
   return field.kind == FieldKind::grid ? field.grid.error : 0;
 }
 
-/// Of the smooth fields (kSmooth).
+/// The part of a ball inside a smooth field (kSmooth).
 IST_HD inline BallPart part_in(const FieldRef& field, const double (&x)[3], double r, bool& sound) {
   switch (field.kind) {
     case FieldKind::half_space:

@@ -6,12 +6,13 @@
 #include "base/team.h"
 #include "cuda/query/field_batch.h"
 
-// A batch's pairs of a tree and a field, step by step, as batch_steps.h has those of trees; with
-// triangles: triangle_steps.h.
+// The steps of a batch's pairs of a tree and a field, as batch_steps.h has those of trees. Fields
+// with triangles are in triangle_steps.h.
 
 namespace ist::gpu {
 
-/// Which group pair i is of; −1: it is answered, or none of a tree and a field. One thread a pair.
+/// The group of pair i; −1 if it is answered or not a pair of a tree and a field. One thread per
+/// pair.
 IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   if (kind_of(batch, i) != PairKind::tree_and_field) return -1;
   const FieldSides sides(batch, i);
@@ -45,7 +46,7 @@ IST_HD inline int sift_field_pair(const FieldBatch& batch, std::uint32_t i) {
   return -1;
 }
 
-/// Pair i of a smooth field.
+/// Sums pair i of a smooth field.
 template <class Team>
 IST_HD void sum_field_pair(const Team& team, const FieldBatch& batch, std::uint32_t i,
                            WalkMemory& memory) {

@@ -8,8 +8,8 @@
 #include "cuda/query/pair_descent.h"
 #include "cuda/query/part_sums.h"
 
-// A tree gone down against a field that tells how far its surface is: ShapeDescent
-// (query/shape/shape_descent.h) depth first, by one team, two blocks at a time.
+// The traversal of a tree against a field that bounds the distance to its surface: ShapeDescent
+// (query/shape/shape_descent.h), depth first, by one team, two blocks at a time.
 
 namespace ist::gpu {
 
@@ -22,7 +22,7 @@ struct ProbeMemory {
   FieldRef field;
 };
 
-/// A ball of a block of the tree, the field's frame; false if the lane holds none.
+/// Places a ball of a block in the field's frame; false if the lane has none.
 IST_HD inline bool place_ball(const ProbeMemory& m, int level, std::uint32_t block, int lane,
                               double (&x)[3], double& r) {
   const NodeBall ball =
@@ -44,8 +44,8 @@ class FieldWalk {
   IST_HD FieldWalk(const Team& team, WalkMemory& memory, PartSums& sums)
       : team_(team), m_(memory), sums_(sums) {}
 
-  /// False where the field holds what is no number. leaf(blocks, have) sums one leaf block or two,
-  /// and at the end none.
+  /// False if the field contains NaN. leaf(blocks, have) sums one or two leaf blocks, and none at
+  /// the end.
   template <class Leaf>
   IST_HD bool run(const Leaf& leaf) {
     int size = 0, leaves = 0;
@@ -66,7 +66,7 @@ class FieldWalk {
     return !team_.any(!sound_);
   }
 
-  /// Sums the spheres of leaf blocks by themselves: of smooth fields.
+  /// Sums the spheres of leaf blocks one by one, for smooth fields.
   IST_HD void add_spheres(const std::uint32_t* blocks, int have) {
     for (int i = 0; i < kItems / Team::kWidth; ++i) {
       const int item = i * Team::kWidth + team_.lane();

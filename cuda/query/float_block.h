@@ -7,10 +7,11 @@
 
 namespace ist::gpu {
 
-/// A block of a mesh as a search reads it: in floats, and by lanes that follow each other.
+/// A block of a mesh in float, laid out for lanes that read consecutive numbers.
 struct alignas(64) FloatBlock {
-  float x[3][kWidth];            ///< vertices, unit frame
-  std::uint32_t corner[kWidth];  ///< of a triangle the corners' places, a byte each; last 1: it is
+  float x[3][kWidth];  ///< vertices, unit frame
+  std::uint32_t
+      corner[kWidth];  ///< positions of a triangle's corners, a byte each; last byte 1 if it exists
 };
 static_assert(sizeof(FloatBlock) == 256);
 

@@ -4,7 +4,7 @@
 
 #include "base/host_device.h"
 
-// The nearest points of triangles in floats: near enough to tell how far other triangles may be.
+// The nearest points of triangles in float, accurate enough to bound the distance of others.
 
 namespace ist::gpu::single {
 
@@ -41,8 +41,8 @@ IST_HD inline float least_inverted() { return 1e-30f; }
 #include "query/exact/edge_gap_formulas-inl.h"
 #undef IST_FORMULA
 
-/// A triangle whose nearest points are on it to rounding, however thin it is: what they bound is
-/// bounded.
+/// A triangle. Its nearest points are on it up to rounding, however thin it is, so bounds from them
+/// are valid.
 struct Face {
   Vec3 corner, side, other, normal;
   float inverse_normal;
@@ -51,7 +51,7 @@ struct Face {
       : corner(from), side(u), other(v), normal(cross(u, v)) {
     inverse_normal = inverse_of(dot(normal, normal));
   }
-  /// A corner over it.
+  /// The distance of a corner from a triangle.
   template <bool kCornerOfA>
   IST_HD void take(const Vec3& p, NearestPoints& least) const {
     const Vec3 r = p - corner;

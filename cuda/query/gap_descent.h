@@ -10,14 +10,14 @@
 #include "query/base/pair_place.h"
 #include "query/base/precision.h"
 
-// Two trees searched by one team for two minima at once, the gap of the inner spheres and that of
+// One team searches two trees for two minima at once, the gap of the inner spheres and that of
 // their cover balls: depth first, the nearest child first, as GapDescent of query/separation.cpp.
-// Two pairs of one kind are looked at a time: item k of 32 is child, or sphere, k % 16 of pair
-// k / 16.
+// Two pairs of one kind are visited at a time: item k of 32 is child, or sphere, k % 16 of pair k /
+// 16.
 //
-// Gaps in the arithmetic of a block (Real) are lowered by what rounding may have added, and what
-// they do not rule out is measured in double. So both minima are those of all pairs of spheres in
-// double, whatever the order in which they were met.
+// Gaps in the arithmetic of a block (Real) are lowered by their rounding, and those that may still
+// be least are computed in double. So both minima are those of all pairs of spheres in double,
+// whatever the order of visits.
 
 namespace ist::gpu {
 
@@ -32,12 +32,13 @@ IST_HD inline double root(double x) { return sqrt(x); }
 
 constexpr int kGapPairsAtOnce = 2;
 constexpr int kGapItems = kGapPairsAtOnce * static_cast<int>(kWidth);
-/// What waits are groups of children, each deeper than the one below.
-constexpr int kGapRoom = kGapItems * (2 * (kMaxLevels - 1) + 1);
-constexpr int kGapNodeBits = 28;  ///< of a node's number; the rest of a word is level and side
+/// The size of the stack. It holds groups of children, each deeper than the one below.
+constexpr int kGapStack = kGapItems * (2 * (kMaxLevels - 1) + 1);
+constexpr int kGapNodeBits =
+    28;  ///< of a node's number; the rest of a word is the level and a flag
 static_assert(kMaxSpheres == 1u << kGapNodeBits && 2 * kMaxLevels <= 16);
 
-/// What a team needs for a pair of trees.
+/// The state of a team for a pair of trees.
 template <class Real>
 struct GapMemory {
   PairPlace place;
@@ -47,17 +48,17 @@ struct GapMemory {
 
   Real turn[9];           ///< place.a_from_b.m
   GapTotals best;         ///< so far
-  GapTotals before, sum;  ///< of who divides the search: of its first part, of all
-  /// Node of A, << kGapNodeBits: twice the level, and 1 if A is to be opened; of B likewise but for
-  /// the 1.
-  std::uint32_t stack_a[kGapRoom], stack_b[kGapRoom];
-  Real stack_gap[kGapRoom], stack_cover[kGapRoom];  ///< no gap below is less
-  LensSide<Real> near[2][kGapItems];                ///< spheres in play, pair by pair
+  GapTotals before, sum;  ///< of a divided search: of its first part, of all parts
+  /// A node of A; above kGapNodeBits twice the level, plus 1 if A is opened next. For B the same
+  /// without the 1.
+  std::uint32_t stack_a[kGapStack], stack_b[kGapStack];
+  Real stack_gap[kGapStack], stack_cover[kGapStack];  ///< no gap below is less
+  LensSide<Real> near[2][kGapItems];                  ///< spheres in play, pair by pair
   Real near_cover[2][kGapItems];
   std::uint32_t near_sphere[2][kGapItems];
 };
 
-/// Pairs that wait, where all teams see them.
+/// Pending pairs in memory that all teams read.
 struct GapEntries {
   std::uint32_t* a;
   std::uint32_t* b;
@@ -73,10 +74,11 @@ class GapDescent {
     if (team_.lane() == 0)
       for (int i = 0; i < 9; ++i) m_.turn[i] = static_cast<Real>(m_.place.a_from_b.m[i]);
     const double length = span(m_.root(0), m_.root(1), m_.place.a_from_b);
-    // A third more, for limits and gaps are rounded too.
+    // A third more, since limits and gaps are rounded too.
     double margin = ist::distance_error<Real>(length) * (4.0 / 3);
     if (sizeof(Real) == 8) {
-      // Of what is too far apart for double all would be in play: GapTotals::cover is off then.
+      // If the distance exceeds double precision, everything would be a candidate; GapTotals::cover
+      // is inexact then.
       const double most =
           kFarMargin * (m_.tree[0].root[3] + m_.place.a_from_b.scale * m_.tree[1].root[3]);
       margin = margin < most ? margin : most;
@@ -85,7 +87,8 @@ class GapDescent {
     team_.sync();
   }
 
-  /// The roots, and a first bound from a pair of spheres. `covers`: their gaps are asked for.
+  /// Begins with the roots and a first bound from a pair of spheres. `covers`: gaps of cover balls
+  /// are wanted.
   IST_HD void start(bool covers = true) {
     const TreeRef &a = m_.tree[0], &b = m_.tree[1];
     GapTotals first;
@@ -103,7 +106,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// Goes on with what waits as if `before` were all that is known; finish() then has what is new.
+  /// Continues as if `before` were all that is known. finish() then returns what is new.
   IST_HD void restart(const GapTotals& before) {
     if (team_.lane() == 0) m_.best.clear();
     limit_gap_ = limit_of(before.gap);
@@ -112,7 +115,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// `count` pairs that another descent of the same trees left waiting.
+  /// Begins with `count` pending pairs of another traversal of the same trees.
   IST_HD void resume(const GapEntries& from, std::uint32_t first, int count) {
     for (int k = team_.lane(); k < count; k += Team::kWidth) {
       const std::uint32_t at = first + static_cast<std::uint32_t>(k);
@@ -125,7 +128,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// Goes on until no more than `floor` pairs wait, `most` are opened or spheres overlap.
+  /// Runs until at most `floor` pairs are pending, `most` were opened, or spheres overlap.
   IST_HD void run(int floor, std::uint32_t most) {
     while (!overlap()) {
       const int first = wanted_below(size_, floor);
@@ -146,11 +149,11 @@ class GapDescent {
   }
 
   IST_HD int waiting() const { return size_; }
-  /// A gap of nothing is known, so nothing else is of interest.
+  /// Two spheres overlap, so no other pair matters.
   IST_HD bool overlap() const { return limit_gap_ < 0; }
   IST_HD std::uint32_t visits() const { return visits_; }
 
-  /// Puts what came out into memory.best; pairs above `floor` that still wait are given up.
+  /// Writes the result to memory.best. Pending pairs above `floor` are dropped.
   IST_HD void finish(int floor) {
     double least = GapTotals::kNone;
     const bool left = size_ > floor && !overlap();
@@ -193,7 +196,7 @@ class GapDescent {
     return level_of(m_.stack_a[k]) == 0 && level_of(m_.stack_b[k]) == 0;
   }
 
-  /// A limit that no rounding to Real makes smaller; where nothing is below: none.
+  /// Rounds a limit up to Real.
   IST_HD static Real limit_of(double least) {
     constexpr Real kUp = 1 + (sizeof(Real) == 4 ? Real(0x1p-22) : Real(0));
     const Real limit = least < static_cast<double>(kHuge) ? static_cast<Real>(least) : kHuge;
@@ -204,7 +207,7 @@ class GapDescent {
     return gap < limit_gap_ || cover < limit_cover_;
   }
 
-  /// The topmost wanted pair of [floor, top); −1: none is.
+  /// The topmost pair of [floor, top) that may be near enough; −1 if none is.
   IST_HD int wanted_below(int top, int floor) const {
     for (; top > floor; top -= Team::kWidth) {
       const int k = top - 1 - team_.lane();
@@ -221,7 +224,7 @@ class GapDescent {
     int place;  ///< −1: not wanted
   };
 
-  /// Opens one or two pairs; their children go on top, the nearest last.
+  /// Opens one or two pairs. Their children go on top of the stack, the nearest last.
   IST_HD void open(int first, int second, int have) {
     Child child[kItemsALane] = {};
     int count = 0;
@@ -263,7 +266,8 @@ class GapDescent {
     team_.sync();
   }
 
-  /// Child `lane` of the opened node of a pair; its place is 0 if it is wanted.
+  /// Looks at child `lane` of the opened node of a pair. Its position is 0 if it may be near
+  /// enough.
   IST_HD void look_below(std::uint32_t word_a, std::uint32_t word_b, std::uint32_t lane,
                          Child& child) const {
     const bool of_a = (word_a >> kGapNodeBits & 1) != 0;
@@ -300,12 +304,11 @@ class GapDescent {
 
   /// A sphere of one side of a pair of leaves.
   struct Side {
-    LensSide<Real> ball;  ///< in A's axes, from A's block's origin
+    LensSide<Real> ball;  ///< along A's axes, from the origin of A's block
     Real cover;
-    bool there;  ///< in play
+    bool there;  ///< may be nearest
   };
 
-  /// Measures the spheres of one or two pairs of leaves.
   IST_HD void meet(int first, int second, int have) {
     int near[2] = {0, 0}, of_first[2] = {0, 0};
     for (int i = 0; i < kItemsALane; ++i) {
@@ -357,7 +360,7 @@ class GapDescent {
     team_.sync();
   }
 
-  /// The least of what lanes found.
+  /// Keeps the least of what lanes found.
   IST_HD void keep(const GapTotals& mine) {
     limit_gap_ = team_.min(limit_gap_);
     limit_cover_ = team_.min(limit_cover_);
@@ -369,7 +372,7 @@ class GapDescent {
                    cover);
   }
 
-  /// Sphere `lane` of both leaves of a pair, and whether the other's ball leaves it in play.
+  /// Loads sphere `lane` of both leaves of a pair, and tests it against the other's ball.
   IST_HD void look(std::uint32_t leaf_a, std::uint32_t leaf_b, std::uint32_t lane,
                    Side (&side)[2]) const {
     const BallBlock& a = m_.tree[0].blocks[0][leaf_a];
@@ -419,7 +422,7 @@ class GapDescent {
            wanted(((d - sphere.ball.r) - ball.r) - margin_, ((d - sphere.cover) - cover) - margin_);
   }
 
-  /// A pair of spheres in double.
+  /// Computes the gaps of a pair of spheres in double.
   IST_HD void measure(std::uint32_t a, std::uint32_t b, GapTotals& best) {
     const NodeBall ball_a = m_.tree[0].ball(kSphereLevel, a);
     const NodeBall ball_b = m_.tree[1].ball(kSphereLevel, b);

@@ -6,7 +6,7 @@
 
 namespace ist::gpu {
 
-/// What is known of two trees, or of a part of the pairs of their spheres. A's unit frame.
+/// The least gaps of two trees, or of some of their pairs of spheres. A's unit frame.
 struct GapTotals {
   static constexpr double kNone = 1.7976931348623157e308;
 
@@ -22,7 +22,7 @@ struct GapTotals {
     a = b = ~0u;
     visits = spheres = out_of_time = 0;
   }
-  /// Of equal gaps the spheres of lower number.
+  /// Takes a gap if it is less. Of equal gaps the spheres of lower number are kept.
   IST_HD void meet(double new_gap, std::uint32_t new_a, std::uint32_t new_b, double new_cover) {
     if (new_gap < gap || (new_gap == gap && (new_a < a || (new_a == a && new_b < b)))) {
       gap = new_gap;

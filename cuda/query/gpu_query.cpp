@@ -22,27 +22,26 @@ struct GpuWorkspace::Impl {
   std::size_t most_pairs = 0;
   gpu::Grids grids{};
   gpu::DeviceBytes memory;
-  // What does not change from batch to batch; all kinds lie in the same memory.
+  // The constant parts of batches. All kinds of batches share the same memory.
   gpu::BatchArrays arrays{};
   gpu::SeparationArrays separations{};
   gpu::PatchArrays patches{};
   gpu::ExactArrays exact{};
-  std::size_t patch_room = 0;  ///< [bytes] at patches.rooms
+  std::size_t patch_bytes = 0;  ///< [bytes] at patches.rooms
   gpu::FieldCounters* field_counters = nullptr;
-  gpu::TriangleRoom triangle_room{};
+  gpu::TriangleWorkspace triangle_work{};
 };
 
 namespace {
 
-/// Room for what is split. A batch that needs more is answered all the same.
-constexpr std::uint32_t kRoomForSplits = 1 << 16, kRoomForTasks = 1 << 19,
-                        kRoomForEntries = 1 << 21;
-/// A round of pairs that triangles meet, and what they leave to be summed.
-constexpr std::uint32_t kRoomForQueries = 1 << 16, kRoomForParts = 1 << 17, kRoomForWords = 3 << 22;
-/// A round of pairs of meshes, and chunks of triangles for each of them.
-constexpr std::uint32_t kRoomForMeshes = 1 << 15, kChunksEach = 64, kMostChunks = 1 << 19;
-constexpr std::uint32_t kRoomForMeshGaps = 1 << 17;    ///< a round of distances of meshes
-constexpr std::uint32_t kRoomForGapEntries = 1 << 20;  ///< of separations, whose entries are larger
+/// Capacities for split pairs. A batch that needs more is answered too, more slowly.
+constexpr std::uint32_t kSplitCapacity = 1 << 16, kTaskCapacity = 1 << 19, kEntryCapacity = 1 << 21;
+/// Capacities of a round of pairs with triangles.
+constexpr std::uint32_t kQueryCapacity = 1 << 16, kPartCapacity = 1 << 17, kWordCapacity = 3 << 22;
+/// Capacities of a round of pairs of meshes, and their chunks of triangles.
+constexpr std::uint32_t kMeshCapacity = 1 << 15, kChunksEach = 64, kMostChunks = 1 << 19;
+constexpr std::uint32_t kMeshGapCapacity = 1 << 17;   ///< a round of distances of meshes
+constexpr std::uint32_t kGapEntryCapacity = 1 << 20;  ///< of separations, whose entries are larger
 
 }  // namespace
 
@@ -52,7 +51,7 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
   gpu::Queue queue(settings);
   std::vector<gpu::SolidRef> refs(solids.size());
   gpu::SolidRef* at = nullptr;
-  // Twice: for the sizes, then for what lies there.
+  // This runs twice: first for the sizes, then for the arrays.
   const auto place = [&](std::byte* from) {
     gpu::Parts parts(from);
     at = parts.take<gpu::SolidRef>(solids.size());
@@ -97,106 +96,106 @@ int GpuSolids::device() const noexcept { return impl_->device; }
 namespace {
 
 void place_splits(gpu::Parts& parts, gpu::BatchArrays& batch) {
-  batch.splits = parts.take<gpu::SplitPair>(kRoomForSplits);
-  batch.tasks = parts.take<gpu::PairTask>(kRoomForTasks);
-  batch.split_room = kRoomForSplits;
-  batch.task_room = kRoomForTasks;
+  batch.splits = parts.take<gpu::SplitPair>(kSplitCapacity);
+  batch.tasks = parts.take<gpu::PairTask>(kTaskCapacity);
+  batch.split_capacity = kSplitCapacity;
+  batch.task_capacity = kTaskCapacity;
 }
 
-/// Room for pairs that triangles meet: trees in fields need the lists of place_penetrations(), and
-/// not its other memory.
-std::size_t place_triangle_room(std::byte* from, gpu::TriangleRoom& room) {
+/// Memory for pairs with triangles. Trees in fields use the lists of place_penetrations(), but not
+/// its other memory.
+std::size_t place_triangle_work(std::byte* from, gpu::TriangleWorkspace& work) {
   gpu::Parts parts(from);
-  room.queries = parts.take<gpu::TriangleQuery>(kRoomForQueries);
-  room.parts = parts.take<gpu::MetPart>(kRoomForParts);
-  room.words = parts.take<std::uint32_t>(kRoomForWords);
-  room.query_room = kRoomForQueries;
-  room.part_room = kRoomForParts;
-  room.word_room = kRoomForWords;
+  work.queries = parts.take<gpu::TriangleQuery>(kQueryCapacity);
+  work.parts = parts.take<gpu::MetPart>(kPartCapacity);
+  work.words = parts.take<std::uint32_t>(kWordCapacity);
+  work.query_capacity = kQueryCapacity;
+  work.part_capacity = kPartCapacity;
+  work.word_capacity = kWordCapacity;
   return parts.used();
 }
 
-std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& room) {
+std::size_t place_penetrations(std::byte* from, GpuWorkspace::Impl& work) {
   gpu::Parts parts(from);
-  gpu::BatchArrays& arrays = room.arrays;
+  gpu::BatchArrays& arrays = work.arrays;
   arrays.counters = parts.take<gpu::BatchCounters>(1);
-  room.field_counters = parts.take<gpu::FieldCounters>(1);
-  const std::size_t sizes = arrays.size_room > 0 ? gpu::kSizes : 1;
-  arrays.list = parts.take<std::uint32_t>(sizes * room.most_pairs);
-  arrays.detailed = parts.take<std::uint32_t>(room.most_pairs);
+  work.field_counters = parts.take<gpu::FieldCounters>(1);
+  const std::size_t sizes = arrays.size_capacity > 0 ? gpu::kSizes : 1;
+  arrays.list = parts.take<std::uint32_t>(sizes * work.most_pairs);
+  arrays.detailed = parts.take<std::uint32_t>(work.most_pairs);
   const std::size_t lists = parts.used();
-  const std::size_t triangles = place_triangle_room(from + lists, room.triangle_room);
+  const std::size_t triangles = place_triangle_work(from + lists, work.triangle_work);
   place_splits(parts, arrays);
-  arrays.places = parts.take<PairPlace>(kRoomForSplits);
-  arrays.totals = parts.take<gpu::LensTotals>(kRoomForSplits + kRoomForTasks);
-  arrays.entries_a = parts.take<std::uint32_t>(kRoomForEntries);
-  arrays.entries_b = parts.take<std::uint32_t>(kRoomForEntries);
-  arrays.entry_room = kRoomForEntries;
+  arrays.places = parts.take<PairPlace>(kSplitCapacity);
+  arrays.totals = parts.take<gpu::LensTotals>(kSplitCapacity + kTaskCapacity);
+  arrays.entries_a = parts.take<std::uint32_t>(kEntryCapacity);
+  arrays.entries_b = parts.take<std::uint32_t>(kEntryCapacity);
+  arrays.entry_capacity = kEntryCapacity;
   return std::max(parts.used(), lists + triangles);
 }
 
-std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& room) {
+std::size_t place_separations(std::byte* from, GpuWorkspace::Impl& work) {
   gpu::Parts parts(from);
-  gpu::SeparationArrays& arrays = room.separations;
+  gpu::SeparationArrays& arrays = work.separations;
   arrays.counters = parts.take<gpu::BatchCounters>(3);
-  for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(room.most_pairs);
-  arrays.meshes.query_room =
-      static_cast<std::uint32_t>(std::min<std::size_t>(room.most_pairs, kRoomForMeshGaps));
+  for (std::uint32_t*& list : arrays.list) list = parts.take<std::uint32_t>(work.most_pairs);
+  arrays.meshes.query_capacity =
+      static_cast<std::uint32_t>(std::min<std::size_t>(work.most_pairs, kMeshGapCapacity));
   arrays.meshes.rounds = parts.take<gpu::MeshGapRound>(2);
   std::byte* const shared = from + parts.used();
-  arrays.meshes.queries = parts.take<gpu::MeshGapQuery>(arrays.meshes.query_room);
+  arrays.meshes.queries = parts.take<gpu::MeshGapQuery>(arrays.meshes.query_capacity);
   const std::size_t of_meshes = parts.used();
-  // Those of spheres, in the same memory: what these need is done before.
+  // Sphere searches use the same memory, since they are done before.
   parts = gpu::Parts(shared);
   place_splits(parts, arrays.pairs);
-  arrays.totals = parts.take<gpu::GapTotals>(kRoomForSplits + kRoomForTasks);
-  arrays.entries = {parts.take<std::uint32_t>(kRoomForGapEntries),
-                    parts.take<std::uint32_t>(kRoomForGapEntries),
-                    parts.take<double>(kRoomForGapEntries), parts.take<double>(kRoomForGapEntries)};
-  arrays.pairs.entry_room = kRoomForGapEntries;
+  arrays.totals = parts.take<gpu::GapTotals>(kSplitCapacity + kTaskCapacity);
+  arrays.entries = {parts.take<std::uint32_t>(kGapEntryCapacity),
+                    parts.take<std::uint32_t>(kGapEntryCapacity),
+                    parts.take<double>(kGapEntryCapacity), parts.take<double>(kGapEntryCapacity)};
+  arrays.pairs.entry_capacity = kGapEntryCapacity;
   return std::max(of_meshes, static_cast<std::size_t>(shared - from) + parts.used());
 }
 
-/// Rooms of teams take what is left of `bytes`.
-void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
+/// The teams' memory takes the rest of `bytes`.
+void place_patches(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& work) {
   gpu::Parts parts(from);
-  gpu::PatchArrays& arrays = room.patches;
+  gpu::PatchArrays& arrays = work.patches;
   arrays.pairs.counters = parts.take<gpu::BatchCounters>(1);
-  arrays.pairs.list = parts.take<std::uint32_t>(room.most_pairs);
-  room.patch_room = bytes - parts.used();
-  arrays.rooms = from + parts.used();
+  arrays.pairs.list = parts.take<std::uint32_t>(work.most_pairs);
+  work.patch_bytes = bytes - parts.used();
+  arrays.team_memory = from + parts.used();
 }
 
-/// Rooms of teams take what is left of `bytes`; returns what it takes to have all.
-std::size_t place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& room) {
+/// The teams' memory takes the rest of `bytes`. Returns the bytes with which all teams have some.
+std::size_t place_exact(std::byte* from, std::size_t bytes, GpuWorkspace::Impl& work) {
   gpu::Parts parts(from);
-  gpu::ExactArrays& exact = room.exact;
+  gpu::ExactArrays& exact = work.exact;
   exact.counters = parts.take<gpu::ExactCounters>(1);
-  for (std::uint32_t*& list : exact.list) list = parts.take<std::uint32_t>(room.most_pairs);
+  for (std::uint32_t*& list : exact.list) list = parts.take<std::uint32_t>(work.most_pairs);
   exact.memory = from + parts.used();
   exact.bytes = bytes - parts.used();
-  exact.query_room =
-      static_cast<std::uint32_t>(std::min<std::size_t>(room.most_pairs, kRoomForMeshes));
-  exact.pool.room = 1024 + std::min(kChunksEach * exact.query_room, kMostChunks);
-  exact.queries = parts.take<gpu::ExactQuery>(exact.query_room);
-  exact.pool.chunks = parts.take<gpu::ExactChunk>(exact.pool.room);
-  exact.pool.next = parts.take<std::uint32_t>(exact.pool.room);
-  exact.rooms = from + parts.used();
-  return parts.used() + gpu::exact_room_bytes(room.grids, room.most_pairs);
+  exact.query_capacity =
+      static_cast<std::uint32_t>(std::min<std::size_t>(work.most_pairs, kMeshCapacity));
+  exact.pool.capacity = 1024 + std::min(kChunksEach * exact.query_capacity, kMostChunks);
+  exact.queries = parts.take<gpu::ExactQuery>(exact.query_capacity);
+  exact.pool.chunks = parts.take<gpu::ExactChunk>(exact.pool.capacity);
+  exact.pool.next = parts.take<std::uint32_t>(exact.pool.capacity);
+  exact.team_memory = from + parts.used();
+  return parts.used() + gpu::exact_memory_bytes(work.grids, work.most_pairs);
 }
 
-/// Sets the room's arrays to parts of the memory at `from`; returns the bytes they take. All kinds
-/// of batches have the same memory, but for flags that stay 0 between them.
-std::size_t place(std::byte* from, GpuWorkspace::Impl& room) {
-  room.arrays.cut_for(room.most_pairs);
+/// Sets the workspace's arrays to parts of the memory at `from`, and returns the bytes they take.
+/// All kinds of batches share the memory except for flags, which are 0 between batches.
+std::size_t place(std::byte* from, GpuWorkspace::Impl& work) {
+  work.arrays.cut_for(work.most_pairs);
   gpu::Parts flags(from);
-  room.arrays.posted = flags.take<std::uint32_t>(kRoomForTasks);
+  work.arrays.posted = flags.take<std::uint32_t>(kTaskCapacity);
   std::byte* const shared = from + flags.used();
   const std::size_t bytes =
-      std::max({place_penetrations(shared, room), place_separations(shared, room),
-                place_exact(shared, 0, room)});
-  place_patches(shared, bytes, room);
-  place_exact(shared, bytes, room);
+      std::max({place_penetrations(shared, work), place_separations(shared, work),
+                place_exact(shared, 0, work)});
+  place_patches(shared, bytes, work);
+  place_exact(shared, bytes, work);
   return flags.used() + bytes;
 }
 
@@ -217,7 +216,7 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   gpu::find_exact_patch_grids(impl_->grids);
   impl_->memory = gpu::DeviceBytes(queue, settings, place(nullptr, *impl_));
   place(impl_->memory.data(), *impl_);
-  gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kRoomForTasks * sizeof(std::uint32_t),
+  gpu::check(cudaMemsetAsync(impl_->arrays.posted, 0, kTaskCapacity * sizeof(std::uint32_t),
                              queue.stream()),
              "readying a workspace");
   queue.wait();
@@ -248,7 +247,7 @@ GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettin
   const auto place = [&](std::byte* from) {
     gpu::Parts parts(from);
     arrays.rounds = parts.take<gpu::KeptRound>(2);
-    arrays.list = parts.take<std::uint32_t>(std::min<std::size_t>(most_pairs, kRoomForMeshes));
+    arrays.list = parts.take<std::uint32_t>(std::min<std::size_t>(most_pairs, kMeshCapacity));
     arrays.memory = parts.take<std::byte>(most_pairs * arrays.bytes);
     return parts.used();
   };
@@ -269,29 +268,29 @@ std::size_t GpuKept::bytes() const noexcept { return impl_->memory.bytes(); }
 
 namespace {
 
-/// What all kinds of batches begin with; throws where a batch cannot be launched.
+/// Checks the arguments of a batch of any kind, and throws if it cannot be launched.
 gpu::SolidPairs asked_of(const GpuSolids& solids, const GpuPairs& pairs,
-                         const GpuWorkspace::Impl& room, Measure measure,
+                         const GpuWorkspace::Impl& work, Measure measure,
                          const GpuPenetrations& answers) {
   if (measure > Measure::exact) throw Error("GPU: a measure that has no name");
-  if (pairs.count > room.most_pairs)
+  if (pairs.count > work.most_pairs)
     throw Error("GPU: a batch of " + std::to_string(pairs.count) + " pairs; the workspace is for " +
-                std::to_string(room.most_pairs));
-  if (solids.device() != room.device)
+                std::to_string(work.most_pairs));
+  if (solids.device() != work.device)
     throw Error("GPU: the solids are on device " + std::to_string(solids.device()) +
-                ", the workspace on " + std::to_string(room.device));
+                ", the workspace on " + std::to_string(work.device));
   return {solids.impl().refs, static_cast<std::uint32_t>(solids.size()), measure, pairs, answers};
 }
 
-/// Throws where the workspace does not hold what the largest mesh takes.
+/// Throws if the workspace is too small for the largest mesh.
 template <class Arrays>
-Arrays exact_batch(const GpuSolids& solids, const GpuWorkspace::Impl& room,
+Arrays exact_batch(const GpuSolids& solids, const GpuWorkspace::Impl& work,
                    const gpu::SolidPairs& asked) {
   Arrays batch = {};
-  static_cast<gpu::ExactArrays&>(batch) = room.exact;
+  static_cast<gpu::ExactArrays&>(batch) = work.exact;
   static_cast<gpu::SolidPairs&>(batch) = asked;
   batch.most_blocks = solids.impl().most_blocks;
-  if (!gpu::has_room(batch))
+  if (!gpu::has_memory(batch))
     throw Error("GPU: the largest mesh does not fit into a workspace for the exact measure");
   return batch;
 }
@@ -301,74 +300,74 @@ Arrays exact_batch(const GpuSolids& solids, const GpuWorkspace::Impl& room,
 void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrationSettings& settings, GpuWorkspace& workspace,
                        const GpuPenetrations& answers, CUstream_st* stream) {
-  const GpuWorkspace::Impl& room = workspace.impl();
-  const gpu::SolidPairs asked = asked_of(solids, pairs, room, settings.measure, answers);
+  const GpuWorkspace::Impl& work = workspace.impl();
+  const gpu::SolidPairs asked = asked_of(solids, pairs, work, settings.measure, answers);
   if (pairs.count == 0) return;
   if (settings.measure == Measure::exact) {
-    const auto batch = exact_batch<gpu::ExactArrays>(solids, room, asked);
+    const auto batch = exact_batch<gpu::ExactArrays>(solids, work, asked);
     const gpu::ExactKept* kept = nullptr;
     if (settings.kept != nullptr) {
       kept = &settings.kept->impl().arrays;
       if (pairs.count > kept->pairs)
         throw Error("GPU: a batch of " + std::to_string(pairs.count) +
                     " pairs; what is kept is for " + std::to_string(kept->pairs));
-      if (settings.kept->impl().device != room.device)
+      if (settings.kept->impl().device != work.device)
         throw Error("GPU: what is kept is on another device than the workspace");
     }
-    const gpu::DeviceGuard guard(room.device);
-    gpu::launch_exact(batch, kept, room.grids, stream);
+    const gpu::DeviceGuard guard(work.device);
+    gpu::launch_exact(batch, kept, work.grids, stream);
     return;
   }
-  gpu::BatchArrays batch = room.arrays;
+  gpu::BatchArrays batch = work.arrays;
   static_cast<gpu::SolidPairs&>(batch) = asked;
   batch.pair_budget = settings.pair_budget;
   batch.has_details = solids.impl().has_details;
-  const gpu::DeviceGuard guard(room.device);
-  gpu::launch_batch(batch, room.grids, stream);
+  const gpu::DeviceGuard guard(work.device);
+  gpu::launch_batch(batch, work.grids, stream);
   if (!solids.impl().has_fields) return;
-  // In the same memory, once the trees are done with it.
+  // Pairs with fields use the same memory once the trees are done.
   const gpu::FieldBatch fields = {
-      asked, room.field_counters, {room.arrays.list, room.arrays.detailed}, room.triangle_room};
-  gpu::launch_field_batch(fields, solids.impl().has_group, room.grids, stream);
+      asked, work.field_counters, {work.arrays.list, work.arrays.detailed}, work.triangle_work};
+  gpu::launch_field_batch(fields, solids.impl().has_group, work.grids, stream);
 }
 
 void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
                       const GpuSeparationSettings& settings, GpuWorkspace& workspace,
                       const GpuSeparations& answers, CUstream_st* stream) {
-  const GpuWorkspace::Impl& room = workspace.impl();
-  const gpu::SolidPairs asked = asked_of(solids, pairs, room, Measure::inner, {});
+  const GpuWorkspace::Impl& work = workspace.impl();
+  const gpu::SolidPairs asked = asked_of(solids, pairs, work, Measure::inner, {});
   if (pairs.count == 0) return;
-  gpu::SeparationArrays batch = room.separations;
+  gpu::SeparationArrays batch = work.separations;
   static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.answers = answers;
   batch.max_visits = settings.max_visits == 0 ? ~0u : settings.max_visits;
   batch.max_distance = settings.max_distance;
-  const gpu::DeviceGuard guard(room.device);
-  gpu::launch_separations(batch, room.grids, !solids.impl().all_meshes,
+  const gpu::DeviceGuard guard(work.device);
+  gpu::launch_separations(batch, work.grids, !solids.impl().all_meshes,
                           solids.impl().most_blocks > 0, stream);
 }
 
 void contact_patches_batch(const GpuSolids& solids, const GpuPairs& pairs, Measure measure,
                            GpuWorkspace& workspace, const GpuPenetrations& answers,
                            const GpuContactPatches& patches, CUstream_st* stream) {
-  const GpuWorkspace::Impl& room = workspace.impl();
-  const gpu::SolidPairs asked = asked_of(solids, pairs, room, measure, answers);
+  const GpuWorkspace::Impl& work = workspace.impl();
+  const gpu::SolidPairs asked = asked_of(solids, pairs, work, measure, answers);
   if (patches.most > kMostGpuPatches)
     throw Error("GPU: " + std::to_string(patches.most) + " patches a pair; at most " +
                 std::to_string(kMostGpuPatches));
   if (pairs.count == 0) return;
-  const gpu::DeviceGuard guard(room.device);
+  const gpu::DeviceGuard guard(work.device);
   if (measure == Measure::exact) {
-    auto batch = exact_batch<gpu::ExactPatchArrays>(solids, room, asked);
+    auto batch = exact_batch<gpu::ExactPatchArrays>(solids, work, asked);
     batch.patches = patches;
-    gpu::launch_exact_patches(batch, room.grids, stream);
+    gpu::launch_exact_patches(batch, work.grids, stream);
     return;
   }
-  gpu::PatchArrays batch = room.patches;
+  gpu::PatchArrays batch = work.patches;
   static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.patches = patches;
   batch.most_bins = solids.impl().most_bins;
-  gpu::launch_patches(batch, room.grids, room.patch_room, stream);
+  gpu::launch_patches(batch, work.grids, work.patch_bytes, stream);
 }
 
 }  // namespace ist

@@ -10,7 +10,7 @@
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
 
-// What launches all that answers a batch, and waits for nothing.
+// The functions that launch a batch's kernels. None of them waits.
 
 namespace ist::gpu {
 
@@ -20,20 +20,20 @@ struct TriangleGrids {
 
 struct ExactGrids {
   int search;
-  int kept[2];  ///< that keep what they find, that look among what is kept
-  int sum[2];   ///< by signs in doubles, by exact ones
+  int kept[2];  ///< of searches that keep candidates, and of those among kept ones
+  int sum[2];   ///< by signs in doubles, and by exact ones
   int touch, whole;
 };
 
 struct MeshGapGrids {
   int glance;
-  int search[2];  ///< of boxes in float, and in double
+  int search[2];  ///< with boxes in float, and in double
   int measure, finish;
 };
 
-/// Blocks of each kernel that the current device runs at a time.
+/// The number of blocks of each kernel that the current device runs at a time.
 struct Grids {
-  int sum, details;  ///< of a batch of trees
+  int sum, details;  ///< of trees
   int search[2];     ///< of separations, in float and in double
   MeshGapGrids mesh_gaps;
   int divide;            ///< of contact patches
@@ -43,7 +43,7 @@ struct Grids {
   ExactGrids exact;
 };
 
-/// Each sets the members of its kernels.
+/// Each function sets the members of its own kernels.
 void find_batch_grids(Grids& grids);
 void find_separation_grids(Grids& grids);
 void find_patch_grids(Grids& grids);
@@ -53,25 +53,25 @@ void find_exact_patch_grids(Grids& grids);
 TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
-/// `kept`: may be null.
+/// `kept` may be null.
 void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& grids,
                   cudaStream_t stream);
 void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cudaStream_t stream);
-/// Whether a batch's memory holds rooms for its largest mesh.
-bool has_room(const ExactArrays& batch);
-bool has_room(const ExactPatchArrays& batch);
-/// [bytes] of rooms for all teams of a batch of so many pairs at most; fewer is slower.
-std::size_t exact_room_bytes(const Grids& grids, std::size_t most_pairs);
-/// `has_spheres`: some solids have no mesh; `has_meshes`: some have one.
+/// True if a batch's memory suffices for its largest mesh.
+bool has_memory(const ExactArrays& batch);
+bool has_memory(const ExactPatchArrays& batch);
+/// [bytes] of memory with which all teams work on a batch of up to `most_pairs`. Less is slower.
+std::size_t exact_memory_bytes(const Grids& grids, std::size_t most_pairs);
+/// `has_spheres`: some solids have no mesh. `has_meshes`: some have one.
 void launch_separations(const SeparationArrays& batch, const Grids& grids, bool has_spheres,
                         bool has_meshes, cudaStream_t stream);
-/// As many divide contacts as `room_bytes` hold the rooms of.
-void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,
+/// `memory_bytes` limits the number of teams that divide contacts.
+void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t memory_bytes,
                     cudaStream_t stream);
-/// `has`: groups of which there are fields.
+/// `has`: the groups of which there are fields.
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
                         const Grids& grids, cudaStream_t stream);
-/// The pairs with boxes and terrains that a batch of fields has listed.
+/// Launches the listed pairs with boxes and terrains.
 void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
                            cudaStream_t stream);
 

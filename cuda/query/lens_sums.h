@@ -10,7 +10,7 @@ namespace ist::gpu {
 
 constexpr double kPi = std::numbers::pi;
 
-/// What is summed over lenses, A's unit frame; positions from B's unit-frame origin.
+/// The sums over lenses, A's unit frame. Positions are relative to the origin of B's unit frame.
 enum Term {
   kCaps,        ///< 3/π · volume
   kForce,       ///< three: −1/2π · dV/d(translation of B)
@@ -19,18 +19,18 @@ enum Term {
   kTerms = 10
 };
 
-/// A ball as a sum of lenses sees it.
+/// A ball of a lens.
 struct LensBall {
   double at[3], r;
 };
 
 /// Adds the lens of ball A at `lever` and ball B at `apart` from it, lengths times `unit`; false if
-/// they do not meet. Centres no farther apart than `blur`, their rounding, are one: alike balls
-/// then push nowhere, as on the CPU.
+/// they do not intersect. Centres within `blur`, their rounding, are taken as equal, so that equal
+/// balls do not push, as on the CPU.
 ///
-/// What cancels is taken in double, as products of sums: how far the balls reach into each other,
-/// and how far the smaller reaches out of the larger. The rest, lens() of query/kernel/lens.h, then
-/// keeps its digits in float, grazing or not.
+/// Terms that cancel are computed in double as products of sums: the depth of the overlap, and how
+/// far the smaller ball extends beyond the larger. The rest, lens() of query/kernel/lens.h, then
+/// keeps its digits in float, also where balls graze.
 IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double unit, double blur,
                             float (&sum)[kTerms]) {
   const double d2 = std::fma(apart.at[0], apart.at[0],
@@ -78,7 +78,7 @@ IST_HD inline bool add_lens(const LensBall& lever, const LensBall& apart, double
   return true;
 }
 
-/// Adds a ball that lies in another.
+/// Adds a ball that is inside another.
 IST_HD inline void add_ball(const LensBall& ball, double unit, float (&sum)[kTerms]) {
   const double r = ball.r * unit;
   const double caps = 4 * (r * r * r);
@@ -86,19 +86,19 @@ IST_HD inline void add_ball(const LensBall& ball, double unit, float (&sum)[kTer
   for (int k = 0; k < 3; ++k) sum[kMoment + k] += static_cast<float>(caps * (ball.at[k] * unit));
 }
 
-/// How often `unit` was multiplied into a term.
+/// The power of `unit` in a term.
 IST_HD constexpr int power_of(int term) {
   return term < kForce ? 3 : term < kTorque ? 2 : term < kMoment ? 3 : 4;
 }
 
-/// That power of a factor.
+/// A factor to the power of a term.
 IST_HD inline double term_factor(double factor, int term) {
   double out = factor * factor;
   for (int p = power_of(term); p > 2; --p) out *= factor;
   return out;
 }
 
-/// Sums of a pair of trees or of a part of it.
+/// The sums of a pair of trees, or of a part of it.
 struct LensTotals {
   double term[kTerms];
   std::uint32_t spheres;  ///< lenses, and spheres that lie in one of the other side

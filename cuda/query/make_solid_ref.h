@@ -65,7 +65,7 @@ class TreeRegions {
   std::uint32_t ranked_ = 0;
 };
 
-/// The memory that a field points to: heights or distances; none of what is out of range.
+/// The heights or distances that a field points to; none if they are out of range.
 inline std::span<const std::byte> pointed_to(const Shape& field) {
   const auto bytes = [](const auto* from, std::size_t count) {
     return std::as_bytes(std::span(from, count));
@@ -77,7 +77,8 @@ inline std::span<const std::byte> pointed_to(const Shape& field) {
   return {};
 }
 
-/// `at`: where who works on the field finds what it points to. `unusable` if out of range.
+/// `at`: the address of the field's data where the batch runs. The kind is `unusable` if a number
+/// is out of range.
 inline FieldRef field_ref(const Shape& field, const std::byte* at) {
   FieldRef ref = {};
   ref.kind = FieldKind::unusable;
@@ -112,7 +113,7 @@ inline FieldRef field_ref(const Shape& field, const std::byte* at) {
   return ref;
 }
 
-/// Of all nodes, level by level.
+/// The sums of all nodes, level by level.
 inline std::vector<NodeSum> node_sums(const SphereTree& tree) {
   std::vector<NodeSum> sums;
   std::size_t below = 0;
@@ -154,7 +155,7 @@ inline std::vector<FilledBall> filled_balls(const SphereTree& tree) {
   return balls;
 }
 
-/// How far balls reach from a centre.
+/// The radius of a ball about `centre` that contains all balls.
 inline double reach_of(const std::vector<FilledBall>& balls, const double* centre) {
   double reach = 0;
   for (const FilledBall& ball : balls)
@@ -164,8 +165,7 @@ inline double reach_of(const std::vector<FilledBall>& balls, const double* centr
   return reach * (1 + 1e-9);
 }
 
-/// The first of the solids that is an asset with these bytes (are_one_asset(),
-/// query/lod/coincident.h).
+/// The index of the first solid that is the same asset (are_one_asset(), query/lod/coincident.h).
 inline std::uint32_t first_alike(std::span<const GpuSolid> solids, const AssetHeader& of) {
   for (std::uint32_t k = 0;; ++k) {
     const auto* const tree = std::get_if<AssetView>(&solids[k]);
@@ -175,9 +175,9 @@ inline std::uint32_t first_alike(std::span<const GpuSolid> solids, const AssetHe
   }
 }
 
-/// Solid i of a batch. `put`: copies an array to where the batch finds it, and returns the place.
+/// Makes solid i of a batch. `put` copies an array to memory of the batch and returns its address.
 ///
-/// Throws Error for what a batch cannot hold.
+/// Throws Error for a solid that batches do not support.
 template <class Put>
 SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& put) {
   const auto refuse = [i](const char* why) {

@@ -11,8 +11,8 @@
 #include "query/exact/mesh_gap.h"
 #include "query/exact/overlap_formulas.h"
 
-// What the distance of two meshes is worked on in by one team, and how pairs of triangles that may
-// be the nearest wait in it and are measured.
+// A team's memory for the distance of two meshes, with the queue of pairs of triangles that may be
+// the nearest.
 
 namespace ist::gpu {
 
@@ -20,7 +20,7 @@ namespace ist::gpu {
 #include "query/exact/box_gap_formulas-inl.h"
 #undef IST_FORMULA
 
-/// What box formulas are written in.
+/// The number types of box formulas.
 template <class Number>
 struct OneBoxGap {
   using T = Number;
@@ -34,28 +34,28 @@ struct OneBoxGap {
 
 constexpr int kMeshGapPairs = 2;  ///< opened together
 constexpr int kMeshGapItems = kMeshGapPairs * static_cast<int>(kWidth);
-/// What waits are groups of children, each deeper than the one below.
-constexpr int kMeshGapRoom = kMeshGapItems * (2 * (kMaxLevels - 1) + 1);
+/// The size of the stack. It holds groups of children, each deeper than the one below.
+constexpr int kMeshGapStack = kMeshGapItems * (2 * (kMaxLevels - 1) + 1);
 constexpr std::uint32_t kMeshGapQueue = 96;  ///< pairs of triangles to be measured
 
-constexpr std::uint32_t kMeshGapLeft = 32;  ///< of them what a search leaves at most
+constexpr std::uint32_t kMeshGapLeft = 32;  ///< the most that a search leaves in the queue
 
-/// What a team that measures keeps at hand of a pair.
+/// The memory of a team that measures pairs of triangles.
 struct MeshGapPair {
-  Similarity map[2];  ///< to A's frame, to B's
+  Similarity map[2];  ///< to A's frame, and to B's
   MeshTree mesh[2];
   double reach;
   NearestTriangles best;
   exact::Point level;  ///< along which level faces are apart
   std::uint32_t crosses;
   std::uint32_t queue[kMeshGapQueue][2];  ///< pairs of triangles, 16 · block + lane
-  float apart[kMeshGapQueue];             ///< what floats know of their distance: it is no less
+  float apart[kMeshGapQueue];             ///< a lower bound of their distance from floats
 
   IST_HD exact::Point corner(int side, std::uint32_t triangle, int k) const {
     const MeshBlock& block = in_global_memory(mesh[side].blocks)[triangle / kWidth];
     return vertex(side, block.vertex[block.corner[k][triangle % kWidth]]);
   }
-  /// In A's frame.
+  /// A vertex in A's frame.
   IST_HD exact::Point vertex(int side, std::uint32_t number) const {
     const double* const x = in_global_memory(mesh[side].vertices) + std::size_t{3} * number;
     const exact::Point at = {x[0], x[1], x[2]};
@@ -63,32 +63,32 @@ struct MeshGapPair {
   }
 };
 
-/// And one that searches.
+/// The memory of a team that searches.
 template <class Real>
 struct MeshGapMemory : MeshGapPair {
   const FloatBlock* in_floats[2];
-  Quad row[3];  ///< of the map to A's frame, the shift last
+  Quad row[3];  ///< of the map to A's frame, the translation last
   BoxLook<Real, Real> look[2];
   float way[3][3];         ///< the axes of A's look
-  double limit;            ///< what is farther decides nothing
+  double limit;            ///< pairs farther apart than this do not matter
   Real squared_limit;      ///< with what rounds
   Real limit_of_boxes[2];  ///< the same in the frames of A and B
-  /// Of nodes that wait: MeshNode, of A's with a bit more if it is to be opened.
-  std::uint32_t stack_a[kMeshGapRoom], stack_b[kMeshGapRoom];
-  Real stack_squared[kMeshGapRoom];  ///< no nearer than that
+  /// Pending pairs of nodes (MeshNode). A's has a further bit that is set if it is opened next.
+  std::uint32_t stack_a[kMeshGapStack], stack_b[kMeshGapStack];
+  Real stack_squared[kMeshGapStack];  ///< no nearer than that
   Real key[kMeshGapItems];
   ExactTriangle triangles[2][kWidth];  ///< their boxes along the axes of A's look
   float vertices[3][2][kWidth];        ///< of two blocks, A's frame
   std::uint8_t near[2][kWidth];        ///< triangles that may be near enough
   std::uint8_t met[kWidth * kWidth];   ///< pairs of them, 16 · A's + B's
-  WayAxes axes[2];                     ///< as A's look has them, and B's
+  WayAxes axes[2];                     ///< for A's nodes, and for B's
 
-  // In floats: a coordinate in A's frame is off by so much of the reach at most.
+  // The error of a float coordinate in A's frame, relative to the reach.
   static constexpr float kPlacing = 1e-6f;
 
   IST_HD float reach_in_floats() const { return static_cast<float>(reach); }
 
-  /// What floats do to distances of triangles, of the reach.
+  /// The error of triangles' distances in float, relative to the reach.
   static constexpr float kOff = 4 * kPlacing;
   IST_HD float limit_in_floats() const {
     return static_cast<float>(std::fmin(limit, 1e15)) * (1 + 4e-6f) + kOff * reach_in_floats();
@@ -102,7 +102,8 @@ struct MeshGapMemory : MeshGapPair {
     return gap * gap;
   }
 
-  /// A triangle's plane; how high over it, times the length of its normal, all is too far.
+  /// Computes a triangle's plane. Returns the height above it, times the normal's length, beyond
+  /// which all is too far.
   IST_HD float place_plane(const float (&t)[3][3], float far, float size, Quad& n) const {
     float u[3], v[3], longest = 0;
     for (int k = 0; k < 3; ++k) {
@@ -117,7 +118,7 @@ struct MeshGapMemory : MeshGapPair {
       squared = std::fma(n.x[k], n.x[k], squared);
     }
     n.x[3] = -std::fma(n.x[0], t[0][0], std::fma(n.x[1], t[0][1], n.x[2] * t[0][2]));
-    // Sides are off by what places their ends, the normal by that times the other side.
+    // A side has the errors of its ends, and the normal that error times the other side.
     return far * std::sqrt(squared) * (1 + 4e-6f) +
            8 * kPlacing * reach_in_floats() * longest * size;
   }
@@ -133,7 +134,7 @@ struct MeshGapMemory : MeshGapPair {
     return least <= margin && most >= -margin;
   }
 
-  /// A point of B's frame.
+  /// Maps a point of B's frame to A's.
   IST_HD void to_a(float (&x)[3]) const {
     const float own[3] = {x[0], x[1], x[2]};
     for (int axis = 0; axis < 3; ++axis) {
@@ -144,13 +145,13 @@ struct MeshGapMemory : MeshGapPair {
   }
 };
 
-/// By copies, so that the triangles themselves may stay in registers.
+/// The arguments are copies, so that the triangles themselves may stay in registers.
 IST_HD_COLD bool triangles_cross(exact::Point a0, exact::Point a1, exact::Point a2, exact::Point b0,
                                  exact::Point b1, exact::Point b2) {
   return exact::cross_exactly({a0, a1, a2}, {b0, b1, b2});
 }
 
-/// Farther pairs decide nothing. By one lane.
+/// Sets the limit beyond which pairs do not matter. Called by one lane.
 template <class Real>
 IST_HD void limit_to(MeshGapMemory<Real>& m, double distance) {
   constexpr double kMost = sizeof(Real) == 4 ? 5e37 : 1e307;
@@ -164,7 +165,7 @@ IST_HD void limit_to(MeshGapMemory<Real>& m, double distance) {
   m.limit_of_boxes[1] = rounded(squared / (scale * scale));
 }
 
-/// Solids are seen along the way from A to B from now on, unless it is zero.
+/// Sets the direction from A to B along which extents are compared from now on, unless it is zero.
 template <class Real, class Team>
 IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact::Point way) {
   MeshGapMemory<Real>& m = *team.memory(&memory);
@@ -183,7 +184,7 @@ IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact
   team.sync();
 }
 
-/// Something is as near as this, that way.
+/// Records that some points are as near as this, in that direction.
 template <class Real, class Team>
 IST_HD void come_to(const Team& team, MeshGapMemory<Real>& m, double distance,
                     const exact::Point& between) {
@@ -192,8 +193,8 @@ IST_HD void come_to(const Team& team, MeshGapMemory<Real>& m, double distance,
   look_along<Real>(team, m, length > 0 ? (1 / length) * between : exact::Point{0, 0, 0});
 }
 
-/// Measures so many pairs of triangles of the queue, no more than the team is wide. Whether one is
-/// nearer than all before.
+/// Measures `count` pairs of the queue, at most a team's width. True if one is nearer than all
+/// before.
 template <class Team>
 IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32_t first,
                               std::uint32_t count) {
@@ -217,7 +218,7 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   NearestTriangles next = m.best;
   const double before = next.least;
   next.meet(team.min(squared));
-  // Of those that are as near the lowest.
+  // Of equally near pairs the lowest counts.
   const bool wants = has && next.wants(squared, name);
   const std::uint64_t lowest = team.min(wants ? name : NearestTriangles::kNone);
   const bool any_crosses = team.any(crosses);
@@ -240,8 +241,8 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   team.sync();
   return next.least < before && !any_crosses;
 }
-/// Measures the last ones of the queue, of so many; how many are left. What seldom runs are
-/// functions of their own: the search needs its registers, and the device its instruction cache.
+/// Measures the last pairs of a queue and returns the number left. Rare code is in functions of its
+/// own, since the search needs its registers and the device its instruction cache.
 template <class Real, class Team>
 IST_HD_COLD std::uint32_t measure_last(const Team& team, MeshGapMemory<Real>& memory,
                                        std::uint32_t queued) {
@@ -259,8 +260,8 @@ IST_HD_COLD std::uint32_t measure_last(const Team& team, MeshGapMemory<Real>& me
   return left;
 }
 
-/// Appends a pair of triangles of each lane that `adds`, for which there is room; how many there
-/// are.
+/// Appends a pair of triangles from each lane that `adds`, for which there must be space. Returns
+/// the queue's new length.
 template <class Team>
 IST_HD std::uint32_t append(const Team& team, MeshGapPair& m, std::uint32_t queued, bool adds,
                             std::uint32_t a, std::uint32_t b, float apart) {
@@ -275,7 +276,7 @@ IST_HD std::uint32_t append(const Team& team, MeshGapPair& m, std::uint32_t queu
   return queued + static_cast<std::uint32_t>(total);
 }
 
-/// Leaves out of a queue of so many what is certain to be farther; how many are left.
+/// Drops from a queue the pairs that are certainly farther, and returns the number left.
 template <class Team>
 IST_HD_COLD std::uint32_t cull(const Team& team, MeshGapPair& memory, std::uint32_t count,
                                float far) {
@@ -293,9 +294,9 @@ IST_HD_COLD std::uint32_t cull(const Team& team, MeshGapPair& memory, std::uint3
   return left;
 }
 
-/// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
-/// most pairs of level faces, which floats cannot tell from nearer ones. `squared`: the blocks are
-/// no nearer.
+/// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they come
+/// after it. So are most pairs of parallel faces, which floats cannot distinguish from nearer ones.
+/// `squared`: the blocks are no nearer.
 template <class Team>
 IST_HD_COLD bool cannot_answer(const Team& team, const MeshGapPair& m, std::uint32_t a,
                                std::uint32_t b, double squared) {

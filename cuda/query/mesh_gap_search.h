@@ -7,9 +7,9 @@
 #include "cuda/query/mesh_gap_memory.h"
 
 // The distance of two meshes by one team, as MeshGapSearch of query/exact/mesh_distance.cpp: depth
-// first, the nearest child first. Two pairs of nodes are opened together: item k of 32 is child
-// k % 16 of pair k / 16. Of two blocks the triangles that may be near enough are measured in
-// floats, which bounds the distance from above; what may be as near waits to be measured in double.
+// first, the nearest child first. Two pairs of nodes are opened together: item k of 32 is child k %
+// 16 of pair k / 16. Triangles of two blocks that may be near enough are measured in float, which
+// bounds the distance from above. Pairs that may be the nearest are queued and measured in double.
 
 namespace ist::gpu {
 
@@ -30,7 +30,7 @@ class MeshGapSearch {
     look_along<Real>(team_, m_, toward);
   }
 
-  /// Until all that is within the limit is met, or `most` pairs were opened.
+  /// Runs until everything within the limit is visited, or `most` pairs were opened.
   IST_HD void run(double limit, std::uint32_t most) {
     if (team_.lane() == 0) {
       limit_to(m_, limit);
@@ -61,19 +61,19 @@ class MeshGapSearch {
     measure_but(sizeof(Real) == 4 ? kMeshGapLeft : 0);
   }
 
-  /// Measures the first triangles of both: what is stopped has an answer.
+  /// Measures the first triangles of both, so that a stopped search has an answer.
   IST_HD void begin() {
     queued_ = append(team_, m_, queued_, team_.lane() == 0, 0, 0, 0);
     measure_but(0);
   }
-  /// Pairs of triangles that are left in the queue, kMeshGapLeft at most, unless the answer is
-  /// there.
+  /// The number of pairs of triangles left in the queue, at most kMeshGapLeft; 0 if the answer is
+  /// known.
   IST_HD std::uint32_t queued() const { return done() ? 0 : queued_; }
 
   IST_HD bool stopped() const { return stopped_; }
   IST_HD std::uint32_t visits() const { return visits_; }
   IST_HD std::uint32_t tests() const { return tests_; }
-  /// Squared: what waits is no nearer.
+  /// The squared distance than which no pending pair is nearer.
   IST_HD double left() const {
     Real least = kHuge;
     for (int k = team_.lane(); k < size_; k += Team::kWidth)
@@ -101,7 +101,7 @@ class MeshGapSearch {
     return level_b == 0 || (level_a > 0 && a_is_larger);
   }
 
-  /// The topmost below `top` that may still be near enough; −1: none is.
+  /// The topmost pending pair below `top` that may still be near enough; −1 if none is.
   IST_HD int wanted_below(int top) const {
     const Real limit = m_.squared_limit;
     for (; top > 0; top -= Team::kWidth) {
@@ -119,7 +119,7 @@ class MeshGapSearch {
     int place;  ///< −1: too far
   };
 
-  /// Opens one or two pairs; their children go on top, the nearest last.
+  /// Opens one or two pairs. Their children go on top of the stack, the nearest last.
   IST_HD void open(int first, int second) {
     Child child[kItemsALane] = {};
     int count = 0;
@@ -151,15 +151,15 @@ class MeshGapSearch {
     team_.sync();
   }
 
-  /// Drops digits: level faces are equally near but for roundings, and then the lowest number is to
-  /// come first.
+  /// Drops digits. Parallel faces are equally near except for rounding, and then the lowest number
+  /// must come first.
   IST_HD static Real coarse(Real x) {
     if constexpr (sizeof(Real) == 4) return float_of(bits_of(x) & 0xfffff000u);
     return static_cast<Real>(
         float_of(bits_of(static_cast<float>(x < 1e37 ? (x > 0 ? x : 0) : 1e37)) & 0xfffff000u));
   }
 
-  /// Child `lane` of the opened node of a pair that waits; whether it may be near enough.
+  /// Looks at child `lane` of the opened node of a pending pair. True if it may be near enough.
   IST_HD bool look_below(int pair, std::uint32_t lane, Child& child) const {
     const bool of_a = (m_.stack_a[pair] & kOpensA) != 0;
     const MeshNode a = node_a(pair), b = node_b(pair);
@@ -189,7 +189,7 @@ class MeshGapSearch {
     const Real gap = unit * (Real(1 - 2 * kGapRounding<Real>) * squared);
     const Real before = m_.stack_squared[pair];
     child.squared = gap > before ? gap : before;
-    // The distances of solids that are far apart for their size differ in the last digits only.
+    // Distances of solids that are far apart for their size differ in the last digits only.
     child.key = gap <= 0            ? apart
                 : sizeof(Real) == 4 ? coarse(child.squared)
                                     : coarse(Real(1 - kGapsAlike) * child.squared - before);
@@ -205,7 +205,8 @@ class MeshGapSearch {
     return true;
   }
 
-  /// The triangles of two blocks that may be near enough wait. `squared`: the blocks are no nearer.
+  /// Queues the triangles of two blocks that may be near enough. `squared`: the blocks are no
+  /// nearer.
   IST_HD void meet(std::uint32_t a, std::uint32_t b, double squared) {
     if (m_.best.pair != NearestTriangles::kNone && cannot_answer(team_, m_, a, b, squared)) return;
     if constexpr (sizeof(Real) == 4) {
@@ -228,7 +229,7 @@ class MeshGapSearch {
     }
   }
 
-  /// Whether triangles may be within the limit, by where they reach along the axes.
+  /// True if triangles may be within the limit, by their extents along the axes.
   IST_HD bool may_be_near(std::uint32_t of_a, std::uint32_t of_b) const {
     double squared = 0;
     for (const exact::Point& way : m_.axes[0].way) {
@@ -246,7 +247,7 @@ class MeshGapSearch {
     return squared <= static_cast<double>(m_.squared_limit);
   }
 
-  /// Until no more than so many are in the queue, or the answer is there.
+  /// Measures until at most `few` pairs are queued or the answer is known.
   IST_HD void measure_but(std::uint32_t few) {
     IST_ROLLED
     while (queued_ > few && !done()) {
@@ -261,13 +262,13 @@ class MeshGapSearch {
     vertex(side, name >> (8 + 8 * k), x);
     return {x[0], x[1], x[2]};
   }
-  /// The vertex of a block that the last byte names.
+  /// The vertex of a block that the last byte of `name` selects.
   IST_HD void vertex(int side, std::uint32_t name, float (&out)[3]) const {
     for (int k = 0; k < 3; ++k) out[k] = m_.vertices[k][side][name & 0xFF];
   }
 
-  /// Of two blocks the triangles that may be within the limit of the other; and the limit, with all
-  /// that floats are off by.
+  /// Lists the triangles of two blocks that may be within the limit of the other block. Returns the
+  /// limit with all errors of floats.
   IST_HD float place_blocks(std::uint32_t a, std::uint32_t b, int& of_a, int& of_b) {
     const FloatBlock& block_a = in_global_memory(m_.in_floats[0])[a];
     const FloatBlock& block_b = in_global_memory(m_.in_floats[1])[b];
@@ -289,7 +290,7 @@ class MeshGapSearch {
       }
     }
     const float far = m_.limit_in_floats();
-    // Most pairs of blocks end here, by the first axis.
+    // Most pairs of blocks are rejected here, by the first axis.
     float apart = 0, size = far;
     of_a = of_b = 0;
     for (int k = 0; k < 3; ++k) {
@@ -336,14 +337,15 @@ class MeshGapSearch {
     return far;
   }
 
-  /// A triangle's plane, and how high over it, times the length of its normal, all is too far.
+  /// Computes a triangle's plane, and the height above it, times the normal's length, beyond which
+  /// all is too far.
   IST_HD void place_plane(int side, float far, float size, ExactTriangle& out) const {
     const std::uint32_t name = out.name();
     float t[3][3];
     for (int k = 0; k < 3; ++k) vertex(side, name >> (8 + 8 * k), t[k]);
     out.margin() = m_.place_plane(t, far, size, out.plane);
   }
-  /// Whether triangles may be so near: by their boxes, then by the planes of both.
+  /// True if triangles may be within `far`: by their boxes, then by both planes.
   IST_HD bool may_be_near(const ExactTriangle& a, const ExactTriangle& b, float far) const {
     return squared_gap(a, b) <= far * far && reaches(a, b.name(), 1) && reaches(b, a.name(), 0);
   }
@@ -355,13 +357,13 @@ class MeshGapSearch {
     return squared;
   }
 
-  /// Whether a triangle of a side comes so near to another's plane.
+  /// True if a triangle of a side may be that near to another's plane.
   IST_HD bool reaches(const ExactTriangle& plane, std::uint32_t name, int side) const {
     float t[3][3];
     for (int k = 0; k < 3; ++k) vertex(side, name >> (8 + 8 * k), t[k]);
     return m_.reaches(plane.plane, plane.margin(), t);
   }
-  /// Their pairs of triangles that may be near enough: how many.
+  /// Lists the pairs of triangles that may be near enough, and returns their number.
   IST_HD int meet_triangles(int rows, int columns, float far) {
     const int pairs = rows * columns;
     int met = 0;
@@ -379,7 +381,8 @@ class MeshGapSearch {
     return met;
   }
 
-  /// Of a team's width of these the nearest bound the distance; what may be as near waits.
+  /// Measures a team's width of these in float. The nearest bounds the distance, and pairs that may
+  /// be as near are queued.
   IST_HD void look_at_triangles(std::uint32_t a, std::uint32_t b, int first, int met) {
     const int k = first + team_.lane();
     const std::uint32_t pair = m_.met[k < met ? k : first];
@@ -395,7 +398,7 @@ class MeshGapSearch {
     const single::Face face_a(first_a, corner(0, name_a, 1) - first_a,
                               corner(0, name_a, 2) - first_a);
     single::NearestPoints found = {HUGE_VALF, {}, {}};
-    // Loops stay rolled: all of them at once crowd the device's instruction cache.
+    // Loops stay rolled, since unrolled code would fill the instruction cache.
     IST_ROLLED
     for (int c = 0; c < 3; ++c) {
       const single::Vec3 from = corner(0, name_a, c),
@@ -417,7 +420,8 @@ class MeshGapSearch {
       team_.sync();
       come_to<Real>(team_, m_, distance, between);
     }
-    // However they were found, between planes square to that way nothing is nearer.
+    // Between planes perpendicular to that direction nothing is nearer, however the points were
+    // found.
     const single::Vec3 way = found.between;
     const float length = std::sqrt(dot(way, way)) * (1 + 1e-6f);
     float last = -1e30f, next = 1e30f;
@@ -428,7 +432,7 @@ class MeshGapSearch {
     const float apart = length > 0 ? (next - last) / length : 0;
     queued_ = append(team_, m_, queued_, k < met && apart <= m_.limit_in_floats(), kWidth * a + i,
                      kWidth * b + j, apart);
-    // Where floats tell no more, or what waits is in each other's way, doubles have to.
+    // If floats no longer decide, or the queue is full, pairs are measured in double.
     const bool touches = m_.limit <= 2 * double{m_.kOff} * m_.reach;
     if (!touches && queued_ + kBatch <= kMeshGapQueue) return;
     if (!touches) queued_ = cull(team_, m_, queued_, m_.limit_in_floats());

@@ -11,12 +11,12 @@
 #include "query/base/precision.h"
 #include "query/exact/inside_search.h"
 
-// The distances of a batch's meshes, step by step: what a kernel's threads and warps do, and a
-// test's on the host. Answers are those of SurfaceGap (query/separation.cpp).
+// The steps of distances of a batch's meshes, for the threads and warps of kernels and for tests on
+// the host. Answers are those of SurfaceGap (query/separation.cpp).
 
 namespace ist::gpu {
 
-/// The pair's A and B as the query has them.
+/// The placed solid that is A or B in the query.
 IST_HD inline const GpuPlacedSolids& side_of(const SolidPairs& batch, const MeshGapQuery& query,
                                              int side) {
   return (side == 0) == (query.swapped == 0) ? batch.pairs.a : batch.pairs.b;
@@ -26,7 +26,7 @@ IST_HD inline const SolidRef& solid_of(const SolidPairs& batch, const MeshGapQue
   return solid_of(batch, side_of(batch, query, side), query.pair);
 }
 
-/// Of solids that are certain to be farther apart than the caller cares for (farther_than()).
+/// The answer for solids that are certainly farther apart than the caller's limit (farther_than()).
 IST_HD inline SeparationRow farther_row(double most) {
   SeparationRow row = no_row<SeparationRow>(QueryStatus::invalid_input);
   row.distance = row.distance_min = most;
@@ -40,7 +40,7 @@ IST_HD inline MeshGapRound& round_of(const MeshGapArrays& meshes, std::uint32_t 
   return meshes.rounds[n % 2];
 }
 
-/// Places the k-th pair of a round, i of the batch. One thread a pair.
+/// Places the k-th pair of a round, which is pair i of the batch. One thread per pair.
 IST_HD inline void place_mesh_gap(const SeparationArrays& batch, MeshGapRound& round,
                                   std::uint32_t k, std::uint32_t i) {
   MeshGapQuery& query = batch.meshes.queries[k];
@@ -78,7 +78,7 @@ IST_HD inline void place_mesh_gap(const SeparationArrays& batch, MeshGapRound& r
   if (query.single == 0) batch.meshes.queries[atomic_add(&round.in_double, 1)].in_double = k;
 }
 
-/// Inner spheres that meet prove an overlap; else they bound the distance, and show the way.
+/// Inner spheres that intersect prove an overlap. Others bound the distance and give a direction.
 template <class Team>
 IST_HD void glance_at_spheres(const Team& team, const SeparationArrays& batch, std::uint32_t k,
                               GapMemory<float>& memory) {
@@ -113,7 +113,7 @@ IST_HD void glance_at_spheres(const Team& team, const SeparationArrays& batch, s
   if (const double far = norm(way); far > 0) query.toward = way / far;
 }
 
-/// Readies a team's memory for a pair.
+/// Loads a pair into a team's memory.
 template <class Team>
 IST_HD void load_mesh_gap(const Team& team, const SeparationArrays& batch,
                           const MeshGapQuery& query, MeshGapPair& memory) {
@@ -147,7 +147,7 @@ IST_HD void search_mesh_gap(const Team& team, const SeparationArrays& batch, std
   const std::uint32_t visits = batch.max_visits == ~0u ? ~0u : batch.max_visits - query.visits;
   MeshGapSearch<Team, Real> search(team, memory, query.toward);
   if (batch.max_visits != ~0u) search.begin();
-  // Where nothing is as near as it is likely, a solid holds the other, but for roundings.
+  // If nothing is as near as is likely, one solid contains the other, or rounding decides.
   double limit = std::fmin(most, query.likely + slack);
   IST_ROLLED
   for (;;) {
@@ -172,7 +172,7 @@ IST_HD void search_mesh_gap(const Team& team, const SeparationArrays& batch, std
   query.left = left;
 }
 
-/// Measures what the search of the k-th pair of a round has left.
+/// Measures the queued pairs that the search of a round's k-th pair has left.
 template <class Team>
 IST_HD void measure_mesh_gap(const Team& team, const SeparationArrays& batch, std::uint32_t k,
                              MeshGapPair& memory) {
@@ -192,7 +192,7 @@ IST_HD void measure_mesh_gap(const Team& team, const SeparationArrays& batch, st
   if (team.lane() == 0 && memory.crosses != 0) query.overlap = 1;
 }
 
-/// Whether a solid holds a shell of the other, B or A. All of a team together.
+/// True if a solid contains a shell of the other, B or A. Called by the whole team.
 template <class Team>
 IST_HD bool holds_shell(const Team& team, const SolidPairs& batch, const MeshGapQuery& query,
                         bool b_in_a, InsideStack& stack) {
@@ -227,10 +227,11 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
   if (!overlap && query.stopped == 0 && best.least > most * most) {
     row = farther_row(batch.max_distance);
   } else if (overlap || distance == 0) {
-    // Spheres are the solids' own.
+    // Spheres have no error of their own.
     row.distance_max = query.overlap == 2 ? 0 : unit * query.simplified;
   } else {
-    // From the pair that answers: which of those that are alike is the least depends on the search.
+    // From the pair that answers, since which of several equal pairs is the least depends on the
+    // search.
     const double nearest = std::fmin(distance - best.rounding, std::sqrt(query.left));
     const double least = (1 - 1e-12) * nearest - slack;
     row.distance = unit * distance;

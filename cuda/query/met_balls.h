@@ -6,22 +6,22 @@
 #include "cuda/query/field_walk.h"
 #include "cuda/query/part_sums.h"
 
-// What a walk leaves to be summed: balls that triangles meet, each with those that may.
+// The result of a traversal: balls that triangles intersect, each with the triangles that may.
 
 namespace ist::gpu {
 
 constexpr int kHeldBalls = 128;
-constexpr int kPairRoom = 256;      ///< of balls and triangles
+constexpr int kPairCapacity = 256;  ///< of balls and triangles
 constexpr int kPairsAtFirst = 128;  ///< no block's test begins with more
 constexpr std::uint8_t kNotHeld = 255;
 static_assert(kHeldBalls % 32 == 0 && kHeldBalls <= kNotHeld);
-static_assert(kItems == 32 && kPairsAtFirst + kItems <= kPairRoom);  // a word has a bit an item
+static_assert(kItems == 32 && kPairsAtFirst + kItems <= kPairCapacity);  // a word has a bit an item
 
 /// A ball of a tree, 16 · block + lane, and whether its centre is inside, in one word.
 using MetBall = std::uint32_t;
 constexpr MetBall kCentreInside = MetBall{1} << 31;
 
-/// Where they lie. `Id`: of a triangle, by whatever its source calls it.
+/// A view of such balls and pairs. `Id`: the type of a triangle's name.
 template <class Id>
 struct MetView {
   const MetBall* balls;
@@ -33,12 +33,12 @@ struct MetView {
 template <class Id>
 struct MetBalls {
   MetBall balls[kHeldBalls];
-  Id triangles[kPairRoom];
-  std::uint8_t of_ball[kPairRoom];
+  Id triangles[kPairCapacity];
+  std::uint8_t of_ball[kPairCapacity];
 };
 
-/// A ball that lies inside or outside but for cones over what meets it; its centre is at x, the
-/// field's frame.
+/// Adds a ball that is inside or outside except for cones over the triangles that intersect it. Its
+/// centre is at x, field's frame.
 IST_HD inline void add_ball(const Similarity& a_from_b, const double (&x)[3], double r, bool inside,
                             double cones, PartSums& sums) {
   const double whole = ball_volume(r);

@@ -6,23 +6,23 @@
 #include "base/host_device.h"
 #include "cuda/query/tree_ref.h"
 
-// What the spheres below each node of a tree add up to: a node that lies in a field as a whole is
-// one look then.
+// Sums over the spheres below each node of a tree, so that a node inside a field as a whole takes
+// one step.
 
 namespace ist::gpu {
 
-/// Of the spheres below a node, their tree's unit frame.
+/// The sums over the spheres below a node, their tree's unit frame.
 struct NodeSum {
   double cubes;      ///< Σ r³
   double moment[3];  ///< Σ r³ · centre
 };
 
-/// The sums of a tree where they lie.
+/// The sums of a tree, in place.
 struct SumsRef {
   const NodeSum* level[kMaxLevels];  ///< [nodes of the level]
   std::uint32_t sphere_count;
 
-  /// `sums`: as node_sums() makes them.
+  /// `sums`: those of node_sums().
   static SumsRef of(const TreeHeader& tree, const NodeSum* sums) {
     SumsRef ref = {};
     ref.sphere_count = tree.sphere_count;

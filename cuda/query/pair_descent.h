@@ -8,12 +8,12 @@
 #include "cuda/query/pair_memory.h"
 #include "cuda/query/pair_sums.h"
 
-// Two trees met by one team: the sum that Descent (query/tree_overlap/descent.h) makes level by
-// level, here depth first, so that what waits fits into a team's own memory.
+// The sum over two trees by one team. Descent (query/tree_overlap/descent.h) visits level by level;
+// this traversal is depth first, so that its pending pairs fit into a team's own memory.
 
 namespace ist::gpu {
 
-/// `Sums`: where lenses go, as PairSums.
+/// `Sums` receives the lenses, as PairSums does.
 template <class Team, class Sums = PairSums<Team>>
 class PairDescent {
  public:
@@ -42,7 +42,7 @@ class PairDescent {
     team_.sync();
   }
 
-  /// The roots, which meet.
+  /// Begins with the roots, which intersect.
   IST_HD void start() {
     const bool no_steps = m_.steps.count == 0;
     if (team_.lane() == 0) {
@@ -50,11 +50,11 @@ class PairDescent {
       (no_steps ? m_.leaf_b : m_.stack_b)[0] = 0;
     }
     (no_steps ? leaves_ : size_) = 1;
-    wide_ = kFirstRoom - (m_.steps.count * kGrowth + kPairsAtOnce);
+    wide_ = kFirstStack - (m_.steps.count * kGrowth + kPairsAtOnce);
     team_.sync();
   }
 
-  /// Pairs that another descent of the same trees left waiting.
+  /// Begins with pending pairs of another traversal of the same trees.
   IST_HD void resume(const std::uint32_t* a, const std::uint32_t* b, int count) {
     for (int k = team_.lane(); k < count; k += Team::kWidth) {
       m_.stack_a[k] = a[k];
@@ -65,11 +65,11 @@ class PairDescent {
     team_.sync();
   }
 
-  /// From here on in tasks: what lies below the floor of one does not show in its sums.
-  IST_HD void divide() { wide_ = kTaskRoom; }
+  /// From here on runs are tasks, whose sums do not depend on what is below their floor.
+  IST_HD void divide() { wide_ = kTaskStack; }
 
-  /// Goes on until no more than `floor` pairs wait, or at least `most` pairs of leaves have been
-  /// met and what waits leaves room for tasks.
+  /// Runs until at most `floor` pairs are pending, or at least `most` pairs of leaves were visited
+  /// and the pending pairs leave space for tasks.
   IST_HD void run(int floor, std::uint32_t most) {
     while (size_ > floor || leaves_ > 0) {
       const bool enough = met_ >= most && size_ <= wide_;
@@ -96,18 +96,18 @@ class PairDescent {
     return {a & kNodeMask, b, static_cast<int>(a >> kNodeBits)};
   }
 
-  /// How many of the `have` pairs on top of a floor are opened together. There is room for what two
-  /// at a time leave, from any number up to wide_ on.
+  /// The number of pairs on top of a floor, out of `have`, that are opened together. From any
+  /// number up to wide_ on, the stack has space for what two at a time leave.
   IST_HD int breadth(int have) const {
     const int by_stack = (wide_ - have) / (static_cast<int>(kWidth) - 1);
-    const int by_leaves = (kLeafRoom - leaves_) / static_cast<int>(kWidth);
+    const int by_leaves = (kLeafCapacity - leaves_) / static_cast<int>(kWidth);
     int most = by_stack < by_leaves ? by_stack : by_leaves;
     most = most < kAhead ? most : kAhead;
     most = most > kPairsAtOnce ? most : kPairsAtOnce;
     return have < most ? have : most;
   }
 
-  /// Opens the pairs on top, no more than `have`.
+  /// Opens the pairs on top, at most `have`.
   IST_HD void open(int have) {
     have = breadth(have);
     for (int k = team_.lane(); k < have; k += Team::kWidth)
@@ -151,7 +151,7 @@ class PairDescent {
                         static_cast<std::uint32_t>(level_x - 1) << kLevelBit;
   }
 
-  /// Puts the pair's child where the step that comes next takes it, if it meets the other side.
+  /// Pushes the pair's child for the next step if it intersects the other side.
   IST_HD void open_item(int k, std::uint32_t lane, bool active) {
     const Ball other = m_.opening.other[k];
     const BallBlock& block = *in_global_memory(m_.opening.block[k]);
@@ -161,13 +161,13 @@ class PairDescent {
     const float dz = block.z[lane] - other.z;
     const float radius = block.r[lane];
     const float d2 = std::fma(dx, dx, std::fma(dy, dy, dz * dz));
-    const float reach = (radius + other.r) * (1 + kRoom);
+    const float reach = (radius + other.r) * (1 + kTolerance);
     bool meets = active && radius > 0 && d2 < reach * reach;
     const bool of_a = (how & kOpensA) != 0;
     const std::uint32_t a = m_.opening.a[k] + (of_a ? lane : 0);
     const std::uint32_t b = m_.opening.b[k] + (of_a ? 0 : lane);
     if (m_.to_single) {
-      const float within = (other.r - radius) * (1 - kRoom);
+      const float within = (other.r - radius) * (1 - kTolerance);
       const bool contained = meets && (how & kIntoOne) != 0 && within > 0 && d2 < within * within;
       meets = meets && !contained;
       if (team_.any(contained))
@@ -191,8 +191,8 @@ class PairDescent {
     }
   }
 
-  /// Adds up the spheres below the nodes, A's or B's, that lanes flag: each lies in one sphere of
-  /// the other side.
+  /// Adds the spheres below the nodes of A or B that lanes flag. Each such node is inside one
+  /// sphere of the other side.
   IST_HD void add_contained(bool flag, bool of_a, int level, std::uint32_t a, std::uint32_t b) {
     for (;;) {
       int total = 0;
@@ -228,7 +228,7 @@ class PairDescent {
     }
   }
 
-  /// A sphere in A's unit frame's axes, from B's unit-frame origin.
+  /// A sphere along the axes of A's unit frame, relative to the origin of B's.
   IST_HD LensBall seen(bool of_a, std::uint32_t number) const {
     const Similarity& map = m_.place.a_from_b;
     const NodeBall ball = m_.tree[of_a ? 0 : 1].ball(kSphereLevel, number);
@@ -241,7 +241,7 @@ class PairDescent {
     return out;
   }
 
-  /// Lists what may meet in the pairs of leaves on top.
+  /// Lists the spheres that may intersect in the pairs of leaves on top.
   IST_HD void meet() {
     const int have = leaves_ < kAhead ? leaves_ : kAhead;
     for (int k = team_.lane(); k < have; k += Team::kWidth)
@@ -251,7 +251,7 @@ class PairDescent {
     met_ += static_cast<std::uint32_t>(have);
     IST_ROLLED
     for (int first = 0; first < have; first += kPairsAtOnce) meet_two(first, have);
-    team_.sync();  // what was readied has been read
+    team_.sync();  // the last batch has been read
   }
 
   IST_HD void ready_meeting(int k, std::uint32_t leaf_a, std::uint32_t leaf_b) {
@@ -279,7 +279,7 @@ class PairDescent {
     const Ball near_b = {
         static_cast<float>(moved[0] - origin_a.x), static_cast<float>(moved[1] - origin_a.y),
         static_cast<float>(moved[2] - origin_a.z), static_cast<float>(ball_b.r * map.scale)};
-    // What each sphere's coordinates are rounded by is bounded by how far the balls reach.
+    // The rounding of a sphere's coordinates is bounded by the extent of the balls.
     constexpr float kRounding = 32 * 0x1p-24f;
     off.r = kRounding * ((largest(near_a) + near_a.r) + (largest(near_b) + near_b.r));
     m_.meeting.near_a[k] = near_a;
@@ -315,7 +315,7 @@ class PairDescent {
       }
     }
     team_.sync();
-    // Spheres of A and B in the first pair and in the second.
+    // Spheres of A and B, in the first pair and in the second.
     constexpr std::uint32_t kFirst = (1u << kWidth) - 1;
     const int a0 = count_bits(there[0] & kFirst), b0 = count_bits(there[1] & kFirst);
     const int a1 = count_bits(there[0]) - a0, b1 = count_bits(there[1]) - b0;
@@ -352,7 +352,7 @@ class PairDescent {
     team_.sync();
   }
 
-  /// Sphere `lane` of both leaves of a pair, and whether it reaches the other's ball.
+  /// Loads sphere `lane` of both leaves of a pair, and tests it against the other's ball.
   IST_HD void look(int k, std::uint32_t lane, Ball& of_a, Ball& of_b, bool (&near)[2]) const {
     const MeetingPairs& pairs = m_.meeting;
     const BallBlock& a = in_global_memory(m_.tree[0].blocks[0])[pairs.block_a[k]];
@@ -381,7 +381,7 @@ class PairDescent {
     return sphere.r > 0 && std::fma(dx, dx, std::fma(dy, dy, dz * dz)) < reach * reach;
   }
 
-  /// Sums listed lenses, as many at once as the team is wide, until fewer than `full` are left.
+  /// Sums listed lenses, a team's width at a time, until fewer than `full` are left.
   IST_HD void sum_list(int full) {
     while (listed_ >= full) {
       const int take = listed_ < Team::kWidth ? listed_ : Team::kWidth;

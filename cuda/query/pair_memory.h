@@ -11,29 +11,29 @@ namespace ist::gpu {
 constexpr int kPairsAtOnce = 2;  ///< item k of 32 is child, or sphere, k % 16 of pair k / 16
 constexpr int kItems = kPairsAtOnce * static_cast<int>(kWidth);
 constexpr int kAhead = 24;  ///< pairs readied together, a lane each
-/// Taking two pairs at a time leaves at most so many pairs more a step.
+/// The largest growth of the stack in a step that takes two pairs.
 constexpr int kGrowth = kItems - kPairsAtOnce;
-constexpr int kFirstRoom = OpeningSteps::kMost * kGrowth + kPairsAtOnce;
-constexpr int kTaskRoom = 120;  ///< on top of what waits for other tasks
-constexpr int kStackRoom = kFirstRoom + kTaskRoom;
-/// Pairs of leaves are met before kAhead and more wait.
-constexpr int kLeafRoom = 224;
-static_assert(kLeafRoom >= kAhead + kItems);
+constexpr int kFirstStack = OpeningSteps::kMost * kGrowth + kPairsAtOnce;
+constexpr int kTaskStack = 120;  ///< on top of what waits for other tasks
+constexpr int kStackSize = kFirstStack + kTaskStack;
+/// Pairs of leaves are visited before kAhead or more are pending.
+constexpr int kLeafCapacity = 224;
+static_assert(kLeafCapacity >= kAhead + kItems);
 constexpr int kNodeBits = 28;  ///< of a node's number; the rest of a word is the step
 constexpr std::uint32_t kNodeMask = (1u << kNodeBits) - 1;
 static_assert(kMaxSpheres == 1u << kNodeBits && OpeningSteps::kMost < 16);
 
-constexpr float kRoom = 2e-6f;  ///< share of a distance, above its rounding
+constexpr float kTolerance = 2e-6f;  ///< share of a distance, above its rounding
 
 struct alignas(16) Ball {
   float x, y, z, r;
 };
 
-/// Node pairs about to be opened: what of them does not change from child to child.
+/// Node pairs to be opened: the data that their children share.
 struct OpeningPairs {
   Ball other[kAhead];  ///< the side that stays whole, seen from the block that is opened
   const BallBlock* block[kAhead];
-  /// What child 0 leaves on the stack, or in the list of leaves.
+  /// The entry that child 0 leaves on the stack or in the list of leaves.
   std::uint32_t a[kAhead], b[kAhead];
   std::uint32_t how[kAhead];  ///< flags, and from kLevelBit on the children's level
 };
@@ -42,32 +42,32 @@ constexpr std::uint32_t kOpensA = 1;
 constexpr std::uint32_t kToLeaf = 2;   ///< children are leaves
 constexpr std::uint32_t kIntoOne = 4;  ///< the other side is a single sphere
 
-/// Pairs of leaves about to be met, in A's axes from A's block's origin.
+/// Pairs of leaves to be visited, along A's axes from the origin of A's block.
 struct MeetingPairs {
   Ball near_a[kAhead], near_b[kAhead];  ///< the leaves' balls
-  Ball off[kAhead];  ///< of B's block's origin; r: by how much two spheres' distance may be off
+  Ball off[kAhead];  ///< the origin of B's block; r: the error of two spheres' distance
   std::uint32_t block_a[kAhead], block_b[kAhead];
-  std::uint32_t lanes[kAhead];  ///< that a leaf has, of A in the low half
+  std::uint32_t lanes[kAhead];  ///< the spheres of a leaf, those of A in the low half
 };
 
-/// What a team needs for a pair of trees.
+/// The state of a team for a pair of trees.
 struct PairMemory {
   PairPlace place;
   TreeRef tree[2];
   OpeningSteps steps;
   Ball turn[3];                     ///< rows of place.a_from_b.m; r of the first: its scale
   std::uint32_t share[kWidth + 1];  ///< k · share[n] >> 16 is k / n, for k < 256
-  /// Lengths are summed times this power of two, about the smaller tree's size to 1: their powers
-  /// then fit into floats.
+  /// Lengths are summed times this power of two, which scales the smaller tree to about 1, so that
+  /// their powers fit into floats.
   double unit;
-  double blur;                        ///< by how much rounding may move a centre, A's unit frame
+  double blur;                        ///< the rounding of a centre, A's unit frame
   bool to_single;                     ///< some leaves are single spheres
-  LensTotals totals;                  ///< of the task in hand
-  LensTotals sum;                     ///< of those that are done
+  LensTotals totals;                  ///< of the current task
+  LensTotals sum;                     ///< of finished tasks
   std::uint32_t task_weight;          ///< size_tasks()
-  std::uint32_t stack_a[kStackRoom];  ///< node of A and the step, << kNodeBits, that opens the pair
-  std::uint32_t stack_b[kStackRoom];
-  std::uint32_t leaf_a[kLeafRoom], leaf_b[kLeafRoom];
+  std::uint32_t stack_a[kStackSize];  ///< node of A and the step, << kNodeBits, that opens the pair
+  std::uint32_t stack_b[kStackSize];
+  std::uint32_t leaf_a[kLeafCapacity], leaf_b[kLeafCapacity];
   union {
     OpeningPairs opening;
     MeetingPairs meeting;

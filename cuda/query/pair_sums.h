@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-/// Where a descent's lenses go: into one sum, the pair's.
+/// Receives a traversal's lenses: adds them to one sum, the pair's.
 template <class Team>
 class PairSums {
  public:
@@ -15,12 +15,12 @@ class PairSums {
     for (float& s : sum_) s = 0;
   }
 
-  /// Where the next lenses of this lane are added to.
+  /// The sum to which the lane's next lenses are added.
   IST_HD float (&begin())[kTerms] { return sum_; }
-  /// They are the spheres of these numbers, if `flag`. Together.
+  /// Ends a round of lenses, whose spheres have these numbers if `flag`. Called by all lanes.
   IST_HD void end(bool, std::uint32_t, std::uint32_t) { ++summed_; }
 
-  /// Rounded sums stay short: a lane adds few numbers before they go on in double.
+  /// A lane adds few numbers in float before they continue in double.
   IST_HD bool full() const { return summed_ >= 16; }
 
   IST_HD void fold() {

@@ -9,8 +9,8 @@
 
 namespace ist::gpu {
 
-/// What one lane sums of the parts of balls inside a field, the field's frame; positions from the
-/// probing tree's unit-frame origin.
+/// The sums of one lane over the parts of balls inside a field, field's frame. Positions are
+/// relative to the origin of the tree's unit frame.
 struct PartSums {
   double volume = 0;
   double force[3] = {0, 0, 0};   ///< d(volume)/d(translation of the tree)
@@ -19,8 +19,7 @@ struct PartSums {
   std::uint32_t spheres = 0;
   std::uint32_t visits = 0;  ///< the team's
 
-  /// A ball's part, its centre being at x: `push` the gradient by that, `shift` the moment about
-  /// it.
+  /// Adds the part of a ball with centre x. `push`: its gradient by x. `shift`: its moment about x.
   IST_HD void add(const double (&x)[3], double part, const double (&push)[3],
                   const double (&shift)[3]) {
     volume += part;
@@ -33,7 +32,7 @@ struct PartSums {
     torque[2] += x[0] * push[1] - x[1] * push[0];
   }
 
-  /// A node that is inside as a whole.
+  /// Adds a node that is inside as a whole.
   IST_HD void add_whole(const NodeSum& sum, std::uint32_t count, const Similarity& a_from_b) {
     const double factor = kBallVolume * (a_from_b.scale * a_from_b.scale * a_from_b.scale);
     volume += factor * sum.cubes;
@@ -44,7 +43,7 @@ struct PartSums {
     spheres += count;
   }
 
-  /// The team's, as an answer is made of them.
+  /// The sums of the team in the form of an answer.
   template <class Team>
   IST_HD LensTotals total(const Team& team) const {
     LensTotals totals;

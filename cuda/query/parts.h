@@ -4,7 +4,7 @@
 
 namespace ist::gpu {
 
-/// Parts of a block of memory, one after another.
+/// Takes arrays from a block of memory, one after another.
 class Parts {
  public:
   explicit Parts(std::byte* from) : from_(from) {}

@@ -10,15 +10,15 @@
 
 namespace ist::gpu {
 
-/// A batch of contact patches in the memory of who works on it.
+/// A batch of contact patches, with its working memory.
 struct PatchArrays {
   BatchArrays pairs;  ///< solids, pairs, answers, counters and the list
   GpuContactPatches patches;
-  std::byte* rooms;         ///< of teams, one after another
+  std::byte* team_memory;   ///< of the teams, one after another
   std::uint32_t most_bins;  ///< of any asset
 
-  IST_HD PatchRoom room(std::uint32_t team) const {
-    return PatchRoom::at(rooms + team * PatchRoom::bytes(most_bins), most_bins);
+  IST_HD PatchWorkspace workspace(std::uint32_t team) const {
+    return PatchWorkspace::at(team_memory + team * PatchWorkspace::bytes(most_bins), most_bins);
   }
 };
 

@@ -10,8 +10,8 @@
 
 namespace ist::gpu {
 
-/// Adds value(k, term) to target(key(k))[term] for k < count, in this order. A term stays with one
-/// lane, which reads and writes the target where the key changes.
+/// Adds value(k, term) to target(key(k))[term] for k < count, in this order. Each term belongs to
+/// one lane, which loads and stores the target when the key changes.
 template <class Team, class Key, class Value, class Target>
 IST_HD void add_by_runs(const Team& team, int count, const Key& key, const Value& value,
                         const Target& target) {
@@ -33,11 +33,11 @@ IST_HD void add_by_runs(const Team& team, int count, const Key& key, const Value
   team.sync();
 }
 
-/// Where a descent's lenses go: into the bins of one of the trees, in double.
+/// Receives a traversal's lenses: adds them to the bins of one of the trees, in double.
 template <class Team>
 class BinSums {
  public:
-  /// The bins are B's if `of_b`. Empties them.
+  /// Clears the bins, which are B's if `of_b`.
   IST_HD BinSums(const Team& team, PatchMemory& memory, PatchBin* bins, const CutsRef& cuts,
                  bool of_b)
       : team_(team), m_(memory), bins_(bins), rank_(cuts.rank), shift_(cuts.shift), of_b_(of_b) {
@@ -85,17 +85,17 @@ class BinSums {
   float term_[kTerms] = {};  ///< this lane's
 };
 
-/// What is binned, divided into parts: ContactDivision (query/contact/contact_division.h) by a
+/// Divides the binned sums into parts: ContactDivision (query/contact/contact_division.h) by a
 /// team, along the regions of CutsRef.
 template <class Team>
 class PatchDivision {
  public:
-  /// `radius`: of the divided tree's root, A's unit frame.
-  IST_HD PatchDivision(const Team& team, PatchMemory& memory, const PatchRoom& room,
+  /// `radius`: that of the divided tree's root, A's unit frame.
+  IST_HD PatchDivision(const Team& team, PatchMemory& memory, const PatchWorkspace& work,
                        const CutsRef& cuts, double radius)
       : team_(team),
         m_(memory),
-        room_(room),
+        work_(work),
         cuts_(cuts),
         bend_cost_(kContactBend * radius * radius) {
     list_bins();
@@ -103,7 +103,7 @@ class PatchDivision {
     add_up_pulls();
   }
 
-  /// Sums of all bins, A's unit frame.
+  /// The sums of all bins, A's unit frame.
   IST_HD void add_up(double (&sum)[kTerms]) const {
     for (double& s : sum) s = 0;
     for (int k = team_.lane(); k < bins_; k += Team::kWidth)
@@ -111,10 +111,10 @@ class PatchDivision {
     for (double& s : sum) s = team_.sum(s);
   }
 
-  /// Until there are `wanted` parts or nothing is left to divide. Returns how many there are.
+  /// Divides until there are `wanted` parts or none can be divided. Returns their number.
   IST_HD int run(int wanted) {
     if (bins_ == 0 || wanted == 0) return 0;
-    for (int k = team_.lane(); k < bins_; k += Team::kWidth) room_.member[k] = 0;
+    for (int k = team_.lane(); k < bins_; k += Team::kWidth) work_.member[k] = 0;
     team_.sync();
     set_part(0, 0);
     int size = 1;
@@ -124,17 +124,17 @@ class PatchDivision {
       if (divide(worst, size)) ++size;
     }
     for (int p = team_.lane(); p < size; p += Team::kWidth)
-      for (double& t : room_.parts->part[p].term) t = 0;
+      for (double& t : work_.parts->part[p].term) t = 0;
     team_.sync();
     add_by_runs(
-        team_, bins_, [&](int k) { return static_cast<int>(room_.member[k]); },
+        team_, bins_, [&](int k) { return static_cast<int>(work_.member[k]); },
         [&](int k, int term) { return bin(k).term[term]; },
-        [&](int p) { return room_.parts->part[p].term; });
+        [&](int p) { return work_.parts->part[p].term; });
     return size;
   }
 
  private:
-  IST_HD PatchBin& bin(int k) const { return room_.bin[room_.rank[k]]; }
+  IST_HD PatchBin& bin(int k) const { return work_.bin[work_.rank[k]]; }
 
   IST_HD void list_bins() {
     const int words = words_of(cuts_);
@@ -144,7 +144,7 @@ class PatchDivision {
       for (int v = 0; v < w; ++v) before += count_bits(m_.marked[v]);
       m_.bins_before[w] = static_cast<std::uint16_t>(before);
       for (std::uint32_t left = w < words ? m_.marked[w] : 0; left != 0; left &= left - 1)
-        room_.rank[before++] = static_cast<std::uint16_t>(32 * w + lowest_bit(left));
+        work_.rank[before++] = static_cast<std::uint16_t>(32 * w + lowest_bit(left));
     }
     team_.sync();
     bins_ = m_.bins_before[words];
@@ -180,7 +180,7 @@ class PatchDivision {
     team_.sync();
   }
 
-  /// How many of the bins that hold anything are of lower rank.
+  /// The number of non-empty bins of lower rank.
   IST_HD int bins_below(std::uint32_t rank) const {
     const std::uint32_t bit = rank % 32, below = bit == 0 ? 0 : m_.marked[rank / 32] << (32 - bit);
     return m_.bins_before[rank / 32] + count_bits(below);
@@ -189,13 +189,13 @@ class PatchDivision {
 
   IST_HD static double square(double x, double y, double z) { return (x * x + y * y) + z * z; }
 
-  /// Sets part p, whose bins are known, to a region.
+  /// Sets part p, whose bins are marked, to a region.
   IST_HD void set_part(int p, std::uint32_t node) {
     double pull = 0, force[3] = {0, 0, 0}, mean[3] = {0, 0, 0};
     int count = 0;
     IST_ROLLED
     for (int k = team_.lane(); k < bins_; k += Team::kWidth) {
-      if (room_.member[k] != p) continue;
+      if (work_.member[k] != p) continue;
       const PatchBin& of = bin(k);
       const double share = of.pull / of.term[kCaps];
       pull += of.pull;
@@ -215,7 +215,7 @@ class PatchDivision {
       }
       IST_ROLLED
       for (int k = team_.lane(); k < bins_; k += Team::kWidth) {
-        if (room_.member[k] != p) continue;
+        if (work_.member[k] != p) continue;
         const PatchBin& of = bin(k);
         const double per = 1 / of.term[kCaps];
         loss +=
@@ -226,7 +226,7 @@ class PatchDivision {
       loss = team_.sum(loss) + bend_cost_ * (bent > 0 ? bent : 0);
     }
     if (team_.lane() == 0) {
-      PatchPart& part = room_.parts->part[p];
+      PatchPart& part = work_.parts->part[p];
       part.loss = loss;
       part.pull = pull;
       part.node = node;
@@ -235,9 +235,10 @@ class PatchDivision {
     team_.sync();
   }
 
-  /// The part that loses most, of equal ones that of the lowest id; −1: none loses anything.
+  /// The part with the largest loss, of equal ones that with the lowest id; −1 if no part has a
+  /// loss.
   IST_HD int next_to_divide(int size) const {
-    const PatchPart* const parts = room_.parts->part;
+    const PatchPart* const parts = work_.parts->part;
     double most = 0;
     for (int p = team_.lane(); p < size; p += Team::kWidth)
       most = parts[p].loss > most ? parts[p].loss : most;
@@ -254,9 +255,9 @@ class PatchDivision {
     return team_.min(id == least ? found : size);
   }
 
-  /// Divides part p into itself and a part `other`. False if there was nothing to divide.
+  /// Divides part p into itself and part `other`. False if it cannot be divided.
   IST_HD bool divide(int p, int other) {
-    const PatchPart& part = room_.parts->part[p];
+    const PatchPart& part = work_.parts->part[p];
     const CutNode* const nodes = in_global_memory(cuts_.node);
     const double least = kLeastContactShare * total_, pull = part.pull;
     const int all = static_cast<int>(part.bins);
@@ -266,7 +267,7 @@ class PatchDivision {
       const std::uint32_t rest = nodes[at].rest;
       if (rest == 0) {
         team_.sync();
-        if (team_.lane() == 0) room_.parts->part[p].loss = 0;
+        if (team_.lane() == 0) work_.parts->part[p].loss = 0;
         team_.sync();
         return false;
       }
@@ -281,7 +282,7 @@ class PatchDivision {
         const std::uint32_t side = at + 1;
         team_.sync();
         for (int k = begin + team_.lane(); k < middle; k += Team::kWidth)
-          room_.member[k] = static_cast<std::uint8_t>(other);
+          work_.member[k] = static_cast<std::uint8_t>(other);
         team_.sync();
         set_part(other, side);
         set_part(p, rest);
@@ -292,11 +293,11 @@ class PatchDivision {
 
   const Team& team_;
   PatchMemory& m_;
-  const PatchRoom& room_;
+  const PatchWorkspace& work_;
   const CutsRef& cuts_;
-  const double bend_cost_;  ///< of a unit of pull that cancels
+  const double bend_cost_;  ///< per unit of pull that cancels
   double total_ = 0;        ///< Σ pull
-  int bins_ = 0;            ///< that hold anything
+  int bins_ = 0;            ///< non-empty
 };
 
 }  // namespace ist::gpu

@@ -28,11 +28,11 @@ __global__ void __launch_bounds__(kSiftThreads) sift_contacts(const PatchArrays 
 __global__ void __launch_bounds__(kThreads, kBlocksEach) divide_contacts(const PatchArrays batch) {
   __shared__ PatchMemory memory[kWarps];
   const unsigned warp = threadIdx.x / 32;
-  const PatchRoom room = batch.room(blockIdx.x * kWarps + warp);
+  const PatchWorkspace work = batch.workspace(blockIdx.x * kWarps + warp);
   BatchCounters& counters = *batch.pairs.counters;
   by_warps(load_fresh(&counters.listed), &counters.taken,
            [&](const WarpTeam& team, std::uint32_t k) {
-             patch_pair(team, batch, batch.pairs.list[k], room, memory[warp]);
+             patch_pair(team, batch, batch.pairs.list[k], work, memory[warp]);
            });
 }
 
@@ -40,14 +40,14 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach) divide_contacts(const P
 
 void find_patch_grids(Grids& grids) { grids.divide = blocks_at_a_time(divide_contacts, kThreads); }
 
-void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t room_bytes,
+void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t memory_bytes,
                     cudaStream_t stream) {
   check(cudaMemsetAsync(batch.pairs.counters, 0, sizeof(BatchCounters), stream),
         "starting a batch");
   const std::size_t pairs = batch.pairs.pairs.count;
   sift_contacts<<<blocks_for(pairs, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
   check_launch("placing pairs of trees");
-  const std::size_t fit = room_bytes / (kWarps * PatchRoom::bytes(batch.most_bins));
+  const std::size_t fit = memory_bytes / (kWarps * PatchWorkspace::bytes(batch.most_bins));
   const auto at_a_time =
       static_cast<unsigned>(std::min(fit, static_cast<std::size_t>(grids.divide)));
   divide_contacts<<<at_a_time, kThreads, 0, stream>>>(batch);

@@ -12,20 +12,20 @@
 #include "cuda/query/pair_memory.h"
 #include "query/contact/contact_numbers.h"
 
-// Where a team keeps what it needs for a pair's patches.
+// A team's memory for a pair's patches.
 
 namespace ist::gpu {
 
-/// What one bin of the divided tree has of the overlap.
+/// The share of the overlap in one bin of the divided tree.
 struct PatchBin {
   double term[kTerms];
   double pull;    ///< |force|, as term[kForce] has it
   double before;  ///< Σ of the pulls of the bins of lower rank
 };
 
-/// Part of a contact: a region of the tree, and bins.
+/// A part of a contact: a region of the tree, and its bins.
 struct PatchPart {
-  double loss;  ///< what taking it for one patch loses; the largest is divided next
+  double loss;  ///< the loss of treating it as one patch; the part with the largest is divided next
   double pull;
   double term[kTerms];
   WorldSums world;
@@ -39,8 +39,8 @@ struct PatchParts {
   std::uint32_t order[kMostGpuPatches];  ///< by id
 };
 
-/// A team's room in device memory, one part after another.
-struct PatchRoom {
+/// A team's device memory, one array after another.
+struct PatchWorkspace {
   PatchParts* parts;
   PatchBin* bin;         ///< [most_bins] by rank
   std::uint16_t* rank;   ///< [most_bins] of the bins that hold anything, in order
@@ -50,28 +50,28 @@ struct PatchRoom {
     const std::size_t all = sizeof(PatchParts) + most_bins * (sizeof(PatchBin) + 3);
     return (all + 255) / 256 * 256;
   }
-  IST_HD static PatchRoom at(std::byte* from, std::uint32_t most_bins) {
-    PatchRoom room;
-    room.parts = reinterpret_cast<PatchParts*>(from);
-    room.bin = reinterpret_cast<PatchBin*>(room.parts + 1);
-    room.rank = reinterpret_cast<std::uint16_t*>(room.bin + most_bins);
-    room.member = reinterpret_cast<std::uint8_t*>(room.rank + most_bins);
-    return room;
+  IST_HD static PatchWorkspace at(std::byte* from, std::uint32_t most_bins) {
+    PatchWorkspace work;
+    work.parts = reinterpret_cast<PatchParts*>(from);
+    work.bin = reinterpret_cast<PatchBin*>(work.parts + 1);
+    work.rank = reinterpret_cast<std::uint16_t*>(work.bin + most_bins);
+    work.member = reinterpret_cast<std::uint8_t*>(work.rank + most_bins);
+    return work;
   }
 };
 
-/// Words of a bit a bin.
+/// The number of words with a bit for each bin.
 IST_HD inline int words_of(const CutsRef& cuts) { return static_cast<int>((cuts.bins + 31) / 32); }
 
-/// What a team keeps at hand.
+/// A team's fast memory.
 struct PatchMemory {
   static constexpr std::uint32_t kWords = kMostContactBins / 32;
 
   PairMemory pair;
   std::uint32_t marked[kWords];           ///< bins that hold anything, by rank
   std::uint16_t bins_before[kWords + 1];  ///< marked bins of lower words
-  float term[32][kTerms + 1];             ///< what lanes add; an odd number keeps banks apart
-  int bin[32];                            ///< to which bins
+  float term[32][kTerms + 1];  ///< the terms of lanes; an odd number avoids bank conflicts
+  int bin[32];                 ///< the bins that they go to
 };
 
 }  // namespace ist::gpu

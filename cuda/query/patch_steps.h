@@ -7,12 +7,12 @@
 #include "cuda/query/patch_arrays.h"
 #include "cuda/query/patch_division.h"
 
-// A batch of contact patches, step by step, as batch_steps.h has penetrations. A pair is one team's
-// from beginning to end.
+// The steps of a batch of contact patches, as batch_steps.h has penetrations. One team processes a
+// pair from beginning to end.
 
 namespace ist::gpu {
 
-/// Whether pair i is to be summed; else it is answered. One thread a pair.
+/// True if pair i needs a sum; else writes its answer. One thread per pair.
 IST_HD inline bool sift_patches(const PatchArrays& batch, std::uint32_t i) {
   PairPlace place;
   const QueryStatus status = place_trees(batch.pairs, i, place);
@@ -22,12 +22,12 @@ IST_HD inline bool sift_patches(const PatchArrays& batch, std::uint32_t i) {
   return sums;
 }
 
-/// What the parts are in the world, their sums made to give the whole's but for the last digit
-/// (write_patches(), query/contact/write_patches.cpp).
+/// Converts parts to world units and corrects their sums so that they equal the whole's except for
+/// the last digit (write_patches(), query/contact/write_patches.cpp).
 template <class Team>
 class PatchWriter {
  public:
-  /// `origin_b`: [u] B's, world.
+  /// `origin_b`: [u] B's origin, world.
   IST_HD PatchWriter(const Team& team, const PatchMemory& memory, PatchParts& parts,
                      const CutsRef& cuts, int size, const Vec3& origin_b)
       : team_(team),
@@ -49,7 +49,7 @@ class PatchWriter {
       parts_.order[before] = static_cast<std::uint32_t>(p);
     }
     team_.sync();
-    // One lane a number: volume, push, turn.
+    // One lane for each number of volume, push and turn.
     constexpr int kNumbers = 7;
     for (int n = team_.lane(); n < kNumbers; n += Team::kWidth) complete(n);
     team_.sync();
@@ -68,9 +68,9 @@ class PatchWriter {
                    : of.rotation_gradient[n - 4];
   }
 
-  /// Adds what is missing of a number to the largest patch.
+  /// Adds a number's missing part to the largest patch.
   IST_HD void complete(int n) {
-    // By the terms: volumes are another lane's.
+    // Compared by the terms, since another lane writes the volumes.
     int largest = 0;
     for (int k = 1; k < size_; ++k)
       if (caps(k) > caps(largest)) largest = k;
@@ -105,7 +105,7 @@ class PatchWriter {
 /// Sums pair i and divides it.
 template <class Team>
 IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t i,
-                       const PatchRoom& room, PatchMemory& memory) {
+                       const PatchWorkspace& work, PatchMemory& memory) {
   const BatchArrays& pairs = batch.pairs;
   PairMemory& pair = memory.pair;
   if (team.lane() == 0) place_pair(pairs, i, pair.place);
@@ -117,17 +117,17 @@ IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t
                            .cuts[static_cast<int>(pairs.measure)];
   {
     PairDescent<Team, BinSums<Team>> descent(team, pair,
-                                             BinSums<Team>(team, memory, room.bin, cuts, of_b));
+                                             BinSums<Team>(team, memory, work.bin, cuts, of_b));
     descent.start();
     descent.run(0, ~0u);
   }
-  PatchDivision<Team> division(team, memory, room, cuts,
+  PatchDivision<Team> division(team, memory, work, cuts,
                                of_b ? pair.tree[1].root[3] * scale : pair.tree[0].root[3]);
   double sum[kTerms];
   division.add_up(sum);
   if (team.lane() == 0) {
     for (int t = 0; t < kTerms; ++t) pair.totals.term[t] = sum[t];
-    room.parts->whole = world_sums(pair.place, pair.totals.term);
+    work.parts->whole = world_sums(pair.place, pair.totals.term);
     write_answer(pairs.answers, i, world_sums(pair.place, pair.totals), pair.totals);
   }
   team.sync();
@@ -135,7 +135,7 @@ IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t
   if (team.lane() == 0 && batch.patches.count != nullptr)
     batch.patches.count[i] = static_cast<std::uint32_t>(size);
   if (size > 0)
-    PatchWriter<Team>(team, memory, *room.parts, cuts, size, vec3(pose_of(pairs.pairs.b, i).t))
+    PatchWriter<Team>(team, memory, *work.parts, cuts, size, vec3(pose_of(pairs.pairs.b, i).t))
         .write(batch.patches, i);
   team.sync();
 }

@@ -11,23 +11,24 @@ namespace ist::gpu {
 
 constexpr int kSeen = 32;  ///< triangles looked at together, a bit each
 
-/// Lengths are off by less than this part of the reach in which triangles are seen.
-constexpr float kSeenRoom = 1e-5f;
+/// The error of lengths, relative to the reach within which triangles are staged.
+constexpr float kSeenTolerance = 1e-5f;
 
-/// How a point lies to a triangle: over its plane, and over its edges in that, positive within.
+/// A point relative to a triangle: its heights above the plane and, in that plane, above the edges,
+/// positive inside.
 struct SeenFrom {
   float height, edge[3];
 };
 
-/// Triangles as they are seen near a point: in floats, lengths being parts of a reach about it.
+/// Triangles staged around a point: in float, with lengths as fractions of a reach.
 struct SeenTriangles {
   struct alignas(16) Plane {
     float n[3], at_centre;
   };
   double centre[3], per;  ///< 1 / reach
-  Plane plane[kSeen][4];  ///< of the triangle, and through its edges
+  Plane plane[kSeen][4];  ///< the triangle's plane, and those through its edges
 
-  /// From where triangles are seen, before any is.
+  /// Sets the point and reach before any triangle is staged.
   IST_HD void look_from(const double (&x)[3], double reach) {
     for (int k = 0; k < 3; ++k) centre[k] = x[k];
     per = 1 / reach;
@@ -44,11 +45,11 @@ struct SeenTriangles {
       far2 = most(far2, dot(corner[i], corner[i]));
     }
     for (int k = 0; k < 3; ++k) diagonal[k] = c[2][k] - c[0][k];
-    cross(edge[0], diagonal, n);  // as TrianglePlane
+    cross(edge[0], diagonal, n);  // as in TrianglePlane
     const double n2 = dot(n, n);
-    // Of one that is too small nothing is clear, or so thin that rounding may turn its plane by
-    // more than goes unseen where it comes near.
-    constexpr double kTurn = 0x1p-50, kUnseen = kSeenRoom / 4;
+    // Nothing is certain of a triangle that is too small, or so thin that rounding turns its plane
+    // by more than the tolerance.
+    constexpr double kTurn = 0x1p-50, kUnseen = kSeenTolerance / 4;
     const bool clear = n2 * (kUnseen * kUnseen) >
                            (kTurn * kTurn) * (length2[0] * dot(diagonal, diagonal)) * far2 &&
                        n2 > kSmallest &&
@@ -66,12 +67,12 @@ struct SeenTriangles {
     }
   }
 
-  /// A point, or a length, as it is seen.
+  /// Converts a point or a length to staged units.
   IST_HD void seen(const double (&x)[3], float (&p)[3]) const {
     for (int k = 0; k < 3; ++k) p[k] = static_cast<float>((x[k] - centre[k]) * per);
   }
   IST_HD float seen_radius(double r) const {
-    return static_cast<float>(r * per) * (1 + kSeenRoom) + kSeenRoom;
+    return static_cast<float>(r * per) * (1 + kSeenTolerance) + kSeenTolerance;
   }
 
   IST_HD SeenFrom from(int triangle, const float (&p)[3]) const {
@@ -83,7 +84,7 @@ struct SeenTriangles {
     return {planes[0].at_centre, {planes[1].at_centre, planes[2].at_centre, planes[3].at_centre}};
   }
 
-  /// Whether a triangle may meet a ball of that radius.
+  /// True if a triangle may intersect a ball of that radius.
   IST_HD static bool meets(const SeenFrom& at, float r) {
     return at.height < r && -at.height < r && at.edge[0] > -r && at.edge[1] > -r && at.edge[2] > -r;
   }
@@ -99,7 +100,7 @@ struct SeenTriangles {
     return {{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])},
             static_cast<float>(-dot(n, x))};
   }
-  /// Good to a float's digits: of a length, which scales a plane's numbers alike.
+  /// The inverse root to a float's digits. It scales all numbers of a plane alike.
   IST_HD static double inverse_root(double square) {
     return static_cast<double>(1.0f / std::sqrt(static_cast<float>(square)));
   }

@@ -10,17 +10,17 @@
 
 namespace ist::gpu {
 
-/// A batch of separations in the memory of who works on it.
+/// A batch of separations, with its working memory.
 struct SeparationArrays {
-  BatchArrays pairs;  ///< solids, pairs, splits, tasks and room for them
-  // Of spheres that are searched in float, of others in double, and of meshes.
+  BatchArrays pairs;  ///< solids, pairs, splits, tasks and their capacities
+  // Pairs of spheres searched in float, others searched in double, and meshes.
   BatchCounters* counters;  ///< [3]
-  std::uint32_t* list[3];   ///< room for all pairs each
+  std::uint32_t* list[3];   ///< each holds all pairs
   MeshGapArrays meshes;
   GpuSeparations answers;
   std::uint32_t max_visits;  ///< of a pair; ~0: no limit
   double max_distance;       ///< [u] 0: no limit
-  GapTotals* totals;         ///< of splits[0]: [split_room + task_room]
+  GapTotals* totals;         ///< [split_capacity + task_capacity]
   GapEntries entries;
 };
 

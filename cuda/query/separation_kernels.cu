@@ -13,12 +13,12 @@ namespace {
 constexpr unsigned kSiftThreads = 256;
 template <class Real>
 constexpr int kKind = sizeof(Real) == 4 ? 0 : 1;
-/// Warps of a block: what the memory of a block holds.
+/// Warps per block, limited by a block's shared memory.
 template <class Real>
 constexpr unsigned kWarps = sizeof(Real) == 4 ? 4 : 2;
 template <class Real>
 constexpr unsigned kThreads = 32 * kWarps<Real>;
-/// Blocks a multiprocessor; more leave too few registers.
+/// Blocks per multiprocessor; more would leave too few registers.
 template <class Real>
 constexpr int kBlocksEach = 5;
 
@@ -32,7 +32,7 @@ template <class Real>
 constexpr int kMeshBlocks = sizeof(Real) == 4 ? 4 : 2;
 constexpr int kMeasureBlocks = 2, kFinishBlocks = 8;
 
-/// Places every pair and lists those that can be.
+/// Places every pair and lists the valid ones.
 __global__ void __launch_bounds__(kSiftThreads) sift_separations(const SeparationArrays batch) {
   const std::uint64_t i = std::uint64_t{blockIdx.x} * kSiftThreads + threadIdx.x;
   const auto pair = static_cast<std::uint32_t>(i);
@@ -62,21 +62,22 @@ __global__ void __launch_bounds__(kThreads<Real>, kBlocksEach<Real>)
   __shared__ GapMemory<Real> memory[kWarps<Real>];
   BatchCounters& counters = batch.counters[kKind<Real>];
   const std::uint32_t tasks = load_fresh(&counters.tasks);
-  by_warps(tasks < batch.pairs.task_room ? tasks : batch.pairs.task_room, &counters.tasks_taken,
-           [&](const WarpTeam& team, std::uint32_t k) {
+  by_warps(tasks < batch.pairs.task_capacity ? tasks : batch.pairs.task_capacity,
+           &counters.tasks_taken, [&](const WarpTeam& team, std::uint32_t k) {
              separate_task<WarpTeam, Real>(team, batch, k, memory[threadIdx.x / 32]);
            });
 }
 
-/// Begins the n-th round of meshes.
+/// Begins round n of meshes.
 __global__ void __launch_bounds__(kPlaceThreads)
     place_meshes(const SeparationArrays batch, const std::uint32_t n) {
-  const std::uint32_t first = n * batch.meshes.query_room, listed = batch.counters[2].listed;
+  const std::uint32_t first = n * batch.meshes.query_capacity, listed = batch.counters[2].listed;
   const std::uint32_t left = first < listed ? listed - first : 0;
-  const std::uint32_t count = left < batch.meshes.query_room ? left : batch.meshes.query_room;
+  const std::uint32_t count =
+      left < batch.meshes.query_capacity ? left : batch.meshes.query_capacity;
   const std::uint32_t k = blockIdx.x * kPlaceThreads + threadIdx.x;
   MeshGapRound& round = round_of(batch.meshes, n);
-  // The next one's: this one's are zero already, and in use.
+  // This clears the next round's counters; those of this round are zero already and in use.
   if (k == 0) round_of(batch.meshes, n + 1) = {};
   if (k == 0) round.count = count;
   if (k < count) place_mesh_gap(batch, round, k, batch.list[2][first + k]);
@@ -124,14 +125,14 @@ __global__ void __launch_bounds__(kMeshThreads, kFinishBlocks)
 }
 
 void launch_meshes(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream) {
-  const std::uint32_t room = batch.meshes.query_room;
+  const std::uint32_t capacity = batch.meshes.query_capacity;
   const auto count = static_cast<std::uint32_t>(batch.pairs.pairs.count);
   const auto blocks = [](int of) { return static_cast<unsigned>(of); };
   check(cudaMemsetAsync(batch.meshes.rounds, 0, 2 * sizeof(MeshGapRound), stream),
         "starting rounds");
-  for (std::uint32_t n = 0; n < (count + room - 1) / room; ++n) {
-    place_meshes<<<blocks_for(std::min(count, room), kPlaceThreads), kPlaceThreads, 0, stream>>>(
-        batch, n);
+  for (std::uint32_t n = 0; n < (count + capacity - 1) / capacity; ++n) {
+    place_meshes<<<blocks_for(std::min(count, capacity), kPlaceThreads), kPlaceThreads, 0,
+                   stream>>>(batch, n);
     check_launch("placing meshes");
     glance_at_meshes<<<blocks(grids.mesh_gaps.glance), kThreads<float>, 0, stream>>>(batch, n);
     check_launch("looking at spheres of meshes");

@@ -9,16 +9,16 @@
 #include "cuda/query/separation_arrays.h"
 #include "query/base/precision.h"
 
-// A batch of separations, step by step, as batch_steps.h has penetrations.
+// The steps of a batch of separations, as batch_steps.h has penetrations.
 
 namespace ist::gpu {
 
-/// Node pairs that one team opens before what is left is divided, and the weight of a task: leaves
-/// count 1, pairs above them more.
+/// The number of node pairs that one team opens before it divides the rest, and the weight of a
+/// task: leaves count 1, pairs above them more.
 constexpr std::uint32_t kGapsAlone = 160;
 constexpr std::uint32_t kGapTaskWeight = 16;
 
-/// World units, as separation(). By one lane.
+/// Writes an answer in world units, as separation(). Called by one lane.
 template <class Real>
 IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
                               const GapMemory<Real>& memory, const GapTotals& totals) {
@@ -32,7 +32,7 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     const double rounding =
         ist::distance_error<double>(span(memory.root(0), memory.root(1), place.a_from_b));
     const double error = rounding + place.rounding_of_world();
-    // What far apart was not told apart (GapDescent), covers have not yet.
+    // Cover gaps do not include yet what is too far apart for double (GapDescent).
     const double least = totals.cover - rounding - error;
     row.distance = unit * totals.gap;
     row.distance_min = unit * (least > 0 ? least : 0);
@@ -53,8 +53,8 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
   write_row(batch.answers, i, row);
 }
 
-/// Which list pair i goes to: 0 spheres in float, 1 in double, 2 meshes; −1: it is answered. One
-/// thread a pair.
+/// The list of pair i: 0 spheres in float, 1 in double, 2 meshes; −1 if it is answered. One thread
+/// per pair.
 IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i) {
   PairPlace place;
   if (kind_of(batch.pairs, i) == PairKind::trees &&
@@ -79,7 +79,7 @@ IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i
   return precision == Precision::float32 ? 0 : 1;
 }
 
-/// Readies the memory for pair i.
+/// Loads pair i into memory.
 template <class Team, class Real>
 IST_HD void load_separation(const Team& team, const SeparationArrays& batch, std::uint32_t i,
                             GapMemory<Real>& memory) {
@@ -105,16 +105,18 @@ IST_HD int gap_task_floor(const GapMemory<Real>& memory, int waiting) {
   return waiting;
 }
 
-/// Leaves what waits to others; false if there is no room. All of the team together.
+/// Leaves the pending entries to other teams; false if there is no memory. Called by the whole
+/// team.
 template <class Team, class Real>
 IST_HD bool split_separation(const Team& team, const SeparationArrays& batch, std::uint32_t i,
                              const GapMemory<Real>& memory, int waiting) {
-  const SplitRoom room = take_room(team, batch.pairs, batch.counters[sizeof(Real) == 4 ? 0 : 1], i,
-                                   waiting, [&](int top) { return gap_task_floor(memory, top); });
-  if (!room.fits) return false;
-  if (team.lane() == 0) batch.totals[room.split] = memory.before;
+  const SplitSlots work =
+      reserve_split(team, batch.pairs, batch.counters[sizeof(Real) == 4 ? 0 : 1], i, waiting,
+                    [&](int top) { return gap_task_floor(memory, top); });
+  if (!work.fits) return false;
+  if (team.lane() == 0) batch.totals[work.split] = memory.before;
   for (int k = team.lane(); k < waiting; k += Team::kWidth) {
-    const std::uint32_t at = room.first_entry + static_cast<std::uint32_t>(k);
+    const std::uint32_t at = work.first_entry + static_cast<std::uint32_t>(k);
     batch.entries.a[at] = memory.stack_a[k];
     batch.entries.b[at] = memory.stack_b[k];
     batch.entries.gap[at] = static_cast<double>(memory.stack_gap[k]);
@@ -123,12 +125,12 @@ IST_HD bool split_separation(const Team& team, const SeparationArrays& batch, st
   return true;
 }
 
-/// Visits of each of `tasks` after the first ones of a pair.
+/// The visits of each of `tasks` after the first ones of a pair.
 IST_HD inline std::uint32_t task_visits(std::uint32_t max_visits, std::uint32_t tasks) {
   return max_visits == ~0u ? max_visits : (max_visits - kGapsAlone) / tasks;
 }
 
-/// Searches pair i, or as much of it as one team is to do alone.
+/// Searches pair i, or the part of it that one team does alone.
 template <class Team, class Real>
 IST_HD void separate_pair(const Team& team, const SeparationArrays& batch, std::uint32_t i,
                           GapMemory<Real>& memory) {
@@ -157,7 +159,7 @@ IST_HD void separate_pair(const Team& team, const SeparationArrays& batch, std::
       most = task_visits(batch.max_visits, tasks);
     }
     if (descent.waiting() == 0) break;
-    // The tasks one by one, each as if others were doing the rest.
+    // Tasks run one by one, each as if other teams did the rest.
     floor = gap_task_floor(memory, descent.waiting());
     descent.restart(memory.before);
   }
@@ -165,7 +167,7 @@ IST_HD void separate_pair(const Team& team, const SeparationArrays& batch, std::
   team.sync();
 }
 
-/// Searches a task; who does a pair's last writes the answer.
+/// Searches a task. The team that finishes a pair's last task writes the answer.
 template <class Team, class Real>
 IST_HD void separate_task(const Team& team, const SeparationArrays& batch, std::uint32_t index,
                           GapMemory<Real>& memory) {
@@ -179,7 +181,7 @@ IST_HD void separate_task(const Team& team, const SeparationArrays& batch, std::
   descent.run(0, task_visits(batch.max_visits, split.tasks));
   descent.finish(0);
   if (team.lane() == 0) {
-    GapTotals* const of_tasks = batch.totals + batch.pairs.split_room;
+    GapTotals* const of_tasks = batch.totals + batch.pairs.split_capacity;
     of_tasks[index] = memory.best;
     publish();
     if (atomic_add(&split.left, ~0u) == 1) {

@@ -12,9 +12,9 @@
 
 namespace ist::gpu {
 
-/// A solid as a batch finds it: a field, or an asset's trees.
+/// A solid of a batch: a field, or an asset's trees.
 struct SolidRef {
-  AssetFrame frame;  ///< of an asset; of a field its own
+  AssetFrame frame;  ///< of an asset; a field has its own
   FieldRef field;    ///< FieldKind::none: an asset, which has all that follows
   TreeRef tree[2];   ///< by Measure
   SumsRef sums[2];   ///< by Measure

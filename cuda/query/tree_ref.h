@@ -7,7 +7,7 @@
 
 #include "query/asset/node_ball.h"
 
-// Trees of an asset where its bytes lie, in device memory or, for tests, in the host's.
+// Trees of an asset in place, in device memory or, for tests, in that of the host.
 
 namespace ist::gpu {
 
@@ -16,12 +16,12 @@ struct TreeRef {
   const BallBlock* blocks[kMaxLevels];
   const Origin* origins[kMaxLevels];
   double root[4];
-  /// Cube of the typical radius of the nodes of level k − 1, up to a factor that all trees share.
+  /// The cube of the typical radius of nodes of level k − 1, up to a factor that all trees share.
   double cube[kMaxLevels + 1];
   std::uint32_t leaf_blocks;
   int top;  ///< the level of one block
 
-  /// `tree`: a header that the host reads; `bytes`: where the asset lies.
+  /// `tree`: the header in host memory. `bytes`: the address of the asset.
   static TreeRef of(const TreeHeader& tree, const std::byte* bytes) {
     TreeRef ref = {};
     ref.top = static_cast<int>(tree.level_count) - 1;
@@ -45,7 +45,7 @@ struct TreeRef {
   }
 };
 
-/// Which side is opened at each step of a descent, from the roots down to leaf blocks or, of much
+/// The side that each step of a traversal opens, from the roots down to leaf blocks or, for much
 /// larger spheres, to single ones: the order of Descent (query/tree_overlap/descent.h).
 struct OpeningSteps {
   static constexpr int kMost = 2 * kMaxLevels;

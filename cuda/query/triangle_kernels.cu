@@ -6,7 +6,7 @@
 namespace ist::gpu {
 namespace {
 
-constexpr unsigned kThreadsEach = 128;  ///< of what one thread does of a pair
+constexpr unsigned kThreadsEach = 128;  ///< of kernels with one thread per pair
 constexpr unsigned kWarps = 4;          ///< whose memory is what a block may have
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr int kBlocksEach = 4;  ///< on a multiprocessor: what registers allow, 128 a thread
@@ -14,7 +14,7 @@ constexpr unsigned kWholeWarps = 3;
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 constexpr int kWholeBlocksEach = 4;  ///< 168 a thread
 
-/// Begins the n-th round.
+/// Begins round n.
 __global__ void __launch_bounds__(kThreadsEach)
     place_queries(const FieldBatch batch, const std::uint32_t n) {
   const std::uint32_t first = end_of(batch, round_of(batch, n + 1));
@@ -39,8 +39,8 @@ __global__ void __launch_bounds__(kThreads, kBlocksEach)
     sum_parts(const FieldBatch batch, const std::uint32_t n) {
   __shared__ FacetSumMemory memory[kWarps];
   TriangleRound& round = round_of(batch, n);
-  const std::uint32_t room = batch.room.part_room;
-  by_warps(round.parts < room ? round.parts : room, &round.summed,
+  const std::uint32_t capacity = batch.work.part_capacity;
+  by_warps(round.parts < capacity ? round.parts : capacity, &round.summed,
            [&](const WarpTeam& team, std::uint32_t k) {
              sum_part(team, batch, k, memory[threadIdx.x / 32]);
            });
@@ -52,7 +52,7 @@ __global__ void __launch_bounds__(kThreadsEach)
   if (k < walked_of(batch, round_of(batch, n))) answer_query(batch, k);
 }
 
-/// Pairs that found no room in their round, and those after the last of `n` rounds.
+/// Pairs that did not fit in their round, and those after the last of `n` rounds.
 __global__ void __launch_bounds__(kWholeThreads, kWholeBlocksEach)
     sum_the_rest(const FieldBatch batch, const std::uint32_t n) {
   __shared__ FacetWholeMemory memory[kWholeWarps];
@@ -76,10 +76,10 @@ TriangleGrids triangle_grids() {
 
 void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
                            cudaStream_t stream) {
-  constexpr std::uint64_t kLeastOfRound = 1 << 14;  // of pairs that keep some 700 words each
+  constexpr std::uint64_t kLeastOfRound = 1 << 14;  // pairs that store some 700 words each
   const auto rounds =
       static_cast<std::uint32_t>((batch.pairs.count + kLeastOfRound - 1) / kLeastOfRound);
-  const std::uint64_t most = batch.room.query_room;
+  const std::uint64_t most = batch.work.query_capacity;
   const unsigned blocks =
       blocks_for(batch.pairs.count < most ? batch.pairs.count : most, kThreadsEach);
   for (std::uint32_t n = 0; n < rounds; ++n) {

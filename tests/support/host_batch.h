@@ -33,10 +33,11 @@ class HostBatch {
   std::uint32_t most_alone = 0, task_weight = 0;
   bool by_size = true;
   // Of pairs of a tree and a field.
-  gpu::FieldCounters field_counters;                               ///< of the last run
-  std::uint32_t query_room = 7, part_room = 20, word_room = 3000;  ///< gpu::TriangleRoom
+  gpu::FieldCounters field_counters;  ///< of the last run
+  std::uint32_t query_capacity = 7, part_capacity = 20,
+                word_capacity = 3000;  ///< gpu::TriangleWorkspace
   // Of pairs of meshes: pairs of a round, chunks of triangles.
-  std::uint32_t mesh_room = 50, mesh_chunks = 400;
+  std::uint32_t mesh_capacity = 50, mesh_chunks = 400;
   std::uint32_t most_rounds = ~0u;
   std::uint32_t rounds = 0;  ///< of the last run
   // What exact runs keep from one to the next: see GpuKept.
@@ -52,7 +53,7 @@ class HostBatch {
   void sum(const gpu::BatchArrays& batch, unsigned seed);
   void run_exactly(const gpu::SolidPairs& asked, unsigned seed);
   void run_fields(const gpu::SolidPairs& asked, unsigned seed);
-  gpu::TriangleRoom triangle_room();
+  gpu::TriangleWorkspace triangle_work();
   /// The kernels of triangle_kernels.cu.
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed);
 

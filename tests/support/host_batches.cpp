@@ -88,20 +88,20 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   exact_counters = {};
   batch.counters = &exact_counters;
   std::vector<std::uint32_t> lists[gpu::kExactPasses], next(mesh_chunks);
-  std::vector<gpu::ExactQuery> mesh_queries(mesh_room);
+  std::vector<gpu::ExactQuery> mesh_queries(mesh_capacity);
   std::vector<gpu::ExactChunk> chunks(mesh_chunks);
   for (int k = 0; k < gpu::kExactPasses; ++k) {
     lists[k].resize(asked.pairs.count);
     batch.list[k] = lists[k].data();
   }
   batch.queries = mesh_queries.data();
-  batch.query_room = mesh_room;
+  batch.query_capacity = mesh_capacity;
   batch.pool = {chunks.data(), next.data(), nullptr, mesh_chunks};
   for (const gpu::SolidRef& solid : solids_.refs())
     batch.most_blocks = std::max(batch.most_blocks, solid.mesh.count);
   gpu::ExactKept kept = kept_;
   gpu::KeptRound kept_rounds[2] = {};
-  std::vector<std::uint32_t> kept_list(mesh_room);
+  std::vector<std::uint32_t> kept_list(mesh_capacity);
   kept.rounds = kept_rounds;
   kept.list = kept_list.data();
   if (kept.pairs > 0 && kept.pairs < asked.pairs.count) throw std::logic_error("too few are kept");
@@ -112,10 +112,10 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     if (kept.pairs > 0 && kept.head(i).state == gpu::KeptState::holds) ++held;
   }
   std::vector<std::uint64_t> bytes;
-  const auto room = [&](int pass) {
+  const auto workspace = [&](int pass) {
     bytes.assign(batch.bytes_of_team(pass) / 8, ~std::uint64_t{0});
-    batch.rooms = batch.memory = reinterpret_cast<std::byte*>(bytes.data());
-    const gpu::ExactRoom of_pass = batch.room(pass, 0);
+    batch.team_memory = batch.memory = reinterpret_cast<std::byte*>(bytes.data());
+    const gpu::ExactWorkspace of_pass = batch.workspace(pass, 0);
     gpu::clear_marks(SerialTeam(), of_pass);
     return of_pass;
   };
@@ -125,7 +125,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   const auto sum = std::make_unique<gpu::ExactSumMemory>();
   const auto contact = std::make_unique<gpu::ExactContactMemory>();
   const auto whole = std::make_unique<gpu::ExactWholeMemory>();
-  const gpu::ExactRoom first_room = room(0);
+  const gpu::ExactWorkspace first_work = workspace(0);
   std::uint32_t n = 0;
   for (std::uint32_t first = 0; n < std::min(most_rounds, 100u) && first < exact_counters.listed[0];
        ++n) {
@@ -153,7 +153,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
     const auto sum_all = [&]<bool kExactly>(std::uint32_t all) {
       for (std::uint32_t k = 0; k < all; ++k)
         by_team(seed, [&](const auto& team) {
-          gpu::sum_query<kExactly>(team, batch, round, k, first_room, *pair, *sum);
+          gpu::sum_query<kExactly>(team, batch, round, k, first_work, *pair, *sum);
         });
     };
     sum_all.template operator()<false>(round.searched);
@@ -166,7 +166,7 @@ void HostBatch::run_exactly(const gpu::SolidPairs& asked, unsigned seed) {
   }
   rounds = n;
   for (int pass = 1; pass < gpu::kExactPasses; ++pass) {
-    const gpu::ExactRoom of_pass = room(pass);
+    const gpu::ExactWorkspace of_pass = workspace(pass);
     const std::uint32_t listed = exact_counters.listed[pass];
     for (std::uint32_t k = 0; k < gpu::pairs_of_pass(batch, pass, n); ++k)
       by_team(seed, [&](const auto& team) {
@@ -180,7 +180,7 @@ void HostBatch::cut_for(std::size_t most_pairs) {
   arrays.cut_for(most_pairs);
   most_alone = arrays.most_alone;
   task_weight = arrays.task_weight;
-  by_size = arrays.size_room > 0;
+  by_size = arrays.size_capacity > 0;
 }
 
 void HostBatch::sum(const gpu::BatchArrays& batch, unsigned seed) {
@@ -214,7 +214,7 @@ void HostBatch::run_fields(const gpu::SolidPairs& asked, unsigned seed) {
   field_counters = {};
   rounds = 0;
   const gpu::FieldBatch batch = {
-      asked, &field_counters, {lists[0].data(), lists[1].data()}, triangle_room()};
+      asked, &field_counters, {lists[0].data(), lists[1].data()}, triangle_work()};
   for (std::uint32_t i = 0; i < n; ++i) {
     const int group = gpu::sift_field_pair(batch, i);
     if (group >= 0) gpu::listed_pair(batch, group, field_counters.listed[group]++) = i;
@@ -227,11 +227,12 @@ void HostBatch::run_fields(const gpu::SolidPairs& asked, unsigned seed) {
   sum_rounds(batch, seed);
 }
 
-gpu::TriangleRoom HostBatch::triangle_room() {
-  queries_.resize(query_room);
-  parts_.resize(part_room);
-  words_.resize(word_room);
-  return {queries_.data(), parts_.data(), words_.data(), query_room, part_room, word_room};
+gpu::TriangleWorkspace HostBatch::triangle_work() {
+  queries_.resize(query_capacity);
+  parts_.resize(part_capacity);
+  words_.resize(word_capacity);
+  return {queries_.data(), parts_.data(), words_.data(),
+          query_capacity,  part_capacity, word_capacity};
 }
 
 void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
@@ -248,7 +249,7 @@ void HostBatch::sum_rounds(const gpu::FieldBatch& batch, unsigned seed) {
     for (; round.walked < count && gpu::goes_on(batch, round, 1); ++round.walked)
       by_team(seed,
               [&](const auto& team) { gpu::walk_query(team, batch, round, round.walked, *walks); });
-    for (std::uint32_t k = 0; k < std::min(round.parts, part_room); ++k)
+    for (std::uint32_t k = 0; k < std::min(round.parts, part_capacity); ++k)
       by_team(seed, [&](const auto& team) { gpu::sum_part(team, batch, k, *sums); });
     for (std::uint32_t k = 0; k < round.walked; ++k) gpu::answer_query(batch, k);
     if (round.walked == 0) throw std::logic_error("a round has no room for a pair");
@@ -283,7 +284,8 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                   vectors,
                   numbers};
   // What teams that come before left in their room must not matter.
-  std::vector<std::byte> room(gpu::PatchRoom::bytes(solids_.most_bins()), std::byte{0xA5});
+  std::vector<std::byte> memory_of_team(gpu::PatchWorkspace::bytes(solids_.most_bins()),
+                                        std::byte{0xA5});
   gpu::PatchArrays batch = {};
   static_cast<gpu::SolidPairs&>(batch.pairs) =
       solids_.asked(columns.pairs(), measure, wholes.answers());
@@ -299,7 +301,7 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                    to.torque.data(),
                    to.point.data(),
                    to.torsion.data()};
-  batch.rooms = room.data();
+  batch.team_memory = memory_of_team.data();
   batch.most_bins = solids_.most_bins();
   if (measure == Measure::exact) {
     divide_exactly(batch.pairs, batch.patches, seed);
@@ -308,8 +310,9 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
   const auto memory = std::make_unique<gpu::PatchMemory>();
   for (std::uint32_t i = 0; i < n; ++i)
     if (gpu::sift_patches(batch, i))
-      by_team(seed,
-              [&](const auto& team) { gpu::patch_pair(team, batch, i, batch.room(0), *memory); });
+      by_team(seed, [&](const auto& team) {
+        gpu::patch_pair(team, batch, i, batch.workspace(0), *memory);
+      });
   return to.rows(wholes.rows());
 }
 
@@ -336,13 +339,13 @@ void HostPatches::divide_exactly(const gpu::SolidPairs& asked, const GpuContactP
     // What was there before must not matter.
     std::vector<std::uint64_t> bytes(batch.bytes_of_team(pass) / 8, 0xA5A5A5A5A5A5A5A5u);
     batch.memory = reinterpret_cast<std::byte*>(bytes.data());
-    const gpu::ExactRoom room = batch.room(pass, 0);
-    gpu::PartRoom parts = batch.part_room(pass, 0);
+    const gpu::ExactWorkspace work = batch.workspace(pass, 0);
+    gpu::Arena parts = batch.arena(pass, 0);
     parts.end = parts.at + std::min(parts.end - parts.at, part_bytes[pass]);
-    gpu::clear_marks(SerialTeam(), room);
+    gpu::clear_marks(SerialTeam(), work);
     for (std::uint32_t k = 0; k < exact_counters.listed[pass]; ++k)
       by_team(seed, [&](const auto& team) {
-        gpu::patch_pass(team, batch, pass, k, room, parts, *memory);
+        gpu::patch_pass(team, batch, pass, k, work, parts, *memory);
       });
   }
 }
@@ -376,7 +379,7 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
   for (int kind = 0; kind < 3; ++kind) batch.list[kind] = lists[kind].data();
   batch.pairs.splits = splits.data();
   batch.pairs.tasks = tasks.data();
-  batch.pairs.split_room = batch.pairs.task_room = batch.pairs.entry_room = room_;
+  batch.pairs.split_capacity = batch.pairs.task_capacity = batch.pairs.entry_capacity = room_;
   batch.answers = {to.distance.data(), to.distance_min.data(), to.distance_max.data(),
                    to.point_a.data(),  to.point_b.data(),      to.normal.data(),
                    to.status.data(),   to.visits.data(),       to.spheres.data()};
@@ -397,16 +400,16 @@ std::vector<Separation> HostSeparations::run(const std::vector<BatchPair>& pairs
 /// The kernels of meshes in separation_kernels.cu.
 void HostSeparations::separate_meshes(gpu::SeparationArrays& batch, unsigned seed) {
   gpu::MeshGapRound rounds[2] = {};
-  std::vector<gpu::MeshGapQuery> queries(mesh_room);
-  batch.meshes = {rounds, queries.data(), mesh_room};
+  std::vector<gpu::MeshGapQuery> queries(mesh_capacity);
+  batch.meshes = {rounds, queries.data(), mesh_capacity};
   const auto spheres = std::make_unique<gpu::GapMemory<float>>();
   const auto single = std::make_unique<gpu::MeshGapMemory<float>>();
   const auto in_double = std::make_unique<gpu::MeshGapMemory<double>>();
   const auto pair = std::make_unique<gpu::MeshGapPair>();
   const auto stack = std::make_unique<InsideStack>();
   const std::uint32_t listed = counters[2].listed;
-  for (std::uint32_t n = 0; n * mesh_room < listed; ++n) {
-    const std::uint32_t first = n * mesh_room, count = std::min(mesh_room, listed - first);
+  for (std::uint32_t n = 0; n * mesh_capacity < listed; ++n) {
+    const std::uint32_t first = n * mesh_capacity, count = std::min(mesh_capacity, listed - first);
     gpu::MeshGapRound& round = gpu::round_of(batch.meshes, n);
     round = {};
     for (std::uint32_t k = 0; k < count; ++k)

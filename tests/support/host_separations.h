@@ -22,8 +22,8 @@ class HostSeparations {
   std::vector<Separation> run(const std::vector<BatchPair>& pairs, unsigned seed = 0,
                               const GpuSeparationSettings& settings = {});
 
-  gpu::BatchCounters counters[3];  ///< of the last run, by kind
-  std::uint32_t mesh_room = 50;    ///< pairs of meshes of a round
+  gpu::BatchCounters counters[3];    ///< of the last run, by kind
+  std::uint32_t mesh_capacity = 50;  ///< pairs of meshes of a round
 
  private:
   template <class Real>

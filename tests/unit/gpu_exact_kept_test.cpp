@@ -153,7 +153,7 @@ TEST(GpuExactKept, SmallSolidsTurnBesideLargeOnes) {
 TEST(GpuExactKept, LittleRoomDoesNotShow) {
   const std::vector<BatchPair> pairs = exact_pairs(68, 100);
   Beside both(exact_assets(), pairs.size(), 1024);
-  both.kept.mesh_room = 7;
+  both.kept.mesh_capacity = 7;
   both.kept.mesh_chunks = 12;
   ask_motion(both, pairs, 8);
   EXPECT_GT(both.held, 50u);

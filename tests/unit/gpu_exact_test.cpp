@@ -116,7 +116,7 @@ TEST(GpuExact, LittleRoomDoesNotShow) {
   const std::vector<Penetration> expected = batch.run(pairs, Measure::exact);
   const std::uint32_t most = batch.rounds;
   EXPECT_GT(most, 5u);
-  batch.mesh_room = 7;
+  batch.mesh_capacity = 7;
   batch.mesh_chunks = 12;
   expect_same_bits(batch.run(pairs, Measure::exact), expected);
   EXPECT_GT(batch.exact_counters.listed[0], 400u);  // some more than once

@@ -298,9 +298,9 @@ TEST(GpuFields, RoomChangesNoBit) {
     for (pair.b = 0; pair.b < batch_solids().size(); ++pair.b) pairs.push_back(pair);
   }
   HostBatch roomy(mixed_solids());
-  roomy.query_room = static_cast<std::uint32_t>(pairs.size());
-  roomy.part_room = 100 * roomy.query_room;
-  roomy.word_room = 10000 * roomy.query_room;
+  roomy.query_capacity = static_cast<std::uint32_t>(pairs.size());
+  roomy.part_capacity = 100 * roomy.query_capacity;
+  roomy.word_capacity = 10000 * roomy.query_capacity;
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched, 1);
   EXPECT_EQ(roomy.rounds, 1u);
   const auto large = [](const HostBatch& batch) { return batch.field_counters.large; };
@@ -317,9 +317,9 @@ TEST(GpuFields, RoomChangesNoBit) {
                            Room{"few rounds", 5, 300, 30000, 2, false, false},
                            Room{"none", 5, 300, 30000, 0, false, false}}) {
     HostBatch batch(mixed_solids());
-    batch.query_room = room.queries;
-    batch.part_room = room.parts;
-    batch.word_room = room.words;
+    batch.query_capacity = room.queries;
+    batch.part_capacity = room.parts;
+    batch.word_capacity = room.words;
     batch.most_rounds = room.most_rounds;
     SCOPED_TRACE(room.of);
     expect_same_bits(batch.run(pairs, Measure::matched, 1), expected);

@@ -94,7 +94,7 @@ TEST(GpuMeshGaps, LanesOfAWarpNeedNoLuck) {
   HostSeparations batch(exact_solids());
   const std::vector<Separation> expected = batch.run(pairs, 1);
   compare_gaps(exact_assets(), pairs, expected);
-  batch.mesh_room = 7;
+  batch.mesh_capacity = 7;
   expect_same_bits(batch.run(pairs, 2), expected);
 }
 

@@ -156,7 +156,7 @@ TEST(GpuQuery, TheLargestPairsBegin) {
     gpu::BatchArrays batch = {};
     batch.counters = &counters;
     batch.list = list.data();
-    batch.size_room = room;
+    batch.size_capacity = room;
     for (std::uint32_t i = 0; i < kPairs; ++i) gpu::list_pair(batch, i, meet[i], counters.listed++);
     std::vector<bool> seen(kPairs);
     std::uint32_t least = 1u << gpu::kSizes;
