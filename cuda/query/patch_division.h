@@ -85,7 +85,7 @@ class BinSums {
   float term_[kTerms] = {};  ///< this lane's
 };
 
-/// Divides the binned sums into parts: ContactDivision (query/contact/contact_division.h) by a
+/// Divides the binned sums into parts: ContactDivision (query/contact/write_patches.cpp) by a
 /// team, along the regions of CutsRef.
 template <class Team>
 class PatchDivision {

@@ -9,16 +9,18 @@
 
 namespace ist {
 
-/// Which vertices of a crossed block are inside the other solid: those of pierced edges by what
-/// pierces them, the others by edges that nothing pierces. A bit a local vertex.
+/// The vertices of a crossed block that are inside the other solid, a bit for each local vertex.
+/// Those of pierced edges follow from what pierces them, the others from edges that nothing
+/// pierces.
 struct BlockInsides {
   std::uint32_t known = 0, inside = 0;
-  std::uint32_t joined[kWidth] = {};  ///< of a vertex: those at the ends of edges that are whole
+  std::uint32_t joined[kWidth] =
+      {};  ///< of a vertex: those joined to it by edges that nothing pierces
 
   BlockInsides() = default;
 
-  /// `pierced`: bit 3 · lane + edge. `sum(edge)`: how often it enters more than it leaves;
-  /// `first(edge)`: what comes first: 1 enters, −1 leaves, 0 unclear.
+  /// `pierced`: bit 3 · lane + edge. `sum(edge)`: its entries less its exits. `first(edge)`: 1 if
+  /// it enters first, −1 if it leaves first, 0 if unclear.
   template <class Sum, class First>
   IST_HD BlockInsides(const MeshBlock& mesh, std::uint64_t pierced, const Sum& sum,
                       const First& first) {
@@ -48,7 +50,7 @@ struct BlockInsides {
     spread(found);
   }
 
-  /// From vertices of which it is known.
+  /// Spreads the state of known vertices along edges that nothing pierces.
   IST_HD void spread(std::uint32_t from) {
     known |= from;
     while (from != 0) {
@@ -61,7 +63,8 @@ struct BlockInsides {
     }
   }
 
-  /// A vertex of which it is not known, where it is not clear what pierces an edge first; 16: none.
+  /// A vertex whose state is unknown, because it is unclear what pierces an edge first; 16 if there
+  /// is none.
   IST_HD std::uint32_t unknown(const MeshBlock& mesh) const {
     const std::uint32_t left = ((1u << mesh.vertices) - 1) & ~known;
     return left == 0 ? kWidth : static_cast<std::uint32_t>(lowest_bit(left));

@@ -1,4 +1,4 @@
-// How the triangles of two blocks lie to each other's planes: included once a target.
+// Tests of two blocks' triangles against each other's planes. Included once per target.
 
 #if defined(IST_QUERY_BLOCK_MEETING_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_BLOCK_MEETING_INL_H_
@@ -17,7 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Which triangles of a block reach into a slab.
+/// The triangles of a block that reach into a slab, a bit each.
 inline std::uint32_t in_slab(const PlacedTriangles& triangles, const float (&normal)[3], float low,
                              float high) {
   const F d;
@@ -40,11 +40,12 @@ struct Straddling {
   std::uint32_t clear = 0, doubtful = 0;
 };
 
-/// In float, and as if points moved by `reach`.
+/// The test is in float, with points that may move by `reach`.
 HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
                                  const PlacedTriangles& b, std::uint32_t lanes, float reach) {
   const F d;
-  // Coordinates are floats, and points of both blocks that matter are no further apart than this.
+  // The rounding of coordinates in float, and `reach`. Points of both blocks that matter are within
+  // `size`.
   const float blur = 1e-6f * (a.reach + b.reach) + reach, size = a.size + b.size;
   const auto over_a = hn::Set(d, blur * a.length[i] + a.slack[i] * size);
   Straddling out;
@@ -52,7 +53,7 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
     if ((lanes >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const auto over_b =
         hn::Set(d, blur) * hn::Load(d, b.length + l) + hn::Load(d, b.slack + l) * hn::Set(d, size);
-    // How far heights reach to the nearer side of a plane.
+    // The extent of heights beyond the nearer side of a plane.
     const auto through = [](const hn::Vec<F>(&height)[3]) {
       return hn::Min(hn::Neg(hn::Min(height[0], hn::Min(height[1], height[2]))),
                      hn::Max(height[0], hn::Max(height[1], height[2])));
@@ -82,14 +83,14 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
-/// How many planes through edges a search has asked, of A's triangles and of B's, and how many
-/// pairs they kept apart. Those pairs are tested otherwise, at three times the cost.
+/// The numbers of planes through edges that a search has tested, of A's triangles and of B's, and
+/// of pairs that they separated. Those pairs would cost three times as much otherwise.
 struct EdgeTally {
   std::uint32_t asked[2] = {}, apart[2] = {};
   bool pays(int side) const { return asked[side] <= 2 * apart[side] + 8; }
 };
 
-/// Two blocks whose triangles are tested by the planes of either side, in double, and by planes
+/// Two blocks whose triangles are tested in double by the planes of both sides, and by planes
 /// through their edges.
 class Meeting {
  public:
@@ -114,11 +115,10 @@ class Meeting {
   const PlacedVertices& vertices(int side) const { return *vertices_[side]; }
   Margin margin() const { return margin_; }
 
-  /// Which triangles of the other block may not lie beside all planes of a flat one of this side.
-  /// Where signs have to be settled, those of its triangles may not be: what is left out is out of
-  /// reach.
+  /// The triangles of the other block that may cross a plane of this side's block, if that is flat.
+  /// If signs must be settled, triangles that are left out are out of reach.
   std::uint32_t straddling_block(int side) {
-    // Its own heights are off by as much as the other's.
+    // Its own heights have the same error as the other's.
     const PlacedPlanes& planes = planes_of(side);
     const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
     flat_[side] = true;
@@ -126,15 +126,16 @@ class Meeting {
                                    margin_ == Margin::room ? Margin::reach : margin_));
   }
 
-  /// Which of `lanes` of B no plane keeps apart from A's triangle i.
+  /// The triangles of B among `lanes` that no plane separates from A's triangle i.
   std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
-    const bool told = margin_ != Margin::room;  // by the planes of flat blocks
+    const bool told = margin_ != Margin::room;  // flat blocks' planes have decided
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
     if (!told || !flat_[1])
       lanes = columns_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
     return lanes;
   }
-  /// Of `lanes`, B's triangles that planes through edges do not keep apart from A's triangle i.
+  /// The triangles of B among `lanes` that planes through edges do not separate from A's triangle
+  /// i.
   std::uint32_t within_edges(std::uint32_t i, std::uint32_t lanes, EdgeTally& tally) {
     const auto ask = [&](int side, std::uint32_t t) {
       ++tally.asked[side];
@@ -154,8 +155,8 @@ class Meeting {
     return lanes;
   }
 
-  /// Which of `lanes` of B lie in one plane with A's triangle i, to flush_distance(): that of
-  /// either, since the plane of a sliver may be any.
+  /// The triangles of B among `lanes` that are in one plane with A's triangle i, to
+  /// flush_distance(). Either triangle's plane will do, since that of a sliver may be any.
   std::uint32_t flush(std::uint32_t i, std::uint32_t lanes) {
     const auto in_plane = [&](int side, std::uint32_t t) {
       const PlaneSides off = sides_by(side, t, flush_distance(search_.touch));
@@ -164,7 +165,7 @@ class Meeting {
     const std::uint32_t others = lanes & ~in_plane(0, i);
     return lanes & ~flush_.without(i, others, [&](std::uint32_t j) { return in_plane(1, j); });
   }
-  /// Of `lanes`, B's triangles that no plane keeps further from A's triangle i than
+  /// The triangles of B among `lanes` that no plane keeps farther from A's triangle i than
   /// CrossingSearch::touch.
   std::uint32_t within_touch(std::uint32_t i, std::uint32_t lanes) {
     const auto beyond_plane = [&](int side, std::uint32_t t) {
@@ -183,13 +184,13 @@ class Meeting {
                    : &placed_planes(*search_.b, number_[1], &search_.a_from_b, *scratch_.placed_b);
     return *planes;
   }
-  /// Of the other block's vertices.
+  /// Classifies the other block's vertices by the plane of triangle t.
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
     return sides_of(*vertices_[1 - side], planes_of(side), t, low, high,
                     (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin,
                     double{margin == Margin::reach ? reach_ : search_.room});
   }
-  /// Of the other block's vertices, what is further from the plane of triangle t than `distance`.
+  /// The other block's vertices that are farther from the plane of triangle t than `distance`.
   PlaneSides sides_by(int side, std::uint32_t t, double distance) const {
     const PlacedPlanes& planes = planes_of(side);
     const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
@@ -201,17 +202,17 @@ class Meeting {
     return triangles_of(found.above, *vertices_[1 - side]) |
            triangles_of(found.below, *vertices_[1 - side]);
   }
-  /// Which of the other block's triangles lie beside the plane of triangle t.
+  /// The other block's triangles that are on one side of the plane of triangle t.
   std::uint32_t beside(int side, std::uint32_t t) const {
     return kept_apart(side, sides(side, t, 0, 0, margin_));
   }
-  /// And beyond an edge of it.
+  /// The same, and those beyond an edge of triangle t.
   std::uint32_t beyond(int side, std::uint32_t t) const {
     const double moved = margin_ != Margin::rounding ? 0.0 : side == 0 ? 1.0 : -1.0;
     return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], moved * search_.aside,
                            beyond_);
   }
-  /// A's triangles that those of B keep apart, found when they are asked for first.
+  /// The triangles of A that planes of B separate, computed at the first use.
   class Columns {
    public:
     template <class Find>

@@ -13,7 +13,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Opens both trees together, and collects the pairs of their blocks whose boxes and slabs meet.
+/// Traverses both trees together, and collects the pairs of blocks whose boxes and slabs intersect.
 class BlockSearch {
  public:
   BlockSearch(const CrossingSearch& search, ExactScratch& scratch)
@@ -70,7 +70,8 @@ class BlockSearch {
     }
   }
 
-  /// Which boxes of B reach into the slab of a box of A and have it reach into theirs.
+  /// The boxes of B that reach into the slab of a box of A, and whose own slab that box reaches
+  /// into.
   std::uint32_t in_slabs(const BoxBlock& of_a, std::uint32_t i, const BoxBlock& of_b,
                          const PlacedBoxes& b_in_a) const {
     const F d;
@@ -121,7 +122,7 @@ class BlockSearch {
     const PlacedBoxes& a_in_b = placed_a(pair.level_a, pair.a);
     const PlacedBoxes& b_in_a = placed_b(pair.level_b, pair.b);
     const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.reach);
-    // Unused lanes meet what is large enough.
+    // Unused lanes may intersect large boxes.
     std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     for (; rows != 0; rows &= rows - 1) {
@@ -160,8 +161,8 @@ class BlockSearch {
            kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
   }
 
-  /// Whether a box meets the box and the plane of one of a block's triangles. `half`: its sides'
-  /// halves, in A's frame.
+  /// True if a box intersects the box and the plane of one of a block's triangles. `half`: half of
+  /// its sides, in A's frame.
   bool meets_triangle(const PlacedTriangles& block, const OneBox& box,
                       const float (&half)[3][3]) const {
     const std::uint32_t lanes = meeting(block.low, block.high, box.low, box.high);
@@ -191,7 +192,7 @@ class BlockSearch {
     return (lanes & bits) != 0;
   }
 
-  /// A's side is a block: its triangles may be far larger than B's boxes.
+  /// A's node is a block, whose triangles may be far larger than B's boxes.
   void open_b(const BoxPair& pair) {
     const std::uint32_t lane = pair.a % kWidth, parent = pair.a / kWidth;
     const OneBox here(a_.level[1].boxes[parent].low, a_.level[1].boxes[parent].high, lane,

@@ -1,7 +1,7 @@
-// How far a box of a mesh is from one of the other, once for lanes of the CPU and for a thread of
-// the GPU. No header of its own: IST_FORMULA goes before a function, and `Of` says what its numbers
-// are: V, lanes of the numbers T or one of them; set(), magnitude(), lesser(), greater() and all()
-// work on them.
+// A lower bound of the distance of boxes of two meshes, once for lanes of the CPU and for a thread
+// of the GPU. This is not a header of its own. IST_FORMULA precedes a function, and `Of` defines
+// its numbers: V, lanes of numbers T or a single one, with set(), magnitude(), lesser(), greater()
+// and all().
 
 /// A box and its slab.
 template <class V>
@@ -9,13 +9,13 @@ struct LaneBox {
   V low[3], high[3], normal[3], slab_low, slab_high;
 };
 
-/// What a formula may be off by, relative.
+/// The relative error of a formula.
 template <class T>
 constexpr double kGapRounding = sizeof(T) == sizeof(float) ? 2e-6 : 1e-14;
 
-/// `squared`: the distance from `one`, or less; `apart`: the largest gap along any axis, which is
-/// negative where both overlap along all of them. False where all are certain to be `beyond`, by
-/// the first axes alone: then neither is said.
+/// `squared`: a lower bound of the squared distance from `one`. `apart`: the largest gap along any
+/// axis, negative if the boxes overlap along all of them. False if the first axes prove that all
+/// boxes are `beyond`; then neither is set.
 template <class Of, class S>
 IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const SeenBox<S>& one,
                                const LaneBox<typename Of::V>& box, typename Of::V beyond,
@@ -23,7 +23,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   using T = typename Of::T;
   using V = typename Of::V;
   const auto set = [](S x) { return Of::set(static_cast<T>(x)); };
-  constexpr S kLength = S(1 - 1e-5);  // of normals, in floats, or more
+  constexpr S kLength = S(1 - 1e-5);  // a lower bound of normals' lengths in float
   constexpr S kLengthOfWay = sizeof(T) == sizeof(float) ? kLength : S(1 - 1e-14);
   const V zero = set(0), half_one = set(S(0.5));
   V away[3], half[3];
@@ -42,7 +42,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   const auto times = [&](const T(&u)[3], const V(&x)[3]) {
     return (Of::set(u[0]) * x[0] + Of::set(u[1]) * x[1]) + Of::set(u[2]) * x[2];
   };
-  // Beside the way, by boxes.
+  // Distances perpendicular to the direction, by boxes.
   V beside = zero;
   for (int j = 0; j < 2; ++j) {
     beside = beside + squared_gap(Of::magnitude(times(look.lane_way[1 + j], away)) -
@@ -57,7 +57,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
     across = across + squared_gap(Of::magnitude(times(look.lane_axis[k], away)) -
                                   (times(look.abs_axis[k], half) + set(one.reach[k])));
   }
-  // n is `turn` times the other normal and a rest, by which only boxes are known.
+  // n is `turn` times the other normal plus a rest, along which only boxes are known.
   const V(&n)[3] = box.normal;
   const V turn =
       (n[0] * set(one.normal[0]) + n[1] * set(one.normal[1])) + n[2] * set(one.normal[2]);
@@ -75,7 +75,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   }
   for (int k = 0; k < 3; ++k)
     at_box = at_box + set(one.reach[k]) * Of::magnitude(times(look.lane_axis[k], rest));
-  // Along n, from the one's middle: it, and the lane's slab.
+  // Along n, from the middle of `one`: its extent, and the lane's slab.
   const V slab_low = box.slab_low - at_middle, slab_high = box.slab_high - at_middle;
   const V turn_low = turn * set(one.low), turn_high = turn * set(one.high);
   const V of_low = turn * slab_low, of_high = turn * slab_high;

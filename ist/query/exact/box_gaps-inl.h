@@ -1,4 +1,4 @@
-// How far boxes of a mesh are from a box of the other one, sixteen at a time: included once a
+// Bounds of the distances of sixteen boxes of a mesh from a box of the other. Included once per
 // target.
 
 #if defined(IST_QUERY_BOX_GAPS_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -46,8 +46,8 @@ struct BoxLanes {
   static HWY_INLINE bool all(hn::Mask<LaneTag<T>> x) { return hn::AllTrue(LaneTag<T>(), x); }
 };
 
-/// Which of sixteen boxes may be within `limit`, squared, of `one` of the other mesh: a bit each.
-/// Of these come the squared distances, or less, and how far they are apart.
+/// The boxes out of sixteen that may be within `limit`, squared, of box `one` of the other mesh, a
+/// bit each, with lower bounds of their squared distances and their largest gaps along an axis.
 template <class T>
 HWY_INLINE std::uint32_t measure_sixteen(const BoxLook<T, double>& look, const BoxBlock& boxes,
                                          const SeenBox<double>& one, double limit,

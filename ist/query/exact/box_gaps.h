@@ -6,7 +6,7 @@
 #include "query/base/pair_place.h"
 #include "query/exact/mesh_tree.h"
 
-// What bounds of the distance of boxes begin with, in double, on the CPU and on a GPU.
+// The input of bounds of boxes' distances, in double, on the CPU and on a GPU.
 
 namespace ist {
 
@@ -17,7 +17,7 @@ struct MiddleBox {
   S normal[3] = {}, slab_low = 0, slab_high = 0;
 };
 
-/// The box of a node: a lane of the block above, or that of the whole mesh, which has no slab.
+/// The box of a node: a lane of the block above, or the box of the whole mesh, which has no slab.
 template <class S>
 IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
   MiddleBox<S> box;
@@ -39,7 +39,7 @@ IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
   return box;
 }
 
-/// The way that an answer is likely to go, and two axes square to it and each other.
+/// The likely direction of the answer, and two axes perpendicular to it and each other.
 struct WayAxes {
   exact::Point way[3];
 };
@@ -55,7 +55,7 @@ IST_HD inline WayAxes axes_along(const exact::Point& way) {
   return {{way, beside, cross(way, beside)}};
 }
 
-/// The same of A's, seen in B's frame, from B to A.
+/// The same axes in B's frame, with the direction from B to A.
 IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a, double scale) {
   const double(&m)[9] = b_from_a.m;
   WayAxes out;
@@ -67,30 +67,30 @@ IST_HD inline WayAxes seen_back(const WayAxes& axes, const Similarity& b_from_a,
   return out;
 }
 
-/// One box of the other mesh in the frame of boxes that are measured from it. All is told from its
-/// middle.
+/// One box of the other mesh in the frame of the boxes that are compared with it. All numbers are
+/// relative to its middle.
 template <class S>
 struct SeenBox {
   S middle[3], hull[3], reach[3], normal[3];
   S low, high;      ///< its slab
-  S nearest;        ///< how far it reaches back along the way
+  S nearest;        ///< its extent backwards along the direction
   S beside_way[2];  ///< and beside that
 };
 
-/// How boxes of one mesh are seen from the other's frame: along their own axes, along the other's,
-/// along the normals of all slabs, and along the way that the answer is likely to go. Boxes in
-/// lanes of T, the other's in S.
+/// Compares boxes of one mesh with a box of the other: along their own axes, along the other's,
+/// along the normals of all slabs, and along the likely direction of the answer. Boxes are in lanes
+/// of T, the other's in S.
 template <class T, class S>
 struct BoxLook {
   S m[9], shift[3], scale;  ///< from the other's frame to theirs
   S axis[3][3];             ///< the other's, in their frame
   S along[3][3] = {};       ///< [way][axis of the other]: their product
-  S blur;                   ///< what a coordinate may be off by
-  // For lanes; ways go from the boxes to the other, and two beside that.
+  S blur;                   ///< the error of a coordinate
+  // For lanes. The first direction leads from the boxes to the other, two are perpendicular to it.
   T lane_axis[3][3], abs_axis[3][3], lane_way[3][3] = {}, abs_way[3][3] = {};
 
   BoxLook() = default;
-  /// `map` goes from the other's frame to theirs.
+  /// `map` leads from the other's frame to theirs.
   IST_HD BoxLook(const Similarity& map, double off)
       : scale(static_cast<S>(map.scale)), blur(static_cast<S>(off)) {
     const double inverse = 1 / map.scale;
@@ -105,12 +105,13 @@ struct BoxLook {
     }
   }
 
-  /// The first of the axes, of length 1, goes from the boxes to the other mesh; or all are zero.
+  /// Sets the axes. The first, of length 1, leads from the boxes to the other mesh; or all are
+  /// zero.
   IST_HD void turn(const WayAxes& axes) {
     for (int j = 0; j < 3; ++j)
       for (int k = 0; k < 3; ++k) turn(axes.way[j], axes.way[j][k], j, k);
   }
-  /// Its j-th, of which `component` is the k-th number.
+  /// Sets component k of the j-th axis.
   IST_HD void turn(const exact::Point& way, double component, int j, int k) {
     along[j][k] = static_cast<S>((way.x * double{axis[k][0]} + way.y * double{axis[k][1]}) +
                                  way.z * double{axis[k][2]});

@@ -6,7 +6,7 @@
 #include "query/exact/mesh_tree.h"
 #include "query/exact/overlap_formulas.h"
 
-// What lies below a lane of a box block as a whole, on the host and on a GPU.
+// Integrals over all that is below a lane of a box block, on the host and on a GPU.
 
 namespace ist {
 
@@ -21,7 +21,7 @@ IST_HD inline exact::Point map_vector(const Similarity& map, const exact::Point&
           (map.m[6] * x.x + map.m[7] * x.y) + map.m[8] * x.z};
 }
 
-/// Integrals over all triangles below a lane of a box block, seen from a point.
+/// Integrals over all triangles below a lane of a box block, relative to a point.
 struct LaneSums {
   double six_volumes;
   exact::Point moment, normal, torque;  ///< 24 ∫ x, ∫ n dA, ∫ x × n dA
@@ -31,7 +31,7 @@ struct LaneSums {
   double six_volume_rounding;  ///< six_volumes may be off by this
 };
 
-/// `a_from_b`: of B's; null for A's.
+/// `a_from_b`: for B's blocks; null for A's.
 IST_HD inline LaneSums lane_sums(const BoxBlock& box, const BoxSums& sums, std::uint32_t lane,
                                  const Similarity* a_from_b, const exact::Point& origin) noexcept {
   using exact::Point;
@@ -84,24 +84,24 @@ IST_HD inline LaneSums lane_sums(const BoxBlock& box, const BoxSums& sums, std::
   return found;
 }
 
-/// What a surface that has moved changes the volume by: no more than a layer as thick over its
-/// faces, edges and corners. `width`: of a box around it, all sides together.
+/// A bound of the change of volume if a surface moves: a layer of that thickness over its faces,
+/// edges and corners. `width`: the sum of the sides of a box around it.
 IST_HD inline double moved_layer(double moved, double area, double width) noexcept {
   return moved * area + 32 * (moved * moved) * width;
 }
 
-/// Signs of a pair are those of B moved by this.
+/// The symbolic translation of B, by which signs of a pair are decided.
 struct MoveAside {
   exact::Point by = {0, 0, 0};  ///< A's unit frame
   double far = 0;               ///< its length
 };
 
-/// Signs are those of B moved by far more than what rounds the meshes' places, and by far less than
-/// what the interval allows for anyway: then faces that are flush, and copies in place, have clear
-/// signs. It goes away from A's middle, since flush parts separate so, and somewhat across, since
-/// no direction of a part is like it. What A and B see of each other is opposite if they change
-/// places: the first and the last term are, and the sign of the other is by the middles, or where
-/// these do not tell by the meshes' hashes. Copies of one mesh about one middle see the same.
+/// The translation is far larger than the rounding of the meshes' placement, and far smaller than
+/// what the interval allows for anyway. So flush faces and copies in place have clear signs. It
+/// leads away from A's middle, since flush parts separate in that direction, and somewhat across,
+/// since no direction of a part is like that. It is opposite if A and B change places: so are its
+/// first and last term, and the sign of the other follows from the middles or, if these are equal,
+/// from the meshes' hashes. Copies of one mesh about one middle get the same translation.
 IST_HD inline MoveAside aside_of(const MeshTree& a, const MeshTree& b,
                                  const Similarity& a_from_b) noexcept {
   using exact::Point;

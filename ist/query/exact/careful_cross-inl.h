@@ -1,6 +1,6 @@
 // Products of vectors that keep their digits, in doubles: in the terms of overlap_formulas-inl.h.
 
-/// a b − c e, rounded about once: products are split.
+/// a b − c e, rounded about once, by split products.
 struct Halves {
   Real whole, high, low;
 };

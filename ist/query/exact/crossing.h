@@ -6,10 +6,10 @@
 
 namespace ist::exact {
 
-/// +1: the edge p → q goes down through the plane, into the other solid; −1: up.
+/// +1 if the edge p → q enters the other solid through the plane, −1 if it leaves.
 IST_HD inline int direction(int sign_p) { return sign_p > 0 ? 1 : -1; }
 
-/// Whether the triangles of A and B cross, of B where it is.
+/// True if triangles of A and B cross, with B not translated.
 IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
   const Point still = {0, 0, 0};
   int height[2][3];
@@ -32,8 +32,8 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
   return false;
 }
 
-/// How often the way from p to q, both B's points or both A's, enters the other solid through one
-/// of its triangles: 1, 0 or −1. `unsure`: doubles do not tell, without `kExactly`.
+/// 1 if the line from p to q, two points of B or of A, enters the other solid through one of its
+/// triangles, −1 if it leaves, else 0. `unsure`: doubles do not decide, without `kExactly`.
 template <bool kExactly = true>
 IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b,
                          const Point& aside, bool& unsure) {
@@ -52,7 +52,7 @@ IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bo
                  .sign;
     all = all && way[k] != 0;
   }
-  // Ways round that differ from each other keep it outside whatever the others are.
+  // Two different signs prove that the line misses the triangle, whatever the third is.
   const int least =
       way[0] < way[1] ? (way[0] < way[2] ? way[0] : way[2]) : (way[1] < way[2] ? way[1] : way[2]);
   const int most =

@@ -1,4 +1,4 @@
-// Where the edges of triangles that cross go through each other: included once a target.
+// The points where edges of crossing triangles pierce each other. Included once per target.
 
 #if defined(IST_QUERY_CROSSING_ENDS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_CROSSING_ENDS_INL_H_
@@ -87,7 +87,7 @@ class PiercingEdges {
     put_point(Crossings::kOffset, end.offset);
     const V one = hn::Set(d, 1.0), two = hn::Set(d, 2.0);
     put(Crossings::kT, hn::IfThenElse(end.from_second, one - end.share, end.share));
-    // Which of two places comes first is asked with B moved aside.
+    // The order of two points on an edge is that with B translated symbolically.
     put(Crossings::kTError,
         hn::IfThenElse(
             end.flat, one,

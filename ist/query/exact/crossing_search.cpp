@@ -18,7 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Finds the triangles that cross in pairs of blocks.
+/// Finds the crossing triangles in pairs of blocks.
 class TriangleSearch : PairSigns {
  public:
   TriangleSearch(const CrossingSearch& search, ExactScratch& scratch)
@@ -41,8 +41,7 @@ class TriangleSearch : PairSigns {
     for (; n < count && found_.complete; ++n) {
       // Two blocks add at most 256, and seven more wait.
       if (keep_ == nullptr && n > next && found_.crossings + 264 > scratch_.most_crossings) break;
-      // Where many more are near than cross, keeping them would not pay. Two blocks add at most
-      // 256.
+      // If many more are near than cross, keeping them does not pay. Two blocks add at most 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
                                gathered_ + 264 > scratch_.kept.most())) {
         KeptRing::give_up(*keep);
@@ -82,7 +81,7 @@ class TriangleSearch : PairSigns {
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
     ends_.write(found_.crossings, scratch_.crossings);
-    // Sums go over eight at a time.
+    // Sums take eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
   }
@@ -122,7 +121,7 @@ class TriangleSearch : PairSigns {
     };
     const bool is_thin[2] = {thin(box_a.slab_low, box_a.slab_high, lane_a),
                              thin(box_b.slab_low, box_b.slab_high, lane_b)};
-    // Whether any are left that do not lie beside the planes of a block.
+    // True if any triangles are left that the planes of a block do not separate.
     const auto straddle_blocks = [&] {
       for (int side = 0; side < 2; ++side) {
         if (!is_thin[side]) continue;
@@ -139,7 +138,7 @@ class TriangleSearch : PairSigns {
       const OneBox box(a.low, a.high, i, reach_);
       std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
       if (lanes == 0) continue;
-      // Where floats tell nothing, they are not asked again.
+      // Where floats decide nothing, they are not used again.
       const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes, reach_);
       flush |= found.clear == 0 && found.doubtful != 0;
       if ((found.clear | found.doubtful) == 0) continue;
@@ -152,7 +151,7 @@ class TriangleSearch : PairSigns {
         add_pair(kWidth * number_a + i, both.vertices(0),
                  kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
                  both.vertices(1), both.margin() == Margin::room);
-      // Once both blocks are marked, planes tell far more.
+      // Once both blocks are marked, planes decide far more.
       if (!flush || both.margin() != Margin::room) continue;
       if (!std::exchange(tried, true)) test_pairs();
       if (!are_near(number_a, number_b)) continue;
@@ -175,7 +174,7 @@ class TriangleSearch : PairSigns {
     if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
   }
 
-  /// Tests what has been gathered, by the planes of both triangles and by edges.
+  /// Tests the gathered pairs by the planes of both triangles and by edges.
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0), asks = std::exchange(pairs.asks, 0);
@@ -207,7 +206,7 @@ class TriangleSearch : PairSigns {
     for (; left != 0; left &= left - 1)
       find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
     round.pierced(parts, pierced);
-    // Two edges pierce where triangles cross, none else.
+    // Two edges pierce if triangles cross, else none.
     std::uint32_t once = 0, twice = 0, more = 0;
     for (const auto& of_side : pierced)
       for (const std::uint32_t bits : of_side) {
@@ -219,7 +218,7 @@ class TriangleSearch : PairSigns {
     if (twice != 0) add_crossings(pairs, heights, pierced, twice);
   }
 
-  /// Those whose blocks are not both marked as near.
+  /// The pairs whose blocks are not both marked as near.
   std::uint32_t not_marked(const TrianglePairs& pairs, std::uint32_t which) const {
     std::uint32_t out = 0;
     for (; which != 0; which &= which - 1) {
@@ -230,8 +229,9 @@ class TriangleSearch : PairSigns {
     return out;
   }
 
-  /// Pairs whose signs might be others if points moved by the room mark their blocks, if they are
-  /// as near: the same ones whichever search found them. Those that cross have marked theirs.
+  /// Marks the blocks of pairs whose signs might differ if points moved within the tolerance, if
+  /// they are that near. So the marks do not depend on which search found the pairs. Crossing pairs
+  /// have marked theirs.
   HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t count, std::uint32_t asks) {
     asks = not_marked(pairs, asks);
     if (asks == 0) return;
@@ -250,8 +250,8 @@ class TriangleSearch : PairSigns {
     }
   }
 
-  /// Keeps of what has been gathered what no plane along a triangle or along an edge of each keeps
-  /// as far apart as the search reaches.
+  /// Keeps the gathered pairs that no plane along a triangle, or along an edge of each, separates
+  /// by more than the search's reach.
   void keep_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0);
@@ -288,7 +288,7 @@ class TriangleSearch : PairSigns {
   float pad_b_, reach_, slack_;
   EdgeTally edges_;
   PiercingEdges ends_;
-  KeptPairs* keep_ = nullptr;   ///< what is near is kept, and not tested yet
+  KeptPairs* keep_ = nullptr;   ///< near pairs are kept, and not tested yet
   std::uint32_t gathered_ = 0;  ///< for it
   CrossingsFound found_;
 };

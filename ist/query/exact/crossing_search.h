@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// Two placed meshes whose crossing triangles are looked for.
+/// Two placed meshes whose crossing triangles are wanted.
 struct CrossingSearch {
   const MeshTree* a;
   const MeshTree* b;
@@ -19,7 +19,7 @@ struct CrossingSearch {
   float near = 0;                  ///< pairs that come as near are found, ≥ room
   float reach = 0;                 ///< and those that may, for what is kept: ≥ near
   std::uint32_t max_visits = 0;    ///< pairs of nodes; 0: no limit
-  double touch = 0;                ///< what comes as near touches: poses and vertices round by this
+  double touch = 0;  ///< solids that are as near touch: the rounding of poses and vertices
 };
 
 /// Pairs of blocks of both meshes whose boxes come within `reach`.
@@ -36,7 +36,7 @@ struct CrossingsFound {
   bool consistent = true;       ///< signs agree with each other
 };
 
-/// How the surfaces of two solids touch that have no volume in common.
+/// How the surfaces of two solids without common volume touch.
 struct SurfaceContact {
   bool touching = false;     ///< points of both are within CrossingSearch::touch of each other
   double area = 0;           ///< of the faces that lie on each other, back to back
@@ -47,28 +47,28 @@ struct SurfaceContact {
 /// Finds the pairs of blocks.
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
-/// Of `count` pairs of blocks (ExactScratch::keys) all triangles that cross, in the order of the
-/// pairs, by exact signs where need be. The same crossings on every instruction set. It goes on
-/// from crossing `first` and pair `next`, and stops where there is no room for more. Marks the
-/// blocks (BlockMarks::near) whose signs might be others if points moved by `room`. `keep`, unless
+/// Finds all crossing triangles of `count` pairs of blocks (ExactScratch::keys), in the order of
+/// the pairs, by exact signs where necessary. The crossings are the same on every instruction set.
+/// Continues from crossing `first` and pair `next`, and stops when memory is full. Marks the blocks
+/// (BlockMarks::near) whose signs might differ if points moved within the tolerance. `keep`, unless
 /// null, gets the pairs of triangles that may cross before B has moved by its margin.
 CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first, std::uint32_t next,
                               std::uint32_t count, KeptPairs* keep, ExactScratch& scratch) noexcept;
 
-/// The same crossings, of pairs of triangles that are kept.
+/// Finds the same crossings among pairs of triangles that are kept.
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept;
 
-/// Of the pairs of blocks (ExactScratch::keys), or those of triangles that are kept, that are
-/// marked as near: how they touch, B where it is.
+/// Finds how the pairs of blocks (ExactScratch::keys), or the kept pairs of triangles, that are
+/// marked as near touch, with B not translated.
 SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
                             const KeptPairs* kept, ExactScratch& scratch) noexcept;
 
-/// Whether one of the first `count` crossings is there wherever points move by the room.
+/// True if one of the first `count` crossings exists wherever points move within the tolerance.
 bool any_settled(const CrossingSearch& search, std::uint32_t count, ExactScratch& scratch) noexcept;
 
-/// The vertices of a block in A's unit frame, B's rounded once after the motion. They stay until
-/// others are placed.
+/// The vertices of a block in A's unit frame, those of B rounded once after the motion. They are
+/// valid until others are placed.
 const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,
                                   ExactScratch& scratch) noexcept;
 

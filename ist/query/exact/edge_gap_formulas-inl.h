@@ -1,7 +1,7 @@
 // The nearest points of two edges, once for lanes of the CPU and for a thread of the GPU: in the
 // terms of overlap_formulas-inl.h, and least_inverted().
 
-/// Of what is not too small, else 0.
+/// The inverse of x, or 0 if x is too small.
 IST_FORMULA Real inverse_of(Real x) {
   const Real one = constant(1.0);
   const Mask long_enough = less(least_inverted(), x);
@@ -26,9 +26,9 @@ IST_FORMULA void take_nearer(NearestPoints& least, Real other, Mask valid, const
 
 IST_FORMULA Real part_of_edge(Real x) { return lesser(greater(x, constant(0.0)), constant(1.0)); }
 
-/// An edge u of A from `p`, and an edge v of B from `q`: where the lines are nearest, by products
-/// of vectors, which keep the digits of nearly parallel ones; then each is brought to the other's
-/// point in turn.
+/// The nearest points of an edge u of A from `p` and an edge v of B from `q`. Those of the lines
+/// come from cross products, which keep the digits of nearly parallel ones; then each is moved to
+/// the point nearest to the other in turn.
 IST_FORMULA void along_edges(const Vec3& p, const Vec3& u, Real inverse_u, const Vec3& q,
                              const Vec3& v, Real inverse_v, NearestPoints& least) {
   const Vec3 w = q - p;

@@ -10,7 +10,7 @@ struct ExactInWorld {
   Vec3 centroid;       ///< zero if there is no volume
   Vec3 force, torque;  ///< the volume's gradients by a motion of B, about B's origin
 
-  /// Of sums in A's unit frame from `origin`; `moment`: 24 ∫ x.
+  /// Converts sums in A's unit frame about `origin`. `moment`: 24 ∫ x.
   IST_HD ExactInWorld(double found, const Vec3& moment, const Vec3& push, const Vec3& turn,
                       const Vec3& origin, const PairPlace& place) {
     const double u = place.unit_a, unit3 = u * u * u;
@@ -18,7 +18,7 @@ struct ExactInWorld {
     force = (u * u) * turned(place.rotation_a, push);
     centroid = {0, 0, 0};
     if (found != 0) centroid = place.to_world(origin + moment / (24 * found));
-    // The sums' origin from B's.
+    // The sums' origin relative to B's.
     const Vec3 arm =
         turned(place.rotation_a, u * (origin - vec3(place.a_from_b.t))) + place.offset_b;
     torque = unit3 * turned(place.rotation_a, turn) + cross(arm, force);

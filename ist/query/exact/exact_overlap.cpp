@@ -19,7 +19,8 @@ using exact::length_bound;
 
 }  // namespace
 
-/// Triangles that are so near count as near, whichever search found them: far more than rounding.
+/// Triangles within this distance count as near, whichever search found them. It is far more than
+/// rounding.
 double ExactQuery::nearness() const noexcept {
   return 1e-7 * (sides_[0].mesh.extent() + a_from_b_.scale * sides_[1].mesh.extent());
 }
@@ -49,7 +50,7 @@ void ExactQuery::clear_marks() noexcept {
   }
 }
 
-/// By the numbers of their blocks: the order of sums is that of the meshes.
+/// Sorts by the numbers of blocks, so that the order of sums is that of the meshes.
 void ExactQuery::sort_pairs(std::uint32_t count) noexcept {
   if (count < 64) {
     std::sort(scratch_.keys.get(), scratch_.keys.get() + count);
@@ -109,16 +110,16 @@ bool ExactQuery::add_crossing(std::uint32_t i) noexcept {
   return true;
 }
 
-/// An edge is pierced: how often it enters and leaves, and which comes first.
-void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const CrossingEnd& end,
-                               double t, double t_error) noexcept {
+/// Counts that an edge is pierced: its entries and exits, and which comes first.
+void ExactQuery::note_piercing(Side& own, CrossedBlock& crossed, const CrossingEnd& end, double t,
+                               double t_error) noexcept {
   const std::uint32_t edge = 3 * (end.triangle % kWidth) + end.edge;
   const int sign = end.enters ? 1 : -1;
   if (crossed.pierced >> edge & 1) {
     crossed.sum[edge] = static_cast<std::int8_t>(crossed.sum[edge] + sign);
     double& first = crossed.first_t[edge];
     double& error = crossed.first_error[edge];
-    if (std::abs(t - first) <= t_error + error) {  // in no certain order
+    if (std::abs(t - first) <= t_error + error) {  // their order is uncertain
       if (crossed.first[edge] != sign) crossed.first[edge] = 0;
       error = std::max(error + std::abs(t - first), t_error);
       first = std::min(first, t);
@@ -167,7 +168,7 @@ LaneSums ExactQuery::lane_sums(const Side& own, int level, std::uint32_t i, std:
   return ist::lane_sums(of.boxes[i], of.sums[i], lane, own.is_b ? &a_from_b_ : nullptr, origin);
 }
 
-/// What lies below a lane of a box block, inside as a whole.
+/// Adds all that is below a lane of a box block and inside as a whole.
 void ExactQuery::sum_lane(const Side& own, int level, std::uint32_t i, std::uint32_t lane,
                           ExactSums& into) noexcept {
   const LaneSums sums = lane_sums(own, level, i, lane, out_.origin);
@@ -181,7 +182,8 @@ void ExactQuery::add_layer(const Side& own, double area, double width) noexcept 
   layers_ += moved_layer(own.moved, area, width);
 }
 
-/// Blocks at the surface of the other solid: rounding and deviations there change the volume.
+/// Bounds the error from blocks at the surface of the other solid, where rounding and deviations
+/// change the volume.
 void ExactQuery::bound_near(const Side& own) noexcept {
   const std::uint32_t blocks = own.mesh.level[0].count;
   const double scale = own.is_b ? a_from_b_.scale : 1;
@@ -197,7 +199,7 @@ void ExactQuery::bound_near(const Side& own) noexcept {
     }
 }
 
-/// Finds the pairs of blocks, or what is kept of them, for find_more().
+/// Finds the pairs of blocks, or takes the kept ones, for find_more().
 bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
   const double room = 2 * (sides_[0].moved + sides_[1].moved);
   const MeshTree &a = sides_[0].mesh, &b = sides_[1].mesh;
@@ -222,8 +224,8 @@ bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) n
   return pairs.complete;
 }
 
-/// Triangles that cross, in the order of the meshes: those for which there is room, behind the
-/// `first` that are left of the ones before.
+/// Finds crossing triangles in the order of the meshes, as many as fit behind the `first` that
+/// remain from before.
 CrossingsFound ExactQuery::find_more(std::uint32_t first, std::uint32_t next) noexcept {
   CrossingsFound found = {.complete = false};
   if (serves_) {
@@ -250,7 +252,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   clear_marks();
   out_.complete = begin_search(max_visits, pair_id);
   std::uint32_t left = 0, next = 0;
-  bool settled = false;  // of those that are no longer held
+  bool settled = false;  // of crossings that are no longer stored
   while (out_.complete) {
     const CrossingsFound found = find_more(left, next);
     out_.consistent = found.consistent;
@@ -284,7 +286,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
-    // In the order of the mesh, whichever was found first.
+    // The order is that of the mesh, whichever was found first.
     for_each_block(side.marks.pierced, side.mesh.level[0].count, [&](std::uint32_t b) {
       sum_crossed_block(side, side.marks.blocks[side.marks.place[b]]);
     });
@@ -296,10 +298,11 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   out_.sums.add(slots_.total());
   out_.error = 1.01 * ((rounding_ + slots_.rounding()) / 6 + layers_) +
                4 * kHalfUnit * std::abs(out_.sums.volume());
-  out_.consistent = std::isfinite(out_.error);  // of what is no number there is no bound
+  out_.consistent = std::isfinite(out_.error);  // NaN has no bound
   out_.complete = out_.consistent;
-  // What sums round may be nothing, where no triangles cross for certain. It is if it is no thicker
-  // than what poses and vertices round, over the faces that lie on each other or push.
+  // If no triangles certainly cross, a volume within the rounding of sums may be 0. It is 0 if it
+  // is no thicker than the rounding of poses and vertices, spread over the faces that lie on each
+  // other or push.
   const double volume = std::abs(out_.sums.volume());
   if (volume <= 1.01 * (rounding_ + slots_.rounding()) / 6 && !settled &&
       !any_settled(search_, left, scratch_)) {

@@ -20,9 +20,10 @@ struct ExactOverlap {
   ExactSums sums;            ///< the gradients are those by a motion of B
   double error = 0;          ///< the true volume is within it of the sums'
   exact::Point origin = {};  ///< of the sums
-  SurfaceContact contact;    ///< where the sums' volume is nothing
+  SurfaceContact contact;    ///< if the sums' volume is 0
   std::uint32_t visits = 0, crossings = 0;
-  /// No limit or room was short, and it is consistent; else nothing above is of use.
+  /// No limit was reached, memory sufficed, and the answer is consistent; else nothing above is
+  /// valid.
   bool complete = true;
   bool consistent = true;  ///< signs agree with each other, as exact ones do
 };
@@ -31,8 +32,8 @@ struct ExactOverlap {
 /// the meshes and the map alone.
 class ExactQuery {
  public:
-  /// `moved_a`, `moved_b`: no point of a surface is further from where it ought to be against the
-  /// other, A's unit frame.
+  /// `moved_a`, `moved_b`: bounds of how far points of the surfaces are from their true places
+  /// relative to each other, A's unit frame.
   ExactQuery(const MeshTree& a, double moved_a, const MeshTree& b, double moved_b,
              const Similarity& a_from_b, const Similarity& b_from_a, ExactScratch& scratch) noexcept
       : sides_{{a, scratch.a, false, moved_a}, {b, scratch.b, true, moved_b}},
@@ -42,10 +43,10 @@ class ExactQuery {
     move_aside();
   }
 
-  /// `max_visits`: 0: no limit. `pair_id`: of the caller's pair, whose calls are steps of one
-  /// motion; 0: of none.
+  /// `max_visits`: 0 for no limit. `pair_id`: the caller's pair, whose calls are steps of one
+  /// motion; 0 for none.
   ExactOverlap run(std::uint32_t max_visits = 0, std::uint32_t pair_id = 0) noexcept;
-  /// Whether ExactScratch holds all crossings that it found, as parts of the overlap need.
+  /// True if ExactScratch holds all crossings that were found, as parts of the overlap need.
   bool holds_crossings() const noexcept { return whole_; }
 
  protected:
@@ -64,14 +65,14 @@ class ExactQuery {
   static std::uint32_t opposite_edge(const CrossedBlock& crossed, std::uint32_t triangle) noexcept {
     return 9u >> 2 * crossed.apex[triangle] & 3;  // the next one, without a branch
   }
-  /// Whether the middle of a triangle's edge is inside: 1 or 0, if nothing pierces it on the way
-  /// from its ends but what is counted from there.
+  /// 1 if the middle of a triangle's edge is inside, else 0. Only what is counted from its ends
+  /// pierces the edge up to there.
   static int middle_of(const MeshBlock& mesh, const CrossedBlock& crossed, std::uint32_t edge) {
     return static_cast<int>(crossed.inside >> mesh.corner[edge % 3][edge / 3] & 1) +
            (crossed.middle[edge] & -static_cast<int>(crossed.pierced >> edge & 1));
   }
 
-  /// How often the cone over the edge opposite to each lane's apex counts.
+  /// Computes how often the cone over the edge opposite to each lane's apex counts.
   static void count_triangles(const MeshBlock& mesh, const CrossedBlock& crossed,
                               std::int8_t (&whole)[kWidth]) noexcept;
   exact::Point place(const Side& side, std::uint32_t vertex) const noexcept;
@@ -88,8 +89,8 @@ class ExactQuery {
         visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
   }
 
-  /// visit(level, box block, lane) for the blocks that lie inside as a whole: as few lanes as hold
-  /// those below box block i of a level.
+  /// Calls visit(level, box block, lane) for the blocks below box block i of a level that are
+  /// inside as a whole, by as few lanes as contain them.
   template <class Visit>
   static void for_each_inside(const Side& own, int level, std::uint32_t i, const Visit& visit) {
     const std::uint32_t shift = 4 * (static_cast<std::uint32_t>(level) - 1);
@@ -144,7 +145,7 @@ class ExactQuery {
   std::uint32_t block_pairs_ = 0;
   SlotSums slots_;
   double rounding_ = 0;  ///< six times what the volume's terms may be off by
-  double layers_ = 0;    ///< what surfaces may miss by having moved
+  double layers_ = 0;    ///< the bound of volume from moved surfaces
 };
 
 }  // namespace ist

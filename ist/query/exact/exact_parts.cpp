@@ -5,8 +5,9 @@
 
 namespace ist {
 
-/// Of the names of crossings and of their ends, in their order, and of what is inside. They tell
-/// what hangs together, unless an edge is pierced more than twice or a curve lies in one triangle.
+/// A hash of the names of crossings and their ends, in order, and of what is inside. These
+/// determine what is connected, unless an edge is pierced more than twice or a curve is in one
+/// triangle.
 std::uint64_t ExactParts::hash_of_names() const noexcept {
   std::uint64_t hash = out_.crossings;
   const auto mix = [&](std::uint64_t name) {

@@ -8,7 +8,7 @@
 
 namespace ist {
 
-/// What ExactQuery::run() found, as OverlapParts asks it.
+/// The result of ExactQuery::run() in the form that OverlapParts uses.
 class MeshOverlap : public ExactQuery {
  public:
   using ExactQuery::ExactQuery;
@@ -111,11 +111,11 @@ class ExactParts : public OverlapOctants<MeshOverlap> {
  public:
   using OverlapOctants::OverlapOctants;
 
-  /// Divides what run() found: OverlapParts::divide(). Of a pair that is kept it knows whether all
-  /// is one.
+  /// Divides the result of run(): OverlapParts::divide(). For a kept pair it knows if all is one
+  /// part.
   std::uint32_t divide() noexcept;
 
-  /// The ends of crossing i, A's unit frame, from the origin.
+  /// The ends of crossing i relative to the origin, A's unit frame.
   void segment(std::uint32_t i, exact::Point& from, exact::Point& to) const noexcept {
     from = place_of(i, 0);
     to = place_of(i, 1);

@@ -34,9 +34,9 @@ struct alignas(64) PlacedTriangles {
   float low[3][kWidth], high[3][kWidth];  ///< boxes, rounded outward; unused lanes empty
   float corner[3][3][kWidth];             ///< [corner][axis]
   float normal[3][kWidth];                ///< product of two sides
-  float offset[kWidth];                   ///< of the plane along it
-  float length[kWidth];                   ///< of it, or more
-  float slack[kWidth];                    ///< how far it may be off
+  float offset[kWidth];                   ///< the plane's offset along the normal
+  float length[kWidth];                   ///< an upper bound of the normal's length
+  float slack[kWidth];                    ///< the error of the normal
   float all_low[3], all_high[3];
   float size;   ///< no two points are further apart
   float reach;  ///< no coordinate is larger
@@ -51,13 +51,13 @@ struct alignas(64) PlacedPlanes {
   /// [edge][axis]: along the plane out of the triangle, which lies below the offset; its absolute
   /// coordinates add up to 1, but for rounding.
   double edge[3][3][kWidth], edge_offset[3][kWidth];
-  /// The block's vertices lie between these heights over the plane of `widest`, times the length of
-  /// its normal.
+  /// The block's vertices are between these heights above the plane of `widest`, times the length
+  /// of its normal.
   double low, high;
   std::uint32_t widest;  ///< the largest triangle
 };
 
-/// What recent queries placed of a mesh.
+/// The parts of a mesh that recent queries have placed.
 struct PlacedMesh {
   PlacedCache<PlacedBoxes, 256> boxes;
   PlacedCache<PlacedVertices, 256> vertices;
@@ -74,20 +74,20 @@ struct PlacedMesh {
 
 /// Eight pairs of triangles that are tested together.
 struct alignas(64) TrianglePairs {
-  /// [A, B][corner][axis]; finite in lanes without a pair, which are computed too.
+  /// [A, B][corner][axis]. Lanes without a pair are computed too, so they must be finite.
   double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
   std::uint32_t asks = 0;  ///< a bit a pair: its blocks may have to be marked as near
 };
 
-/// A pair of nodes that waits.
+/// A pending pair of nodes.
 struct BoxPair {
   std::uint32_t a, b;
   std::uint8_t level_a, level_b;
 };
 
-/// A pair of nodes that waits to be measured, and what it is apart at least.
+/// A pending pair of nodes, and a lower bound of its distance.
 struct GapPair {
   double squared;
   float order;  ///< the less, the likelier it holds the answer
@@ -95,17 +95,17 @@ struct GapPair {
   std::uint8_t level_a, level_b;
 };
 
-/// A block whose triangles cross others: which of its vertices are inside the other solid.
+/// A block whose triangles cross others, with the vertices that are inside the other solid.
 struct CrossedBlock {
   std::uint32_t block;
-  std::uint16_t inside;         ///< a bit a local vertex
-  std::uint64_t pierced;        ///< bit 3 · lane + edge
-  double vertex[3][kWidth];     ///< [axis] from the origin of the sums
-  std::uint8_t apex[kWidth];    ///< of each lane the corner, 0 … 2, that is nearest to the origin
-  std::uint8_t fan[3][kWidth];  ///< of each lane its corners from there on, local vertices
-  // Of a pierced edge:
-  std::int8_t sum[3 * kWidth];     ///< how often it enters more than it leaves
-  std::int8_t first[3 * kWidth];   ///< what comes first: 1 enters, −1 leaves, 0 unclear
+  std::uint16_t inside;       ///< a bit a local vertex
+  std::uint64_t pierced;      ///< bit 3 · lane + edge
+  double vertex[3][kWidth];   ///< [axis] from the origin of the sums
+  std::uint8_t apex[kWidth];  ///< for each lane the corner, 0 … 2, that is nearest to the origin
+  std::uint8_t fan[3][kWidth];  ///< for each lane its corners from there on, as local vertices
+  // For each edge that is pierced:
+  std::int8_t sum[3 * kWidth];     ///< its entries less its exits
+  std::int8_t first[3 * kWidth];   ///< 1 if it enters first, −1 if it leaves first, 0 if unclear
   std::int8_t middle[3 * kWidth];  ///< `sum` of places that are nearer to its first corner
   double first_t[3 * kWidth], first_error[3 * kWidth];
 
@@ -114,24 +114,23 @@ struct CrossedBlock {
   }
 };
 
-/// The segments that two triangles share where they cross: a number an array each, so that eight
-/// are summed together. A segment runs from where B's side of A's triangle lies to the left of it.
-/// A's edges leave B at the start (end 0) and enter it at the end (end 1); B's edges enter A at the
-/// start and leave it at the end.
+/// The common segments of crossing triangles, each number in an array of its own, so that eight are
+/// summed together. A's edges leave B at a segment's start (end 0) and enter it at its end (end 1).
+/// B's edges enter A at the start and leave it at the end.
 class Crossings {
  public:
-  /// Eight are read and written at once, so that up to seven more are touched.
+  /// Eight are loaded and stored at once, so up to seven more are touched.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
       : room_((most + 15) / 8 * 8),
         numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
         triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{room_})) {}
 
-  /// Where an edge of one solid goes through a triangle of the other. All segments that end there
-  /// have the same bits of it.
+  /// The numbers of an end, where an edge of one solid pierces a triangle of the other. All
+  /// segments that end there have the same bits.
   enum EndNumber {
     kFrom = 0,    ///< x, y, z of the end of the edge that is nearer to the triangle's plane
     kOffset = 3,  ///< from there to the place: it keeps its digits where that is next to the end
-    kT = 6,       ///< of the way along the edge, from its first corner in this triangle
+    kT = 6,       ///< the position along the edge, from its first corner in this triangle
     kTError = 7,  ///< of t
     kHeightError = 8,  ///< heights of the edge's ends over the triangle, times twice its area, are
                        ///< off by this together
@@ -140,13 +139,12 @@ class Crossings {
   };
   double* end(int e, int number) noexcept { return at(kEndNumbers * e + number); }
   const double* end(int e, int number) const noexcept { return at(kEndNumbers * e + number); }
-  /// The corner of a triangle that its cones start at, from the origin of the sums.
+  /// The apex of a triangle's cones, relative to the origin of the sums.
   double* apex(int side, int axis) noexcept { return at(2 * kEndNumbers + 3 * side + axis); }
   const double* apex(int side, int axis) const noexcept {
     return at(2 * kEndNumbers + 3 * side + axis);
   }
-  /// Where the edge of an end is opposite to its triangle's apex: 1 if it enters, −1 if it leaves;
-  /// else 0.
+  /// If an end's edge is opposite to its triangle's apex: 1 if it enters, −1 if it leaves; else 0.
   double* opposite(int e) noexcept { return at(2 * kEndNumbers + 6 + e); }
   const double* opposite(int e) const noexcept { return at(2 * kEndNumbers + 6 + e); }
   /// Triangles: 16 · block + lane.
@@ -155,14 +153,14 @@ class Crossings {
     return triangle_[2 * i + side];
   }
 
-  /// Crossings from `from` on, fewer than eight, become the first.
+  /// Moves the crossings from `from` on, fewer than eight, to the front.
   void move_to_front(std::uint32_t from, std::uint32_t count) noexcept {
     for (int number = 0; number < kNumbers; ++number)
       std::copy_n(at(number) + from, count, at(number));
     std::copy_n(triangle_.get() + 2 * std::size_t{from}, 2 * std::size_t{count}, triangle_.get());
   }
 
-  /// Zeros in crossings [from, to): they add nothing to a sum.
+  /// Clears crossings [from, to), so that they add nothing to a sum.
   void clear(std::uint32_t from, std::uint32_t to) noexcept {
     for (int number = 0; number < kNumbers; ++number)
       std::fill(at(number) + from, at(number) + to, 0.0);
@@ -174,7 +172,7 @@ class Crossings {
     return {triangle_[2 * i + of_b], code % 8 - 3 * of_b, of_b != 0, code >= 8,
             static_cast<std::uint32_t>(e) != of_b};
   }
-  /// Where it is, seen from `origin`.
+  /// The position of an end relative to `origin`.
   exact::Point place_of(std::uint32_t i, int e, const exact::Point& origin) const noexcept {
     return (exact::Point{end(e, kFrom)[i], end(e, kFrom + 1)[i], end(e, kFrom + 2)[i]} - origin) +
            exact::Point{end(e, kOffset)[i], end(e, kOffset + 1)[i], end(e, kOffset + 2)[i]};
@@ -192,7 +190,7 @@ class Crossings {
   HookedArray<std::uint32_t> triangle_;
 };
 
-/// One bit a block, or a shell.
+/// The bit of a block or shell.
 inline bool has(const HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
   return bits[i / 64] >> i % 64 & 1;
 }
@@ -200,15 +198,15 @@ inline void set(HookedArray<std::uint64_t>& bits, std::uint32_t i) noexcept {
   bits[i / 64] |= std::uint64_t{1} << i % 64;
 }
 
-/// What a query knows of the blocks of one solid.
+/// The state of one solid's blocks in a query.
 struct BlockMarks {
-  /// A bit a block: signs of it might differ if the surfaces moved by the room.
+  /// A bit for each block: its signs might differ if the surfaces moved within the tolerance.
   HookedArray<std::uint64_t> near;
   HookedArray<std::uint64_t> crossed;  ///< triangles of it cross others: it is in `blocks`
   HookedArray<std::uint64_t> pierced;  ///< edges of it are pierced
   HookedArray<std::uint64_t> inside;   ///< no edge is pierced, and it lies inside
   HookedArray<std::uint64_t> shells;   ///< a bit a shell: edges of it are pierced
-  HookedArray<std::uint32_t> place;    ///< of crossed blocks, in `blocks`
+  HookedArray<std::uint32_t> place;    ///< the index in `blocks` of a crossed block
   HookedArray<CrossedBlock> blocks;
   std::uint32_t count = 0;
 };
@@ -248,20 +246,21 @@ struct ExactScratch {
     }
   }
 
-  /// Node pairs wait depth first: 255 others a level, and both trees are opened together.
+  /// The most pending node pairs: depth first, 255 others for each level, and both trees are opened
+  /// together.
   static constexpr std::uint32_t kMostWaiting = 256 * 2 * kMaxLevels;
 
-  /// What is placed is of another pose: all but A's triangles in A's own frame.
+  /// Drops what was placed for another pose: all but A's triangles in A's own frame.
   void forget(std::uint64_t mesh_a) noexcept {
     placed_b->forget();
     placed_a->boxes.forget();
     if (std::exchange(hash_a, mesh_a) != mesh_a) placed_a->forget();
   }
 
-  /// Pairs of blocks, or of triangles, that are kept for later.
+  /// The capacity for pairs of blocks or triangles that are kept for later.
   std::uint32_t most_pairs() const noexcept { return 16 * most_crossings; }
 
-  /// Crossings, vertices of crossed blocks and blocks of both solids.
+  /// The number of elements: crossings, vertices of crossed blocks, and blocks of both solids.
   std::size_t elements() const noexcept {
     return most_crossings + 2 * kWidth * std::size_t{most_crossed} + 2 * std::size_t{most_blocks};
   }
@@ -270,16 +269,16 @@ struct ExactScratch {
   std::uint32_t most_crossed;    ///< blocks of a mesh that cross the other
   std::uint32_t most_crossings;  ///< pairs of triangles
   Hooked<PlacedMesh> placed_a, placed_b;
-  std::uint64_t hash_a = 0;  ///< of the asset that `placed_a` is of
+  std::uint64_t hash_a = 0;  ///< of the asset of `placed_a`
   Hooked<TrianglePairs> pairs;
   HookedArray<BoxPair> waiting;
   HookedArray<GapPair> gaps;
   Crossings crossings;
-  KeptRing kept;  ///< that may cross
-  KeptRing near;  ///< that may be the nearest
+  KeptRing kept;  ///< pairs of triangles that may cross
+  KeptRing near;  ///< pairs of blocks that may be the nearest
   HookedArray<std::uint64_t> keys, other_keys;
   HookedArray<std::uint32_t> flood;
-  // Of parts:
+  // For parts:
   HookedArray<PiercedEnd> ends;
   HookedArray<CurveExtent> curves;
   HookedArray<std::uint32_t> parent, part;  ///< of an element

@@ -7,11 +7,11 @@
 #include "base/bits.h"
 #include "query/exact/orientation.h"
 
-// What an overlap, its connected parts and their octants are summed in, on the host and on a GPU.
+// The sums of an overlap, its connected parts and their octants, on the host and on a GPU.
 
 namespace ist {
 
-/// What is summed of an overlap, or a part of it: from the origin, A's unit frame.
+/// The sums of an overlap or a part of it, relative to the origin, A's unit frame.
 struct ExactSums {
   exact::CarefulSum six_volumes;
   exact::Point moment = {};  ///< 24 ∫ x
@@ -33,35 +33,36 @@ struct ExactPart {
   ExactSums sums;          ///< from the whole's origin
   std::uint64_t id = 0;    ///< lowest pair of triangles on its outline, from 1; 0: it has none
   std::uint32_t kept = 0;  ///< the part that it was added to, or itself
-  std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex: it is not divided
+  std::uint32_t slot = kNoIndex;  ///< of its octants; kNoIndex if it is not divided
   exact::Point centre = {};       ///< centroid from the whole's origin, once there is need of it
-  // Of keep_largest():
-  double cost = 0;            ///< of its being added to another
+  // For keep_largest():
+  double cost = 0;            ///< of adding it to another
   std::uint32_t nearest = 0;  ///< that other
-  std::uint32_t listed = 0;   ///< in the k-th part the k-th of those that are kept
+  std::uint32_t listed = 0;   ///< in part k: the k-th part that is kept
   bool unlike = false;        ///< the other pushes against it
 };
 
-/// What is summed of an octant of a part, from the part's centroid and in the axes of the octants.
+/// The sums of an octant of a part, relative to the part's centroid and along the axes of the
+/// octants.
 struct OctantSums {
   double six_volumes = 0;
   exact::Point moment = {};   ///< 24 ∫ x
   exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
   exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
-  // Of the first:
+  // In the first octant of a part:
   exact::Point centre = {};          ///< the part's centroid from the whole's origin, A's axes
   exact::Point low = {}, high = {};  ///< its box in the axes, from the centre
   int planes = 0;                    ///< a bit an axis: the part is cut across it
 };
 
-/// An end of a segment that two triangles share: an edge of one pierces the other.
+/// An end of the common segment of two triangles: an edge of one pierces the other.
 struct CrossingEnd {
   std::uint32_t triangle;  ///< whose edge it is
   std::uint32_t edge;      ///< edge k goes from corner k to the next
   bool of_b, from_first, enters;
 };
 
-/// An edge where it is pierced.
+/// A point where an edge is pierced.
 struct PiercedEnd {
   std::uint64_t edge;
   double t;
@@ -69,14 +70,14 @@ struct PiercedEnd {
   bool of_b;
 };
 
-/// A curve where surfaces cross, if it lies in one triangle of a solid.
+/// A curve where surfaces cross, if it is in one triangle of a solid.
 struct CurveExtent {
   std::uint32_t triangle;  ///< kNoIndex: of several
   exact::Point low, high;  ///< its box
   exact::Point area;       ///< twice the vector of what it goes around
 };
 
-/// Where parts and octants are worked out.
+/// The working memory of parts and octants.
 struct PartMemory {
   static constexpr std::uint32_t kMostParts = 1024;
   static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
@@ -91,21 +92,21 @@ struct PartMemory {
   std::uint32_t most_parts;
 };
 
-/// What eight pieces of the boundary add to the sums of an overlap, a lane each.
+/// The terms that eight pieces of the boundary add to the sums of an overlap, one per lane.
 struct alignas(64) ExactTerms {
-  /// Tetrahedra: those of a segment, and of an edge at each of its ends. Their sum would lose
-  /// digits where all are large and the overlap is small.
+  /// The tetrahedra of a segment, and of an edge at each of its ends. They are not summed here,
+  /// since digits would be lost where all are large and the overlap is small.
   double six_volumes[3][8];
   double moment[3][8], force[3][8], torque[3][8];
   double rounding[8];  ///< six times what the volume may be off by
 };
 
-/// What eight crossings add to octants, a lane each: triangles of A and of B between the segment
-/// and the apex, and those between the apex and a pierced edge opposite to it, at each end.
+/// The terms that eight crossings add to octants, one per lane: triangles of A and of B between the
+/// segment and the apex, and those between the apex and a pierced edge opposite to it, at each end.
 struct alignas(64) OctantPieces {
   static constexpr int kTriangles = 4, kEnd = 2, kNear = 4;
-  /// From the centre in the octants' axes: the apexes of A and of B, from kEnd the ends, and from
-  /// kNear the nearer ends of their edges.
+  /// Relative to the centre, along the octants' axes: the apexes of A and B, from kEnd on the ends,
+  /// and from kNear on the nearer ends of their edges.
   double at[6][3][8];
   double times[4][8];  ///< how often a triangle counts
   double six_volumes[4][8], moment[4][3][8], area[4][3][8], torque[4][3][8];
@@ -122,14 +123,14 @@ struct alignas(64) OctantPieces {
   }
 };
 
-/// Where octants are seen from: the axes, and for each lane the centre of its part, from the origin
+/// The frame of octants: the axes, and for each lane the centre of its part relative to the origin
 /// of the sums.
 struct alignas(64) OctantView {
   double centre[3][8];
   exact::Point origin, axis[3];
 };
 
-/// What pieces of the boundary are worked out in.
+/// The working memory for pieces of the boundary.
 struct PieceMemory {
   union {
     ExactTerms terms;
@@ -137,7 +138,7 @@ struct PieceMemory {
   };
   OctantView view;
   std::int8_t whole[kWidth];  ///< how often the cone over a triangle's edge counts
-  bool says;                  ///< what the lane that leads tells the others
+  bool says;                  ///< a flag from the leading lane to the others
 };
 
 /// Adds lane l of terms.

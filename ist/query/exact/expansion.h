@@ -10,7 +10,7 @@
 
 namespace ist::exact {
 
-/// A double's rounding: half a unit in the last place of 1.
+/// The relative rounding of a double: half a unit in the last place of 1.
 inline constexpr double kHalfUnit = 0x1p-53;
 
 /// high + low = a + b exactly.
@@ -56,7 +56,7 @@ class CarefulSum {
   double high_ = 0, low_ = 0;
 };
 
-/// A sum of at most kRoom doubles that do not overlap, without zeros; none: 0.
+/// A sum of at most kRoom doubles that do not overlap, without zeros. An empty one is 0.
 template <int kRoom>
 struct Expansion {
   int count = 0;
@@ -94,7 +94,7 @@ IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>
   add_parts(a, b, factor, [&](double part) { out.part[out.count++] = part; });
   return out;
 }
-/// Its sign alone.
+/// The sign of the sum alone.
 template <int kA, int kB>
 IST_HD inline int sign_of_sum(const Expansion<kA>& a, const Expansion<kB>& b, double factor) {
   double largest = 0;
@@ -134,7 +134,7 @@ IST_HD inline Expansion<2> difference(double a, double b) {
 
 template <int kA>
 IST_HD inline Expansion<4 * kA> product(const Expansion<kA>& a, const Expansion<2>& b) {
-  // One of b's parts is there at least in all but the rarest cases.
+  // Except in the rarest cases b has at least one part.
   if (b.count < 2) {
     Expansion<4 * kA> out;
     const Expansion<2 * kA> one = b.count == 0 ? Expansion<2 * kA>() : scaled(a, b.part[0]);

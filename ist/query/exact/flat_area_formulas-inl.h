@@ -1,5 +1,5 @@
-// What triangles in one plane have in common, once for lanes of the CPU and for a thread of the
-// GPU: in the terms of overlap_formulas-inl.h.
+// The common area of triangles in one plane, once for lanes of the CPU and for a thread of the GPU,
+// in the terms of overlap_formulas-inl.h.
 
 /// Points in the plane of two coordinates, and an edge between two of them.
 struct FlatPoint {
@@ -22,7 +22,7 @@ IST_FORMULA FlatEdge flat_edge(const FlatPoint& p, const FlatPoint& q) {
 }
 IST_FORMULA Real height_at(const FlatEdge& e, Real where) { return e.y + (where - e.x) * e.slope; }
 
-/// One of three, by the largest coordinate of a normal.
+/// Selects one of three numbers by the largest coordinate of a normal.
 struct LargestAxis {
   Mask by_x, by_y;
 };
@@ -30,7 +30,7 @@ IST_FORMULA Real one_of(const LargestAxis& axis, Real if_x, Real if_y, Real if_z
   return choose(axis.by_x, if_x, choose(axis.by_y, if_y, if_z));
 }
 
-/// What triangles in one plane have in common.
+/// The common area of triangles in one plane.
 struct CommonArea {
   Real over_normal;  ///< its area, over the length of A's normal
   Vec3 centre;       ///< seen from A's first corner
@@ -83,7 +83,7 @@ IST_FORMULA CommonArea common_area(const Vec3 (&a)[3], const Vec3 (&b)[3], const
       moment_y = moment_y + turned * (at_p * mean_p + at_q * mean_q);
     }
   }
-  // What roundings leave of nothing is nothing.
+  // An area within rounding is 0.
   const Real found = magnitude(twice), least = constant(1e-14) * ((right - left) * (high - low));
   const Real size = one_of(axis, nx, ny, nz);
   const Mask counts = both(less(least, found), less(zero, size));

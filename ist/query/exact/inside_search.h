@@ -7,7 +7,7 @@
 
 namespace ist {
 
-/// One mesh of a pair. A's is where it is; B's vertices are moved into A's unit frame.
+/// One mesh of a pair. A's vertices stay, B's are mapped to A's unit frame.
 struct MeshOfPair {
   const MeshTree& mesh;
   const Similarity* to_a = nullptr;  ///< null: it is A's
@@ -20,15 +20,15 @@ struct MeshOfPair {
   }
 };
 
-/// Nodes of a mesh that wait, of a search depth first.
+/// The pending nodes of a depth-first search.
 struct InsideStack {
   MeshNode node[kWidth * kMaxLevels];
 };
 
-/// Whether a point is inside, A's unit frame: by the triangles on the way out, along an axis of the
-/// mesh's frame. Signs are exact, of B moved by `aside`; of points on the surface they decide one
-/// way or the other. All of a team together; `stack` is what its lanes share. `unsure`: doubles do
-/// not tell, without `kExactly`.
+/// True if a point is inside, A's unit frame, by the triangles that a ray along an axis of the
+/// mesh's frame crosses. Signs are exact, with B translated by `aside`, so points on the surface
+/// are decided too. Called by the whole team, whose lanes share `stack`. `unsure`: doubles do not
+/// decide, without `kExactly`.
 template <bool kExactly, class Team>
 IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exact::Point& p,
                            const exact::Point& aside, InsideStack& stack, bool& unsure) noexcept {
@@ -36,7 +36,7 @@ IST_HD_COLD bool is_inside(const Team& team, const MeshOfPair& solid, const exac
   const MeshTree& mesh = solid.mesh;
   const Point start = solid.is_b() ? map_point(*solid.from_a, p) : p;
   const double at[3] = {start.x, start.y, start.z};
-  // What mapping there and back rounds, and what B is moved aside.
+  // The rounding of the maps there and back, and the symbolic translation of B.
   double pad = 0;
   for (int k = 0; k < 3; ++k)
     pad += std::abs(at[k]) + (solid.is_b() ? std::abs(solid.from_a->t[k]) : 0) + 1e-300;

@@ -4,12 +4,12 @@
 
 #include "query/exact/exact_sums.h"
 
-// How many parts of a contact become patches, on the host and on a GPU.
+// Selects the parts of a contact that become patches, on the host and on a GPU.
 
 namespace ist {
 
-/// The nearest part that is kept, of those that push like part p if there are any, and what it
-/// costs to join it.
+/// Finds the nearest kept part to which p may be joined, preferably one that pushes like p, and the
+/// cost.
 IST_HD inline void weigh_part(ExactPart* parts, std::uint32_t count, std::uint32_t p) {
   ExactPart& part = parts[p];
   double square = 0;
@@ -29,9 +29,9 @@ IST_HD inline void weigh_part(ExactPart* parts, std::uint32_t count, std::uint32
   part.cost = part.sums.volume() * (square * square);
 }
 
-/// As many parts as there is room for: the least joins the nearest of those that push like it, if
-/// there are any. Least is by volume; of octants by volume times the fourth power of the distance
-/// to the one that it joins: a crumb beside a contact goes, a small foot far from it stays.
+/// Keeps at most `room` parts. The least joins the nearest of those that push like it, if there are
+/// any. Least is by volume, or for octants by volume times the fourth power of the distance to the
+/// one that it joins: a crumb beside a contact goes, a small foot far from it stays.
 IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, std::uint32_t room,
                                          bool octants) {
   std::uint32_t count = 0;
@@ -66,22 +66,22 @@ IST_HD inline std::uint32_t keep_largest(ExactPart* parts, std::uint32_t size, s
   return count;
 }
 
-/// Adds to the kept parts what joined them.
+/// Adds the parts that were joined to the kept ones.
 IST_HD inline void join_parts(ExactPart* parts, std::uint32_t size) {
   for (std::uint32_t p = 0; p < size; ++p)
     if (parts[p].kept != p) parts[parts[p].kept].sums.add(parts[p].sums);
 }
 
-/// [u] Depth that no patch of a contact of such a volume [u³] exceeds.
+/// [u] An upper bound of the depth of patches of a contact of that volume [u³].
 IST_HD inline double exact_deepest(double volume) noexcept {
-  // The cube root from square roots alone: the C library's differs between processors. Each step
-  // leaves a quarter of the error of the logarithm.
+  // The cube root by square roots alone, since the C library's differs between processors. Each
+  // step leaves a quarter of the error of the logarithm.
   double y = std::sqrt(volume);
   for (int k = 0; k < 30; ++k) y = std::sqrt(std::sqrt(volume * y));
   return y;
 }
 
-/// Of a solid's radius: octants of a contact this near to each other hold it as one does.
+/// The distance, relative to a solid's radius, within which octants of a contact hold it like one.
 inline constexpr double kNearOctants = 0.15;
 
 }  // namespace ist

@@ -14,13 +14,13 @@ inline bool keeps_mesh(const PlacedAsset& placed) noexcept {
   return !placed.asset.empty() && placed.asset.header().mesh != 0;
 }
 
-/// Only where the asset keeps one.
+/// The asset must have a mesh.
 inline MeshTree mesh_of(const PlacedAsset& placed) noexcept {
   const AssetHeader& asset = placed.asset.header();
   return {asset, *at<MeshHeader>(asset, asset.mesh)};
 }
 
-/// The same of placed assets.
+/// The same for placed assets.
 inline double moved_by_poses(const PlacedAsset& a, const PlacedAsset& b, const MeshTree& mesh_b,
                              const RelativePose& pose) noexcept {
   const auto offset = [](const PlacedAsset& placed) {

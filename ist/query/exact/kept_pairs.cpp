@@ -7,7 +7,7 @@
 namespace ist {
 namespace {
 
-/// No point of B moves by more from one placement in A to the other.
+/// A bound of the motion of B's points from one placement in A to the other.
 double largest_motion(const MeshTree& b, const Similarity& from, const Similarity& to) {
   double squared = 0;
   for (int corner = 0; corner < 8; ++corner) {
@@ -24,14 +24,14 @@ double largest_motion(const MeshTree& b, const Similarity& from, const Similarit
   return std::sqrt(squared);
 }
 
-/// The side of a triangle, as if they tiled a cube.
+/// The side of a triangle if triangles tiled a cube.
 double side_of(const MeshTree& a, const MeshTree& b, double scale) {
   return 0.5 * std::min(1 / std::sqrt(a.level[0].count), scale / std::sqrt(b.level[0].count));
 }
 
-// Of such a side.
+// Relative to such a side.
 constexpr double kLeast = 0.007, kMost = 0.3;
-// Steps that a margin is made for. Its pairs grow with it, and searches become rarer.
+// The number of steps that a margin allows for. More steps keep more pairs and need fewer searches.
 constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
 }  // namespace

@@ -9,52 +9,54 @@
 
 namespace ist {
 
-/// The pairs of triangles of two solids that may cross, or be near, while no point of B has moved
-/// by more than `margin` against A.
+/// The pairs of triangles of two solids that may cross or be near as long as no point of B has
+/// moved by more than `margin` relative to A.
 struct KeptPairs {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
   std::uint64_t mesh[2];    ///< hashes of the assets
   Similarity last;          ///< B in A at the last query
-  double step;              ///< how far it had moved since the one before
-  std::uint32_t crossings;  ///< that the last query found
-  double steps;             ///< that the next margin is made for
+  double step;              ///< the motion since the query before
+  std::uint32_t crossings;  ///< found by the last query
+  double steps;             ///< the number of steps that the next margin allows for
   Similarity found_at;      ///< B in A when the pairs were found
   double margin;            ///< A's unit frame; 0: none are kept
-  double room;              ///< of the search that found them
+  double room;              ///< the tolerance of the search that found them
   double moved;             ///< since they were found; set by KeptRing::holds
   std::uint64_t first;      ///< in the ring
   std::uint32_t count;
-  std::uint64_t nearest = kNone;  ///< of distances: the pair that the last query found
-  double apart = 0;               ///< of distances: that of the last query, or less; 0: unknown
-  double horizon = 0;  ///< of distances: what is not kept was no nearer when the pairs were found
-  double gone = 0;     ///< of distances: how far B has gone since, step by step
-  /// Of crossings that all hang together, and of what they go around: see ExactParts. 0: unknown.
+  std::uint64_t nearest = kNone;  ///< for distances: the pair that the last query found
+  double apart = 0;  ///< for distances: a lower bound of the last query's; 0 if unknown
+  double horizon =
+      0;  ///< for distances: pairs that are not kept were no nearer when the list was made
+  double gone = 0;  ///< for distances: the length of B's path since, step by step
+  /// A hash of crossings that are all connected, and of what they surround (ExactParts); 0 if
+  /// unknown.
   std::uint64_t one = 0;
 };
 
-/// Whether after a step so long, from a distance, what was near before still says much.
+/// True if what was near before a step of that length, at a distance, is still informative.
 bool is_short(double step, const MeshTree& a, const MeshTree& b, double scale,
               double distance) noexcept;
 
-/// What exact queries keep from call to call: pairs of triangles of many pairs of solids. The
+/// The pairs of triangles that exact queries keep from call to call, for many pairs of solids. The
 /// oldest are overwritten.
 class KeptRing {
  public:
   KeptRing(std::size_t capacity, const MemoryHooks& hooks);
 
-  /// What is kept of the caller's pair `id`, for a query at `pose`.
+  /// The kept pairs of the caller's pair `id`, for a query at `pose`.
   KeptPairs& of(std::uint32_t id, const MeshTree& a, const MeshTree& b,
                 const Similarity& pose) noexcept;
-  /// Whether its pairs are all that a search by `room` can find.
+  /// True if its pairs are all that a search with tolerance `room` can find.
   bool serves(KeptPairs& kept, const MeshTree& b, double room) const noexcept;
-  /// Whether what is kept is still there. Sets kept.moved.
+  /// True if the list is still in the ring. Sets kept.moved.
   bool holds(KeptPairs& kept, const MeshTree& b) const noexcept;
   /// Empties the list and sets kept.margin, by which a search looks ahead while it adds pairs in
-  /// their order. 0: keeping would not pay.
+  /// order. 0 if keeping does not pay.
   void begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept;
-  std::uint64_t most() const noexcept { return mask_ + 1; }  ///< that one list may have
-  /// There are too many: none are kept, and the next margin will be less.
+  std::uint64_t most() const noexcept { return mask_ + 1; }  ///< the most that one list may have
+  /// Drops a list with too many pairs. The next margin will be smaller.
   static void give_up(KeptPairs& kept) noexcept;
   void add(KeptPairs& kept, std::uint64_t pair) noexcept {
     ring_[static_cast<std::size_t>(written_++ & mask_)] = pair;
@@ -69,7 +71,7 @@ class KeptRing {
 
   std::uint64_t mask_, written_ = 0;
   HookedArray<std::uint64_t> ring_;
-  HookedArray<std::uint32_t> ids_;  ///< of the slots; 0: free
+  HookedArray<std::uint32_t> ids_;  ///< of the slots; 0 if free
   HookedArray<KeptPairs> slots_;
 };
 

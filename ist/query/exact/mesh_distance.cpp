@@ -22,11 +22,11 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 class MeshGapSearch {
-  /// Of the margin that crossings have, as near pairs grow with its square: two steps of three.
+  /// Relative to the margin of crossings, since near pairs grow with its square.
   static constexpr double kMargin = 1.2;
-  /// Of a kept bound: a later step found it, and how far B had gone by then is added.
+  /// A flag of a kept bound: a later step found it, and B's path until then is added.
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
-  /// Pairs of triangles that wait for others, eight of which are measured in the time of these.
+  /// The number of pairs of triangles that wait for others. Eight are measured in the same time.
   static constexpr std::uint32_t kFew = 4;
   /// A block this many times as large as a node is bounded by its triangles, not by its box.
   static constexpr double kMuchLarger = 3;
@@ -73,7 +73,7 @@ class MeshGapSearch {
         if (kept->margin > 0) keep_ = kept;
         look_ahead(2 * kept->margin);
       }
-      if (budget_.limited()) {  // what is stopped has an answer
+      if (budget_.limited()) {  // a stopped search has an answer
         add(0);
         measure_added();
       }
@@ -83,7 +83,7 @@ class MeshGapSearch {
         search();
       }
     }
-    // What ended early has not come to all that is near.
+    // A search that ended early has not visited all that is near.
     const bool whole = !done();
     finish();
     if (kept != nullptr) {
@@ -95,7 +95,8 @@ class MeshGapSearch {
   }
 
  private:
-  /// `toward`: unit, or zero: then solids are seen along the axes of A.
+  /// Sets the direction along which extents are compared. `toward`: unit, or zero for the axes of
+  /// A.
   void look_along(const exact::Point& toward) {
     toward_ = level_ = toward;
     faces_.reset();
@@ -107,7 +108,8 @@ class MeshGapSearch {
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
 
-  /// Farther pairs decide nothing; what comes as near by later steps is kept.
+  /// Sets the limit beyond which pairs do not matter. Pairs that later steps may bring as near are
+  /// kept.
   void limit_to(double distance) {
     nearest_limit_ = distance;
     limit_ = distance + ahead_;
@@ -118,9 +120,9 @@ class MeshGapSearch {
     limit_to(nearest_limit_);
   }
 
-  /// What is kept: pairs of blocks, each with what it was apart at least when the search found it.
-  /// What may have come near since is measured again, and gets a new bound: that, and how far B had
-  /// gone by then.
+  /// Searches the kept pairs of blocks. Each has a lower bound of its distance when the search
+  /// found it. Pairs that may have come near since are measured again and get a new bound, which
+  /// includes B's path until then.
   void follow(KeptPairs& kept) {
     KeptRing& ring = scratch_.near;
     look_ahead(kept.step);
@@ -138,8 +140,8 @@ class MeshGapSearch {
     measure_added();
   }
 
-  /// Depth first, the nearest child on top: the spheres' distance, by which most is left out from
-  /// the start, is seldom far off.
+  /// Depth first, the nearest child on top. The spheres' distance, which prunes most from the
+  /// start, is seldom far off.
   void search() {
     size_ = 0;
     push({0, 0, 0, 0, static_cast<std::uint8_t>(a_.top), static_cast<std::uint8_t>(b_.top)}, 0);
@@ -165,21 +167,22 @@ class MeshGapSearch {
     out_.a = best_.on_a;
     out_.b = best_.on_a + best_.between;
     out_.distance = best_.least > 0 ? std::sqrt(best_.squared) : 0;
-    // From the pair that answers: which of those that are alike is the least depends on the search.
+    // From the pair that answers, since which of several equal pairs is the least depends on the
+    // search.
     double nearest = std::sqrt(best_.squared) - best_.rounding;
     for (std::uint32_t i = 0; out_.stopped && i < size_; ++i)
       nearest = std::min(nearest, std::sqrt(waiting_[i].squared));
     out_.least = std::max(0.0, (1 - 1e-12) * nearest - slack_);
   }
 
-  /// Drops the last twelve bits. Level faces are equally near but for roundings; with equal orders
-  /// the lowest number comes first, and cannot_answer() then leaves the others out.
+  /// Drops the last twelve bits. Parallel faces are equally near except for rounding. With equal
+  /// orders the lowest number comes first, and cannot_answer() prunes the others.
   static float coarse(double x) {
     const auto single = static_cast<float>(std::min(x, 1e37));
     return float_of(bits_of(single) & 0xfffff000u);
   }
 
-  /// Sorts by order from `first` on: the least is on top, and of equal ones what came first.
+  /// Inserts by order from `first` on: the least is on top, and of equal ones the first.
   void push(const GapPair& pair, std::uint32_t first) {
     std::uint32_t place = size_++;
     for (; place > first && waiting_[place - 1].order <= pair.order; --place)
@@ -201,7 +204,7 @@ class MeshGapSearch {
     }
   }
 
-  /// Whether a solid holds a shell of the other, B or A.
+  /// True if a solid contains a shell of the other, B or A.
   bool holds(bool b_in_a) const {
     const MeshTree& other = b_in_a ? b_ : a_;
     const MeshOfPair solid =
@@ -213,7 +216,7 @@ class MeshGapSearch {
     return false;
   }
 
-  /// The larger node's sixteen against the other's box.
+  /// Opens the larger node: its sixteen children against the other's box.
   template <class T>
   void open(const GapPair& pair, const BoxLook<T, double>& at_a, const BoxLook<T, double>& at_b) {
     const bool open_a =
@@ -244,7 +247,7 @@ class MeshGapSearch {
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
-      // The distances of solids that are far apart for their size differ in the last digits only.
+      // Distances of solids that are far apart for their size differ in the last digits only.
       child.order = gap <= 0 ? static_cast<float>(apart[l])
                     : single_
                         ? coarse(child.squared)
@@ -255,7 +258,7 @@ class MeshGapSearch {
     }
   }
 
-  /// The triangles of the node that is not opened, if it is a block and much larger than the other;
+  /// The triangles of the node that is not opened if it is a block and much larger than the other,
   /// else null.
   const BlockFaces* triangles_beside(const GapPair& pair, bool open_a) {
     if ((open_a ? pair.level_b : pair.level_a) != 0) return nullptr;
@@ -270,8 +273,8 @@ class MeshGapSearch {
     }
     return &*faces_;
   }
-  /// Along these two blocks' triangles are compared: if one block is much larger, along the
-  /// direction from its nearest triangle to the other block.
+  /// The axes along which two blocks' triangles are compared. If one block is much larger, they
+  /// follow the direction from its nearest triangle to the other block.
   WayAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
     const GapPair blocks{0, 0, number_a, number_b, 0, 0};
     for (const bool of_a : {false, true}) {
@@ -284,7 +287,7 @@ class MeshGapSearch {
     }
     return axes_;
   }
-  /// A node's box, in A's frame and along the axes.
+  /// A node's box in A's frame, with its extents along the axes.
   PlacedBox placed_box(bool of_a, int level, std::uint32_t number) const {
     const MiddleBox<double> box = box_of<double>(of_a ? a_ : b_, level, number);
     const double(&m)[9] = asked_.a_from_b.m;
@@ -308,8 +311,8 @@ class MeshGapSearch {
                 : placed_vertices(a_, number, nullptr, *scratch_.placed_a);
   }
 
-  /// The triangles of two blocks, no nearer than `known`, that may be near enough. None is nearer
-  /// than what comes back, or than `limit_`.
+  /// Queues the triangles of two blocks, which are no nearer than `known`, that may be near enough.
+  /// Returns a lower bound of the distance of those that are within `limit_`.
   double measure(std::uint32_t number_a, std::uint32_t number_b, double known) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
     const double ahead = ahead_of(of_a, of_b);
@@ -343,7 +346,7 @@ class MeshGapSearch {
     return std::max(known, std::sqrt(double{least}));
   }
 
-  /// How far all of B's block is beyond all of A's, along the normal of level faces or toward.
+  /// The gap between the blocks of A and B along the normal of parallel faces, or along `toward`.
   double ahead_of(const PlacedVertices& of_a, const PlacedVertices& of_b) const {
     const D d;
     const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
@@ -359,8 +362,9 @@ class MeshGapSearch {
     return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
   }
 
-  /// Whether all of two blocks is no nearer than the best, to rounding, and comes after it: so are
-  /// most pairs of level faces, which floats cannot tell from nearer ones. `first`: of their pairs.
+  /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they
+  /// come after it. So are most pairs of parallel faces, which floats cannot distinguish from
+  /// nearer ones. `first`: the first of their pairs.
   bool cannot_answer(double ahead, std::uint64_t first) const {
     const double distance = std::sqrt(best_.least);
     return best_.pair < first && distance >= 4 * best_.rounding &&
@@ -429,7 +433,7 @@ class MeshGapSearch {
   static std::uint64_t kept_least(double least) {
     return bits_of(static_cast<float>((1 - 1e-6) * std::min(least, 1e30)));
   }
-  /// Two blocks that the next steps look at again.
+  /// Keeps two blocks for the next steps.
   void keep(std::uint64_t blocks, std::uint64_t bound) {
     KeptRing& ring = scratch_.near;
     if (keep_->count + 2 > ring.most()) {
@@ -451,8 +455,8 @@ class MeshGapSearch {
     return at;
   }
 
-  /// Whether a plane square to the way between the points that were found parts the triangles: it
-  /// does if these are the nearest, but for roundings.
+  /// True if a plane perpendicular to the direction between the found points separates the
+  /// triangles. It does if these are the nearest points, except for rounding.
   bool apart_along(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n) const {
     const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
     const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
@@ -473,9 +477,9 @@ class MeshGapSearch {
   GapPair* const waiting_;  ///< a stack
   std::uint32_t size_ = 0;
   const double scale_, reach_;
-  const bool single_;   ///< boxes are measured in floats
-  const double slack_;  ///< what distances of triangles are off by, by rounding
-  const double blur_;   ///< likewise of boxes
+  const bool single_;                           ///< boxes are measured in floats
+  const double slack_;                          ///< the rounding of triangles' distances
+  const double blur_;                           ///< likewise of boxes
   BoxLook<float, double> single_a_, single_b_;  ///< A's boxes seen from B, and B's from A
   BoxLook<double, double> double_a_, double_b_;
   double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;

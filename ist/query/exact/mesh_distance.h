@@ -10,7 +10,7 @@
 
 namespace ist {
 
-/// Two placed meshes whose distance is asked; all lengths in A's unit frame.
+/// Two placed meshes whose distance is wanted. All lengths are in A's unit frame.
 struct GapQuestion {
   const MeshTree& a;
   const MeshTree& b;
@@ -20,13 +20,13 @@ struct GapQuestion {
   double enough = -1;               ///< nor a smaller one, once one as small as this is found
   double likely = HUGE_VAL;         ///< it is no more than this, unless a solid holds the other
   exact::Point toward = {0, 0, 0};  ///< unit, from A to B near where they are nearest; or zero
-  KeptPairs* kept = nullptr;        ///< what is kept of this pair; null: nothing
+  KeptPairs* kept = nullptr;        ///< the kept state of this pair; null if there is none
   bool outside = false;             ///< no solid holds a shell of the other, unless surfaces cross
 };
 
 /// The gap between two meshes, A's unit frame.
 struct MeshGap {
-  double distance = 0;          ///< of the nearest points that were found
+  double distance = 0;          ///< of the nearest points found
   double least = 0;             ///< no two points are nearer, roundings included
   exact::Point a = {}, b = {};  ///< these points
   bool overlap = false;         ///< surfaces cross, or one solid holds a shell of the other
@@ -36,10 +36,10 @@ struct MeshGap {
 };
 
 /// Branch and bound over both trees of boxes, depth first, the nearest child first. A visit opens
-/// one node, or measures two blocks. Of pairs of triangles that are as near, to rounding, the one
-/// of the lowest numbers answers, so that neither the order of the search nor what is kept under
-/// `pair_id` decides. Allocates, locks and throws nothing; the same answer on every instruction
-/// set.
+/// one node, or measures two blocks. Of pairs of triangles that are equally near up to rounding,
+/// the one with the lowest numbers answers, so that neither the order of the search nor what is
+/// kept under `pair_id` matters. Allocates, locks and throws nothing. The answer is the same on
+/// every instruction set.
 MeshGap mesh_gap(const GapQuestion& question, Budget& budget, ExactScratch& scratch) noexcept;
 
 }  // namespace ist

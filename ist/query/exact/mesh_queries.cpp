@@ -11,20 +11,20 @@ namespace {
 
 using exact::Point;
 
-/// A node that waits: the nearest on top.
+/// A pending node; the nearest is on top.
 struct WaitingNode {
   double key;
   int level;
   std::uint32_t number;
 };
 
-/// Depth first, of sixteen below a node the one of the least key first.
+/// A depth-first stack. Of a node's sixteen children the one with the least key comes first.
 class NodeStack {
  public:
   explicit NodeStack(const MeshTree& mesh) noexcept { nodes_[size_++] = {0, mesh.top, 0}; }
   bool empty() const noexcept { return size_ == 0; }
   WaitingNode pop() noexcept { return nodes_[--size_]; }
-  /// Those below a box block whose key is less than `limit`.
+  /// Pushes the children of a box block whose key is less than `limit`.
   void push(const MeshTree& mesh, const WaitingNode& of, const double (&key)[kWidth],
             double limit) noexcept {
     const std::uint32_t first = size_;
@@ -49,7 +49,7 @@ void corners_of(const MeshTree& mesh, const MeshBlock& block, std::uint32_t t,
   for (int k = 0; k < 3; ++k) corners[k] = mesh.vertex(block.vertex[block.corner[k][t]]);
 }
 
-/// A way from p to q, and the triangles that it may go through.
+/// A segment from p to q, and the triangles that it may cross.
 class Way {
  public:
   Way(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
@@ -57,7 +57,7 @@ class Way {
     for (int k = 0; k < 3; ++k) {
       from_[k] = (&p.x)[k];
       along_[k] = along[k];
-      // Where the way does not go, what lies beside it is entered beyond its end.
+      // Along axes without extent, boxes beside the segment are entered beyond its end.
       constexpr double kLeast = 1e-150;
       inverse_[k] = 1 / (std::abs(along[k]) > kLeast ? along[k] : kLeast);
     }
@@ -65,7 +65,7 @@ class Way {
     if (std::abs(along[2]) > std::abs(along[main_])) main_ = 2;
   }
 
-  /// Where it enters sixteen boxes; HUGE_VAL for those beside it.
+  /// The positions where the segment enters sixteen boxes; HUGE_VAL for those beside it.
   void enter(const BoxBlock& boxes, double (&key)[kWidth]) const noexcept {
     double enter[kWidth], leave[kWidth];
     for (std::uint32_t l = 0; l < kWidth; ++l) enter[l] = 0, leave[l] = 1;
@@ -83,7 +83,7 @@ class Way {
 
   void hit(const MeshTree& mesh, std::uint32_t number, MeshHit& best) const noexcept {
     const MeshBlock& block = mesh.blocks[number];
-    // Vertices as the way sees them: it is the origin, and each is off by no more than `blur`.
+    // Vertices relative to the segment, which is the origin, with errors of at most `blur`.
     const int i = (main_ + 1) % 3, j = (main_ + 2) % 3;
     double across[2][kWidth], ahead[kWidth], reach = 0;
     for (std::uint32_t v = 0; v < kWidth; ++v) {
@@ -107,7 +107,7 @@ class Way {
       if (exact::enters(p_, q_, corners, true, {0, 0, 0}) == 0) continue;
       const Point normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
       const double climbed = dot(normal, corners[0] - p_), climb = dot(normal, q_ - p_);
-      // Where it hardly climbs the corners tell better.
+      // If it hardly climbs, the corners are more accurate.
       const double t_plane = climb != 0 && std::abs(climbed) <= 2 * std::abs(climb)
                                  ? climbed / climb
                                  : 0.5 * (first + last);
@@ -149,7 +149,7 @@ MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept
 }
 
 MeshFoot nearest_on(const MeshTree& mesh, const Point& p, double limit) noexcept {
-  // What is no further by more than roundings need not be looked at: far away all is as near.
+  // Points that are nearer by no more than rounding need no visit: far away all are equally near.
   constexpr double kNearer = 1 - 4e-15;
   MeshFoot best;
   best.squared = limit * limit;
@@ -180,7 +180,7 @@ MeshFoot nearest_on(const MeshTree& mesh, const Point& p, double limit) noexcept
         along[l] += boxes.normal[k][l] * at;
       }
     for (std::uint32_t l = 0; l < kWidth; ++l) {
-      constexpr double kLength = 1 - 1e-5;  // of normals, or more
+      constexpr double kLength = 1 - 1e-5;  // a lower bound of normals' lengths
       const double slab = kLength * std::max(0.0, std::max(boxes.slab_low[l] - along[l],
                                                            along[l] - boxes.slab_high[l]));
       key[l] = std::max(key[l], slab * slab);

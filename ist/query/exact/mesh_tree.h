@@ -39,7 +39,7 @@ struct MeshTree : MeshParts {
     }
   }
 
-  /// Where a copy of the asset's bytes lies.
+  /// The same tree in a copy of the asset's bytes.
   MeshTree copied_to(const std::byte* bytes, const AssetHeader& asset) const noexcept {
     const std::ptrdiff_t far = bytes - reinterpret_cast<const std::byte*>(&asset);
     const auto moved = [far]<class T>(const T* from) {
@@ -62,7 +62,7 @@ struct MeshTree : MeshParts {
     return {x[0], x[1], x[2]};
   }
 
-  /// No coordinate is larger.
+  /// A bound of the coordinates.
   IST_HD double extent() const noexcept {
     double extent = 0;
     for (int k = 0; k < 3; ++k)
@@ -88,23 +88,24 @@ struct MeshNode {
   IST_HD std::uint32_t number() const { return word & ((1u << kShift) - 1); }
 };
 
-/// Nodes that are so much larger than the other side's are opened alone.
+/// A node this many times as large as the other side's is opened alone.
 inline constexpr float kOpenedAlone = 2;
 
-/// What rounding may do to a box of a mesh that is placed in floats, by x ↦ scale · R x + t.
+/// The rounding of a mesh's box that is placed in float by x ↦ scale · R x + t.
 IST_HD inline float placing_pad(double scale, const double (&t)[3], const MeshTree& mesh) noexcept {
   const double shift = std::fmax(std::abs(t[0]), std::fmax(std::abs(t[1]), std::abs(t[2])));
   return static_cast<float>(1e-6 * (2 * scale * mesh.extent() + shift));
 }
 
-/// The solid's surface and the mesh lie within this of each other, unit frame.
+/// The distance within which the solid's surface and the mesh are of each other, unit frame.
 IST_HD inline double moved_in_mesh(const MeshTree& mesh) noexcept {
   return mesh.header->error + mesh.header->rounding;
 }
 
-/// How far a vertex of B may be from where the poses put it against A: A's unit frame. A rotation
-/// is off by up to 37 roundings, what moves by it, and the shift between the frames, by 45 at most
-/// with all that follows. `offset`: [u] of a unit frame's middle from its solid's origin.
+/// A bound of the distance of B's vertices from their true places relative to A, A's unit frame. A
+/// rotation has an error of up to 37 roundings; points that it maps, and the translation between
+/// the frames, have at most 45 with all that follows. `offset`: [u] of a unit frame's middle from
+/// its solid's origin.
 IST_HD inline double moved_by_poses(const double (&t_a)[3], double offset_a, const double (&t_b)[3],
                                     double offset_b, double extent_b,
                                     const PairPlace& pose) noexcept {
@@ -117,7 +118,7 @@ IST_HD inline double moved_by_poses(const double (&t_a)[3], double offset_a, con
           5 * far);
 }
 
-/// What comes as near touches. `moved`: what both surfaces are off by.
+/// The distance within which solids touch. `moved`: the errors of both surfaces.
 IST_HD inline double touching_distance(double moved, const MeshTree& a, const MeshTree& b,
                                        const Similarity& a_from_b) noexcept {
   const double shift =
@@ -125,8 +126,8 @@ IST_HD inline double touching_distance(double moved, const MeshTree& a, const Me
   return moved + 4 * exact::kHalfUnit * (a.extent() + a_from_b.scale * b.extent() + shift);
 }
 
-/// Of solids that touch, faces whose corners are as near to one plane lie on each other: a kernel
-/// rounds the corners of a face apart, and the planes of its slivers turn with them.
+/// Faces of touching solids lie on each other if their corners are within this of one plane: a CAD
+/// kernel rounds the corners of a face apart, and the planes of its slivers turn with them.
 IST_HD constexpr double flush_distance(double touch) noexcept { return 64 * touch; }
 
 }  // namespace ist

@@ -7,8 +7,8 @@
 
 #include "query/exact/orientation.h"
 
-// The nearest points of segments and triangles, in double. What is found lies on them to a
-// rounding, so that it bounds the distance from above however thin they are.
+// The nearest points of segments and triangles, in double. They are on them up to rounding, so that
+// they bound the distance from above however thin these are.
 
 namespace ist::exact {
 
@@ -17,7 +17,7 @@ struct NearestPair {
   double squared = HUGE_VAL;  ///< distance
   Point a = {}, b = {};
 
-  /// Whether these are nearer.
+  /// Takes these points if they are nearer; returns if so.
   bool take(const Point& on_a, const Point& on_b) noexcept {
     const Point between = on_b - on_a;
     const double s = dot(between, between);
@@ -40,7 +40,7 @@ inline Point nearest_on_segment(const Point& p, const Point& from, const Point& 
   return along < uu ? from + (along / uu) * u : to;
 }
 
-/// A triangle with what its points are found by.
+/// A triangle with the data for its nearest points.
 struct FlatTriangle {
   Point corner[3];
   Point side[3];  ///< from corner k to the next
@@ -73,7 +73,7 @@ inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept
   return best.a;
 }
 
-/// Of a triangle's corners over the other's plane, times the length of its normal.
+/// Heights of a triangle's corners above the other's plane, times the length of its normal.
 using Heights = std::array<double, 3>;
 
 /// Takes the nearest points of two triangles that do not cross, if they are nearer. `enough`: any
@@ -88,8 +88,8 @@ inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Hei
         best.take(nearest_on_triangle(b.corner[k], a), b.corner[k]) && enough)
       return;
   }
-  // Edges whose nearest points are no corners; by products of vectors, which keep the digits of
-  // edges that are nearly parallel.
+  // Edges whose nearest points are not corners, by cross products, which keep the digits of nearly
+  // parallel edges.
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
       const Point n = cross(a.side[i], b.side[j]), w = b.corner[j] - a.corner[i];
@@ -101,7 +101,7 @@ inline void take_nearest(const FlatTriangle& a, const FlatTriangle& b, const Hei
     }
 }
 
-/// Whether triangles that do not cross come as near.
+/// True if triangles that do not cross are nearer than `distance`.
 inline bool come_within(double distance, const Point (&a)[3], const Point (&b)[3]) noexcept {
   const FlatTriangle of_a(a[0], a[1], a[2]), of_b(b[0], b[1], b[2]);
   Heights over_a, over_b;

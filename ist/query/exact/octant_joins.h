@@ -6,11 +6,11 @@
 #include "query/exact/exact_sums.h"
 #include "query/exact/overlap_formulas.h"
 
-// Which octants of a part are one, on the host and on a GPU.
+// Joins the octants of a part that belong together, on the host and on a GPU.
 
 namespace ist::octants {
 
-/// Of a part's sums: what is less in an octant is left to the others.
+/// Relative to a part's sums: an octant with less is left to the others.
 inline constexpr double kRounding = 1e-9;
 
 /// From 1 at `low` to 0 at twice that, or the other way round.
@@ -43,8 +43,8 @@ IST_HD inline double both_areas(const OctantSums& sums) {
   return norm(sums.area[0]) + norm(sums.area[1]);
 }
 
-/// How far two octants are one: where one is a sliver of the other, or where they are near to each
-/// other, as those above and below the middle of a contact that is thin aslant are.
+/// The degree to which two octants are one: if one is a sliver of the other, or if they are near
+/// each other, like those above and below the middle of a contact that is thin and aslant.
 IST_HD inline double oneness(const OctantSums& x, const OctantSums& y, double near) {
   const double less = exact::lesser(x.six_volumes, y.six_volumes),
                more = exact::greater(x.six_volumes, y.six_volumes);
@@ -54,26 +54,26 @@ IST_HD inline double oneness(const OctantSums& x, const OctantSums& y, double ne
   return exact::greater(falls(less / more, 1.0 / 64), falls(apart, near));
 }
 
-/// Of what is near: a part that is no thicker along an axis is not cut across it.
+/// Relative to what is near: a part that is no thicker along an axis is not cut across it.
 inline constexpr double kThin = 1.0 / 8;
 
-/// How far a part is no longer than `length` along an axis.
+/// The degree to which a part is no longer than `length` along an axis.
 IST_HD inline double shortness(const OctantSums& box, int axis, double length) {
   return falls(box.high[axis] - box.low[axis], length);
 }
-/// And along all.
+/// The same along all axes.
 IST_HD inline double smallness(const OctantSums& box, double length) {
   return exact::lesser(exact::lesser(shortness(box, 0, length), shortness(box, 1, length)),
                        shortness(box, 2, length));
 }
 
-/// Whether it is longer than that along all.
+/// True if it is longer than that along all axes.
 IST_HD inline bool is_large(const OctantSums& box, double near) {
   return shortness(box, 0, near) == 0 && shortness(box, 1, near) == 0 &&
          shortness(box, 2, near) == 0;
 }
 
-/// The planes across which octants are not one anyway, a bit an axis.
+/// The planes across which octants are not one anyway, a bit for each axis.
 IST_HD inline int planes_of(const OctantSums& box, double near) {
   int planes = 0;
   for (int k = 0; k < 3 && smallness(box, near) < 1; ++k)
@@ -81,8 +81,8 @@ IST_HD inline int planes_of(const OctantSums& box, double near) {
   return planes;
 }
 
-/// A contact that is not thin is one: there its two surfaces differ. `small`: how far it is one as
-/// it is small, or for lack of room.
+/// Joins octants. A contact that is not thin is one, since its two surfaces differ there. `small`:
+/// the degree to which it is one because it is small or because few patches are wanted.
 IST_HD inline void join(OctantSums* octants, double near, double small) {
   for (const bool by_axis : {true, false})
     for (int k = 0; k < 3; ++k) {

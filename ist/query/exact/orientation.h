@@ -12,7 +12,8 @@ namespace ist::exact {
 
 using Point = Vec3;
 
-/// A rounded determinant of B where it is, how far it may be off, and its sign with B moved aside.
+/// A rounded determinant with B not translated, its error, and its sign with B translated
+/// symbolically.
 struct Determinant {
   double value;
   double error;  ///< 0: `value` is the nearest double, or nearly
@@ -31,7 +32,7 @@ IST_HD inline bool same(const Point& p, const Point& q) {
   return p.x == q.x && p.y == q.y && p.z == q.z;
 }
 
-/// The sign of a d − b c of differences, 0 for none: in doubles where these are certain.
+/// The sign of a d − b c of differences, or 0; in doubles where these are certain.
 IST_HD_COLD int sign_of_minor(double a1, double a0, double b1, double b0, double c1, double c0,
                               double d1, double d0) {
   const double ad = (a1 - a0) * (d1 - d0), bc = (b1 - b0) * (c1 - c0);
@@ -49,7 +50,7 @@ IST_HD_COLD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, c
   int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
   if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
   if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
-  // Of a triangle without area, or of parallel edges: any sign that is always the same will do.
+  // For a triangle without area, or parallel edges, any sign will do that is always the same.
   return sign != 0 ? moved * sign : 1;
 }
 
@@ -64,8 +65,8 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
                      vz = difference(v1.z, v0.z);
-  // In steps, so that few expansions are held at a time: on a GPU they lie in memory of each
-  // thread.
+  // In steps, so that few expansions exist at a time: on a GPU they are in each thread's local
+  // memory.
   Expansion<64> shift_xy;
   const auto xy = [&] {
     const Expansion<16> x = minor(uy, vz, uz, vy), y = minor(uz, vx, ux, vz);
@@ -81,9 +82,9 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
 /// r · (u × v) in doubles, of rounded differences, for many r: sign 0 where it is not certain.
 struct FilteredPlane {
   Point normal, size;
-  double shift, shift_error;  ///< what moving aside adds
+  double shift, shift_error;  ///< the part of the symbolic translation
 
-  /// `by`: aside, or its opposite where r's start moves.
+  /// `by`: the symbolic translation, or its opposite if r's start moves.
   IST_HD FilteredPlane(const Point& u, const Point& v, const Point& by) {
     const double ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by_ = u.x * v.z, az = u.x * v.y,
                  bz = u.y * v.x;
@@ -92,7 +93,7 @@ struct FilteredPlane {
     shift = dot(by, normal);
     shift_error = kFilter * absolute_dot(by, size);
   }
-  /// `moved`: how much its points may change it.
+  /// `moved`: how much moving points may change it.
   IST_HD Determinant height(const Point& r, double moved = 0) const {
     const double value = dot(r, normal), error = kFilter * absolute_dot(r, size);
     const double signed_value = value + shift;
@@ -123,7 +124,7 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
   return found.sign != 0 ? found : exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
 }
 
-/// In doubles, whose sign may be 0, or with `kExactly` whatever it takes.
+/// In doubles, with a sign that may be 0; or with `kExactly` exactly.
 template <bool kExactly>
 IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const Point& u1,
                                          const Point& u0, const Point& v1, const Point& v0,
@@ -146,7 +147,7 @@ IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, con
   return determinant_of<kExactly>(a, b[0], b[1], b[0], b[2], b[0], -1, aside);
 }
 
-/// Which way round A's edge p → q goes about B's edge r → s.
+/// The orientation of A's edge p → q about B's edge r → s.
 template <bool kExactly = true>
 IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s,
                                     const Point& aside) {

@@ -1,27 +1,27 @@
-// Formulas of an overlap's sums, once for lanes of the CPU and for a thread of the GPU. No header
-// of its own: who includes it says before what its numbers are. `Real`, `Mask` and `Vec3` are a
-// number, an answer and three numbers, or lanes of them; constant(), magnitude(), choose(), less()
-// and equal() work on them. IST_FORMULA goes before a function.
+// The formulas of an overlap's sums, once for lanes of the CPU and for a thread of the GPU. This is
+// not a header of its own: the including file defines its numbers first. `Real`, `Mask` and `Vec3`
+// are a number, a condition and three numbers, or lanes of them, with constant(), magnitude(),
+// choose(), less() and equal(). IST_FORMULA precedes a function.
 
-/// Where an edge from p to q goes through a plane.
+/// The point where an edge from p to q crosses a plane.
 struct EdgeEnd {
   Vec3 from;         ///< the end of the edge that is nearer to the plane
   Vec3 offset;       ///< from there to the place: it keeps its digits where that is next to the end
-  Real share;        ///< of the edge that the offset is
-  Real heights;      ///< of both ends together; 1 where they are rounded to 0
+  Real share;        ///< the offset as a share of the edge
+  Real heights;      ///< of both ends together; 1 if they are rounded to 0
   Mask flat;         ///< they are
   Mask from_second;  ///< the nearer end is q
 };
 
-/// From heights over the plane. From the nearer end, and between two as near from the first in
-/// space, so that both triangles at an edge do alike.
+/// Computes the point from heights above the plane: from the nearer end, or if both are equally
+/// near from the first in space, so that both triangles at an edge agree.
 IST_FORMULA EdgeEnd edge_end(const Vec3& p, const Vec3& q, Real height_p, Real height_q) {
   const Real hp = magnitude(height_p), hq = magnitude(height_q), whole = hp + hq;
   const Mask before =
       either(less(q.x, p.x),
              both(equal(q.x, p.x), either(less(q.y, p.y), both(equal(q.y, p.y), less(q.z, p.z)))));
   const Mask turned = either(less(hq, hp), both(equal(hq, hp), before));
-  // An edge in the plane has both ends on one side, yet their heights may be rounded to 0.
+  // An edge in the plane has both ends on one side, but their heights may be rounded to 0.
   const Mask flat = equal(whole, constant(0.0));
   const Real divisor = choose(flat, constant(1.0), whole);
   const Real share = choose(flat, constant(0.5), lesser(hp, hq) / divisor);
@@ -30,16 +30,16 @@ IST_FORMULA EdgeEnd edge_end(const Vec3& p, const Vec3& q, Real height_p, Real h
   return {near, share * (far - near), share, divisor, flat, turned};
 }
 
-/// The corner that a triangle's cones start at, 0 … 2, of its corners' distances from the origin:
-/// the nearest.
+/// The apex of a triangle's cones, 0 … 2: the corner nearest to the origin, by its corners'
+/// distances.
 IST_FORMULA Real apex_of(Real first, Real second, Real third) {
   return choose(less(third, lesser(first, second)), constant(2.0),
                 choose(less(second, first), constant(1.0), constant(0.0)));
 }
 
-/// What a piece of the boundary adds to the sums, from the origin.
+/// The terms that a piece of the boundary adds to the sums, relative to the origin.
 struct PieceTerms {
-  Real six_volumes[3];  ///< of tetrahedra: summed one by one, as they may cancel
+  Real six_volumes[3];  ///< of tetrahedra, which are summed one by one since they may cancel
   Vec3 moment, force, torque;
   Real rounding;  ///< six times what the volume may be off by
 };
@@ -61,7 +61,7 @@ IST_FORMULA void segment_terms(const Vec3 (&near)[2], const Vec3 (&offset)[2],
   const Real six_a = dot(c, of_a), six_b = dot(c, of_b);
   out.six_volumes[0] = dot(c, of_a - of_b);
   Vec3 moment = six_a * (of_a + sum) - six_b * (of_b + sum);
-  // What the product rounds, and what ends that are rounded do to the triangles at them.
+  // The rounding of the product, and the effect of rounded ends on the triangles at them.
   Real rounding = constant(exact::kHalfUnit) * length_bound(along) *
                   (constant(8.0) * length_bound(a) * length_bound(of_a - of_b) +
                    constant(6.0) * (length_bound(a) + length_bound(b)) *
@@ -97,14 +97,15 @@ IST_FORMULA void cone_terms(Real count, const Vec3& apex, const Vec3& next, cons
   out.moment = six * (apex + (next + last));
 }
 
-/// What a piece of a surface adds to the sums of an octant, from the centre of its part.
+/// The terms that a piece of a surface adds to the sums of an octant, relative to the centre of its
+/// part.
 struct OctantTerms {
   Real six_volumes;
   Vec3 moment, area, torque;
 };
 
-/// `half`: 0.5 times how often it counts; `share`: of its torque, a third of the octant's share in
-/// a surface, and less than 0 for A's.
+/// `half`: 0.5 times how often it counts. `share`: the factor of its torque, a third of the
+/// octant's share in a surface, negative for A's.
 IST_FORMULA OctantTerms octant_terms(Real half, Real share, const Vec3& p, const Vec3& q,
                                      const Vec3& r) {
   const Vec3 area = half * cross(q - p, r - p), three = p + (q + r);
@@ -112,15 +113,16 @@ IST_FORMULA OctantTerms octant_terms(Real half, Real share, const Vec3& p, const
   return {six, six * three, area, share * cross(three, area)};
 }
 
-/// What a crossing adds to octants: the triangles of A and of B between the segment and the apex,
-/// those between the apex and a pierced edge opposite to it, at each end, and all of them together.
+/// The terms that a crossing adds to octants: the triangles of A and of B between the segment and
+/// the apex, those between the apex and a pierced edge opposite to it, at each end, and all of them
+/// together.
 struct OctantTriangles {
   OctantTerms of[4], all;
   Vec3 area[2];  ///< of all, A's and B's
 };
 
-/// `corner`: the apexes of A and of B, the ends, and the nearer ends of their edges; `by_b`: whose
-/// edge an end is of; `times`: how often its triangle counts.
+/// `corner`: the apexes of A and of B, the ends, and the nearer ends of their edges. `by_b`: an end
+/// is on B's edge. `times`: how often its triangle counts.
 IST_FORMULA void octant_triangles(const Vec3 (&corner)[6], const Mask (&by_b)[2],
                                   const Real (&times)[2], OctantTriangles& out) {
   const Real half = constant(0.5), third = constant(0.5 / 3), less_third = constant(-0.5 / 3);

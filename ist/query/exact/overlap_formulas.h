@@ -23,7 +23,7 @@ IST_HD inline bool equal(double x, double y) { return x == y; }
 IST_HD inline bool both(bool x, bool y) { return x && y; }
 IST_HD inline bool either(bool x, bool y) { return x || y; }
 IST_HD inline double choose(bool of, double x, double y) { return of ? x : y; }
-/// No less than its length.
+/// An upper bound of a vector's length.
 IST_HD inline double length_bound(const Vec3& a) {
   return (std::abs(a.x) + std::abs(a.y)) + std::abs(a.z);
 }

@@ -22,8 +22,8 @@ bool ExactQuery::is_inside(const Side& own, std::uint32_t vertex) const noexcept
   return ist::is_inside(solid, place(own, vertex), search_.aside);
 }
 
-/// Marks the blocks that lie inside as a whole: from those whose edges are pierced on, and whole
-/// shells.
+/// Marks the blocks that are inside as a whole, by flooding from blocks with pierced edges and from
+/// whole shells.
 void ExactQuery::find_insides(Side& own) noexcept {
   BlockMarks& marks = own.marks;
   const MeshTree& mesh = own.mesh;

@@ -30,10 +30,10 @@ class OverlapOctants : public OverlapParts<Overlap> {
  public:
   using Parts::Parts;
 
-  /// Divides parts of divide() that are kept, in the frame of A or B: all those for which there is
-  /// room if each patch is to have its share of the volume. Returns how many octants are in
-  /// PartMemory::octants: their names are 8 times the part's, and the octant's number. `near`:
-  /// octants that are not further apart are one.
+  /// Divides the kept parts of divide(), along the axes of A or B: those that have a patch's share
+  /// of the volume, if there are `room` patches. Returns the number of octants in
+  /// PartMemory::octants, whose names are 8 times the part's plus the octant's number. `near`:
+  /// octants that are no farther apart are one.
   IST_HD std::uint32_t split(std::uint32_t parts, bool by_b, double near,
                              std::uint32_t room) noexcept {
     const Similarity& map = this->map();
@@ -57,7 +57,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
   using Parts::pieces;
   using Parts::width;
 
-  /// A point seen from a part's centroid, in the axes of the octants.
+  /// A point relative to a part's centroid, along the axes of the octants.
   struct Corner {
     double at[3];
     int octant;
@@ -65,12 +65,12 @@ class OverlapOctants : public OverlapParts<Overlap> {
     IST_HD Point point() const noexcept { return {at[0], at[1], at[2]}; }
   };
 
-  /// Whether there are parts to divide.
+  /// Selects the parts to divide. False if there are none.
   IST_HD bool begin_octants(std::uint32_t parts, double least) noexcept {
     std::uint32_t slots = 0;
     for (std::uint32_t p = 0; p < parts; ++p) {
       ExactPart& part = memory().parts[p];
-      // Where the whole is nothing, parts are what sums round.
+      // If the whole is 0, parts are rounding.
       if (part.kept != p || part.id == 0 || !(least > 0 && part.sums.volume() > least) ||
           slots == PartMemory::kMostSplit)
         continue;
@@ -102,13 +102,13 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
   }
 
-  /// Where a side goes through a plane, on the side of `from`.
+  /// The point where an edge crosses a plane, taken on the side of `from`.
   IST_HD static Corner between(const Corner& from, const Corner& to, int plane) noexcept {
     const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
     Corner out = {{0, 0, 0}, from.octant};
     for (int k = 0; k < 3; ++k) {
       if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
-      // What has both ends on one side stays there, whatever rounding does.
+      // If both ends are on one side of a plane, so is the point, whatever rounding does.
       const int bit = 1 << k;
       if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
         out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
@@ -116,7 +116,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return out;
   }
 
-  /// A piece that no plane before `kPlane` cuts.
+  /// Adds a piece that no plane before `kPlane` cuts.
   template <int kPlane = 0>
   IST_HD_COLD static void add_triangle(OctantSums* octants, bool of_b, double times,
                                        const Corner& p, const Corner& q, const Corner& r) noexcept {
@@ -149,7 +149,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     }
   }
 
-  /// Those of a crossing. Most lie in one octant.
+  /// Adds the pieces of a crossing. Most are in one octant.
   IST_HD void add_pieces(std::uint32_t l, OctantSums* octants) noexcept {
     const OctantPieces& seen = pieces().octants;
     int all = 7, any = 0;
@@ -171,7 +171,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
                  seen.corner(t, 2, l));
   }
 
-  /// Triangle t of lane l, of these corners.
+  /// Adds triangle t of lane l, which has these corners.
   IST_HD void add_seen(OctantSums* octants, bool of_b, int t, std::uint32_t l, int p, int q,
                        int r) noexcept {
     const OctantPieces& seen = pieces().octants;
@@ -195,8 +195,8 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return slot == kNoIndex ? nullptr : &memory().octant_sums[8 * slot];
   }
 
-  /// The boxes of parts, and the planes that cut them: those across which octants are not one
-  /// anyway. Whether there are any.
+  /// Finds the boxes of parts, and the planes that cut them: those across which octants are not one
+  /// anyway. False if there are none.
   IST_HD bool find_planes(std::uint32_t parts, double near) noexcept {
     const auto reach = [&](OctantSums& sums, const Point& x) {
       const Point from = in_axes(x - sums.centre);
@@ -205,7 +205,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
         if (from[k] > sums.high[k]) sums.high[k] = from[k];
       }
     };
-    // The surface between its curves may reach further than these.
+    // The surface between its curves may extend beyond these.
     for (std::uint32_t i = 0; i < this->crossings(); ++i)
       if (OctantSums* const sums = octants_of(i)) reach(*sums, this->place_of(i, 0));
     for (int side = 0; side < 2; ++side) {
@@ -236,7 +236,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return any;
   }
 
-  /// The pieces that parts are summed of: see ExactTerms.
+  /// Sums the pieces of parts (ExactTerms) by octants.
   IST_HD void sum_octants() noexcept {
     meet();
     OctantView& view = pieces().view;
@@ -276,7 +276,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     }
   }
 
-  /// Eight triangles of a crossed block: the lanes see them, one adds them up.
+  /// Adds eight triangles of a crossed block: the lanes compute them, one adds them.
   IST_HD void sum_triangles(int side, std::uint32_t r, std::uint32_t first) noexcept {
     const MeshBlock& block = this->block_of(r);
     const std::uint32_t left = block.triangles - first, count = left < 8 ? left : 8;
@@ -298,7 +298,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     meet();
     for (std::uint32_t l = lane(); pieces().says && l < count; l += width()) {
       if (seen.times[0][l] == 0) continue;
-      // From the apex on.
+      // Corners start at the apex.
       const std::uint32_t apex = this->opposite_edge(r, first + l) + 2;
       Point at[3];
       for (std::uint32_t k = 0; k < 3; ++k)
@@ -318,7 +318,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     meet();
   }
 
-  /// The c-th corner of lane l, in its view.
+  /// Places the c-th corner of lane l in the frame of its octants.
   IST_HD Point see(const Point& x, std::uint32_t c, std::uint32_t l) noexcept {
     OctantPieces& seen = pieces().octants;
     const OctantView& view = pieces().view;
@@ -336,7 +336,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return {{seen.at[c][0][l], seen.at[c][1][l], seen.at[c][2][l]}, seen.octant[c][l] & planes};
   }
 
-  /// A block inside as a whole: by its integrals if it lies in one octant.
+  /// Adds a block that is inside as a whole, by its integrals if it is in one octant.
   IST_HD void sum_block(int side, std::uint32_t b) noexcept {
     const MeshBlock& block = mesh(side).blocks[b];
     OctantSums* octants = nullptr;
@@ -347,7 +347,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
         for (double& x : pieces().view.centre[k]) x = octants->centre[k];
     }
     meet();
-    // Vertices by eight.
+    // Eight vertices at a time.
     for (std::uint32_t v = lane(); pieces().says && v < block.vertices; v += width())
       see(this->vertex(side, block.vertex[v]), v / 8, v % 8);
     meet();
@@ -373,8 +373,8 @@ class OverlapOctants : public OverlapParts<Overlap> {
                    at[block.corner[2][t]]);
   }
 
-  /// Appends the octants of a part. Returns how many are written then: `first` if they are not
-  /// those of the part, as where rounding is more than what it has.
+  /// Appends the octants of a part. Returns the number written then; `first` if they do not sum to
+  /// the part, as where rounding exceeds it.
   IST_HD std::uint32_t write_octants(const ExactPart& part, double small, double near,
                                      std::uint32_t first) noexcept {
     const auto in_frame = [&](const Point& v) {

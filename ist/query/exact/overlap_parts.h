@@ -12,7 +12,7 @@
 
 namespace ist {
 
-/// A triangle's name has no more bits: eight times a pair's name fits into 64.
+/// The number of bits of a triangle's name, so that eight times a pair's name fits into 64.
 inline constexpr int kTriangleBits = 28;
 
 template <class Visit>
@@ -20,7 +20,7 @@ IST_HD void for_each_bit(std::uint64_t bits, const Visit& visit) {
   for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(lowest_bit(bits)));
 }
 
-/// The least power of two that is no less.
+/// The least power of two that is at least n.
 IST_HD inline std::uint32_t power_from(std::uint32_t n) {
   std::uint32_t power = 1;
   while (power < n) power *= 2;
@@ -60,7 +60,7 @@ class OverlapParts : public Overlap {
     return finish();
   }
 
-  /// Of crossing i in the order of sums.
+  /// The part of crossing i in the order of sums.
   IST_HD std::uint32_t part_of_crossing(std::uint32_t i) noexcept {
     return memory().parts[part_of(i)].kept;
   }
@@ -75,7 +75,7 @@ class OverlapParts : public Overlap {
   using Overlap::pieces;
   using Overlap::width;
 
-  /// `one`: all that counts is known to be in one part.
+  /// `one`: everything that counts is known to be in one part.
   IST_HD void start(bool one) noexcept {
     parts_ = 0;
     one_ = one;
@@ -112,7 +112,7 @@ class OverlapParts : public Overlap {
     }
   }
 
-  /// Whether all that counts is in one part.
+  /// True if everything that counts is in one part.
   IST_HD bool are_one() noexcept {
     meet();
     if (leads()) pieces().says = parts_ == 1;
@@ -133,7 +133,7 @@ class OverlapParts : public Overlap {
     return !this->any(!one);
   }
 
-  /// Sums them.
+  /// Sums the parts and returns their number.
   IST_HD std::uint32_t finish() noexcept {
     meet();
     if (leads()) pieces().says = one_ && this->whole().volume() > 0;
@@ -163,14 +163,14 @@ class OverlapParts : public Overlap {
     return known = part;
   }
 
-  // Elements: crossings, vertices of crossed blocks, and blocks inside as a whole.
+  // Elements are crossings, vertices of crossed blocks, and blocks inside as a whole.
   IST_HD std::uint32_t vertex_element(std::uint32_t record, std::uint32_t vertex) const noexcept {
     return first_vertex_ + kWidth * record + vertex;
   }
   IST_HD std::uint32_t block_element(int side, std::uint32_t block) const noexcept {
     return first_block_[side] + block;
   }
-  /// What a triangle of a crossed block hangs together with, where it counts as a whole.
+  /// The element to which a triangle of a crossed block belongs where it counts as a whole.
   IST_HD std::uint32_t triangle_element(std::uint32_t r, std::uint32_t t) const noexcept {
     if (one_) return 0;
     const std::uint32_t edge = 3 * t + opposite_edge(r, t);
@@ -184,10 +184,10 @@ class OverlapParts : public Overlap {
 
   std::uint32_t parts_ = 0;
   bool one_ = false;      ///< all that counts is in one part
-  bool by_names_ = true;  ///< what hangs together follows from names of crossings and their ends
+  bool by_names_ = true;  ///< connections follow from names of crossings and their ends
 
  private:
-  /// Of an end in the list of its edge, above the number of the next.
+  /// Flags of an end in the list of its edge, above the number of the next.
   static constexpr std::uint64_t kEnters = std::uint64_t{1} << 32,
                                  kFromFirst = std::uint64_t{2} << 32;
 
@@ -204,14 +204,15 @@ class OverlapParts : public Overlap {
     return element;
   }
 
-  /// The same, and leaves all as it is.
+  /// The same without changing any links.
   IST_HD std::uint32_t top(std::uint32_t element) const noexcept {
     const std::uint32_t* const parent = memory().parent;
     while (parent[element] != element) element = parent[element];
     return element;
   }
 
-  /// The lower number stays the root, so that parts do not depend on the order.
+  /// Joins two elements. The lower number becomes the root, so that parts do not depend on the
+  /// order.
   IST_HD void unite(std::uint32_t x, std::uint32_t y) noexcept {
     x = root(x);
     y = root(y);
@@ -219,12 +220,12 @@ class OverlapParts : public Overlap {
     if (y < x) memory().parent[x] = y;
   }
 
-  /// Of the edges of a crossed block.
+  /// The index of a crossed block's first edge.
   IST_HD static std::uint32_t first_middle(std::uint32_t record) noexcept {
     return 3 * kWidth * record;
   }
 
-  /// Each element by itself, and no end in the list of an edge.
+  /// Makes each element its own root, and empties the lists of ends of edges.
   IST_HD void begin() noexcept {
     const auto alone = [&](std::uint32_t element) {
       memory().parent[element] = element;
@@ -239,7 +240,7 @@ class OverlapParts : public Overlap {
       });
   }
 
-  /// visit(block) of those inside as a whole that are this lane's.
+  /// Calls visit(block) for this lane's share of the blocks inside as a whole.
   template <class Visit>
   IST_HD void for_each_of_lane(int side, const Visit& visit) noexcept {
     std::uint32_t next = lane();
@@ -249,7 +250,7 @@ class OverlapParts : public Overlap {
     });
   }
 
-  /// Vertices inside, along edges that nothing pierces: each lane's of crossed blocks of its own.
+  /// Joins vertices inside along edges that nothing pierces. Each lane has its own crossed blocks.
   IST_HD void join_within_blocks() noexcept {
     for (std::uint32_t r = lane(); r < records(); r += width()) {
       const std::uint64_t pierced = this->pierced_of(r);
@@ -265,8 +266,8 @@ class OverlapParts : public Overlap {
     }
   }
 
-  /// Segments that end at the same place go on in each other: it is an edge of one triangle and
-  /// another that shares the edge, against one of the other solid. A table finds it by its name.
+  /// Joins segments that end at the same point, which is on an edge of two triangles and in a
+  /// triangle of the other solid. A hash table finds it by its name.
   IST_HD void join_curves() noexcept {
     PiercedEnd* const ends = memory().ends;
     std::uint64_t* const table = memory().keys;  // numbers of ends, from 1
@@ -301,8 +302,8 @@ class OverlapParts : public Overlap {
     }
   }
 
-  /// A curve that lies in one triangle and goes round what is outside belongs to the narrowest one
-  /// there that goes around it, or to the triangle's corners.
+  /// Joins a curve that is in one triangle and surrounds what is outside to the narrowest curve
+  /// around it there, or to the triangle's corners.
   IST_HD void join_holes(int side) noexcept {
     using exact::Point;
     CurveExtent* const curves = memory().curves;
@@ -363,12 +364,12 @@ class OverlapParts : public Overlap {
     }
   }
 
-  /// What an edge has inside joins what bounds it, end by end.
+  /// Joins the ends of the pieces of edges that are inside.
   IST_HD void join_edges() noexcept {
     for (std::uint32_t r = 0; r < records(); ++r) {
       const MeshBlock& block = block_of(r);
       for_each_bit(this->pierced_of(r), [&](std::uint32_t edge) {
-        // The triangle on its other side has the same ends.
+        // The triangle on the edge's other side has the same ends.
         const std::uint32_t t = edge / 3;
         if (edge % 3 != opposite_edge(r, t) &&
             block.vertex[block.corner[edge % 3][t]] > block.vertex[block.corner[(edge + 1) % 3][t]])
@@ -421,14 +422,14 @@ class OverlapParts : public Overlap {
     return middle != kNoIndex ? middle : nearest;
   }
 
-  /// visit(r) of a side's crossed blocks of which edges are pierced and vertices are inside.
+  /// Calls visit(r) for a side's crossed blocks with pierced edges and vertices inside.
   template <class Visit>
   IST_HD void for_each_mixed(int side, const Visit& visit) const noexcept {
     for (std::uint32_t r = this->first_record(side); r < this->end_record(side); ++r)
       if (this->side_of(r) == side && this->pierced_of(r) != 0 && this->inside_of(r) != 0) visit(r);
   }
 
-  /// Vertices inside, from block to block. A table finds those that are one.
+  /// Joins vertices inside that different blocks share. A hash table finds them.
   IST_HD void join_vertices(int side) noexcept {
     int count = 0;
     for_each_mixed(side, [&](std::uint32_t r) { count += count_bits(this->inside_of(r)); });
@@ -450,7 +451,7 @@ class OverlapParts : public Overlap {
     });
   }
 
-  /// Blocks inside as a whole, with each other and with what is inside of crossed ones.
+  /// Joins blocks inside as a whole with each other and with vertices inside of crossed ones.
   IST_HD void join_blocks(int side) noexcept {
     const MeshTree& all = mesh(side);
     this->for_each_inside(side, [&](std::uint32_t b) {
@@ -505,8 +506,8 @@ class OverlapParts : public Overlap {
     }
   }
 
-  /// What is less than nothing is the wall of a cavity in a part: in the largest, as far as can be
-  /// told from sums.
+  /// A part with negative volume is the wall of a cavity. It is added to the largest part, the best
+  /// guess from sums.
   IST_HD void join_cavities() noexcept {
     ExactPart* const parts = memory().parts;
     std::uint32_t largest = 0;

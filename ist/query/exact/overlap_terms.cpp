@@ -22,7 +22,7 @@ HWY_INLINE void store(const PieceTerms& terms, ExactTerms& out, std::size_t l) {
   store(terms.moment, out.moment, l);
 }
 
-/// Whether the edge of an end is B's, of crossings from `i` on.
+/// True where an end's edge is B's, for crossings from `i` on.
 HWY_INLINE Mask ends_by_b(const Crossings& crossings, int e, std::size_t i) {
   const D d;
   const V edge = hn::LoadU(d, crossings.end(e, Crossings::kEdge) + i), eight = hn::Set(d, 8.0);
@@ -121,7 +121,7 @@ void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const Oc
   }
 }
 
-/// Numbers of a block's sixteen vertices, of a corner of some triangles.
+/// Picks the numbers of a triangle's corner from those of a block's sixteen vertices.
 HWY_INLINE V pick(const double* of_vertex, const std::uint8_t* local) {
   const D d;
   if constexpr (hn::MaxLanes(D()) == 8) {

@@ -1,4 +1,4 @@
-// What the signs of eight pairs of triangles say: included once a target.
+// The signs of eight pairs of triangles. Included once per target.
 
 #if defined(IST_QUERY_PAIR_SIGNS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_PAIR_SIGNS_INL_H_
@@ -22,7 +22,7 @@ HWY_INLINE Vec3 corner_of(const TrianglePairs& pairs, int side, int c, std::size
           hn::Load(d, pairs.corner[side][c][2] + l)};
 }
 
-/// Writes a triangle of a pair that is gathered.
+/// Stores a triangle of a gathered pair.
 HWY_INLINE void put_triangle(const MeshTree& mesh, std::uint32_t triangle,
                              const PlacedVertices& from, int side, TrianglePairs& pairs) {
   const MeshBlock& block = mesh.blocks[triangle / kWidth];
@@ -38,31 +38,31 @@ inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
   return each(bits) | ~(bits[0] | bits[1] | bits[2]);
 }
 
-/// Heights of eight pairs, and what their signs say: a bit each.
+/// The heights of eight pairs, and their signs, a bit each.
 struct alignas(64) PairHeights {
   double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
-  double shift[2][8];                     ///< what moving B aside adds to them, its absolute value
-  std::uint32_t positive[2][3] = {};      ///< with B moved aside
-  std::uint32_t certain[2][3] = {};       ///< in double
-  std::uint32_t settled[2][3] = {};       ///< wherever points move by the room
+  double shift[2][8];                 ///< the part of the symbolic translation, its absolute value
+  std::uint32_t positive[2][3] = {};  ///< with B moved aside
+  std::uint32_t certain[2][3] = {};   ///< certain in double
+  std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
 
-  /// Pairs that a plane keeps apart.
+  /// The pairs that a plane separates.
   std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
     return (each(known[0]) & alike(positive[0])) | (each(known[1]) & alike(positive[1]));
   }
-  /// Edges that go through the other's plane.
+  /// The edges that cross the other's plane.
   void find_parts(std::uint32_t (&out)[2][3]) const {
     for (int s = 0; s < 2; ++s)
       for (int k = 0; k < 3; ++k) out[s][k] = positive[s][k] ^ positive[s][(k + 1) % 3];
   }
 };
 
-/// Signs of pairs that were gathered, in double, and exactly where doubles leave them unclear.
+/// The signs of gathered pairs, in double, and exactly where doubles do not decide.
 class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  /// `kAsks`: whether what is settled is asked.
+  /// `kAsks`: settled signs are wanted.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
                                PairHeights& out) const {
@@ -95,14 +95,14 @@ class PairSigns {
           const V value = dot(r, normal), error = filter * absolute_dot(r, size);
           const V moved = value + shift, away = hn::Abs(moved), sure = error + shift_error;
           hn::Store(value, d, out.value[side][c] + l);
-          // Where moving aside decides, the plane may lie on the other side of the corner.
+          // If the symbolic translation decides, the plane may be on the other side of the corner.
           const V height = hn::Abs(value);
           hn::Store(error + hn::IfThenElseZero(height <= hn::Abs(shift), height), d,
                     out.error[side][c] + l);
           out.positive[side][c] |= mask_bits(d, moved > hn::Zero(d)) << l;
           out.certain[side][c] |= mask_bits(d, away > sure) << l;
           if constexpr (kAsks) {
-            // What the room moves: six products of three numbers.
+            // The effect of the tolerance: six products of three numbers.
             const V unsettled = sure + six_rooms * longest * (two * largest(r) + longest);
             out.settled[side][c] |= mask_bits(d, away > unsettled) << l;
           }
@@ -125,7 +125,7 @@ class PairSigns {
     bits = (bits & ~(1u << n)) | static_cast<std::uint32_t>(bit) << n;
   }
 
-  /// Of pair n, where doubles leave a sign unclear.
+  /// Computes the heights of pair n whose sign is unclear in double.
   HWY_NOINLINE void find_heights_exactly(const TrianglePairs& pairs, std::uint32_t n,
                                          PairHeights& out) const {
     const ExactCorners corners(pairs, n);
@@ -145,13 +145,13 @@ class PairSigns {
     }
   }
 
-  /// Which way round A's edges go about B's: a bit a pair.
+  /// The orientations of A's edges about B's, a bit for each pair.
   struct WaysRound {
     std::uint32_t positive[3][3] = {};  ///< [A's edge][B's edge]
     std::uint32_t certain[3][3] = {}, settled[3][3] = {};
 
-    /// Pairs of which an edge, that goes through the other's plane (`parts`: A's, B's), may go
-    /// through the triangle as far as `known` tells.
+    /// The pairs with an edge that crosses the other's plane (`parts`: A's, B's) and may, by the
+    /// `known` signs, cross the triangle.
     void may_pierce(const std::uint32_t (&parts)[2][3], const std::uint32_t (&known)[3][3],
                     std::uint32_t (&out)[2][3]) const {
       for (int k = 0; k < 3; ++k)
@@ -165,7 +165,7 @@ class PairSigns {
           out[s][k] = parts[s][k] & ~(plus & minus);
         }
     }
-    /// Those of `which` of which a sign that matters is unknown.
+    /// The pairs of `which` with an unknown sign that matters.
     std::uint32_t undecided(std::uint32_t which, const std::uint32_t (&parts)[2][3],
                             const std::uint32_t (&known)[3][3]) const {
       which &= ~(each(known[0]) & each(known[1]) & each(known[2]));
@@ -176,7 +176,7 @@ class PairSigns {
         for (int j = 0; j < 3; ++j) decided &= ~(asked[0][i] | asked[1][j]) | known[i][j];
       return which & ~decided;
     }
-    /// Pairs of which an edge goes through the other's triangle, once all signs that matter are
+    /// The pairs with an edge that crosses the other's triangle, once all signs that matter are
     /// known.
     void pierced(const std::uint32_t (&parts)[2][3], std::uint32_t (&out)[2][3]) const {
       for (int k = 0; k < 3; ++k) {
@@ -212,7 +212,7 @@ class PairSigns {
         const V size_a = largest(edge_a) + room, error_a = filter * size_a;
         HWY_UNROLL(3)
         for (int j = 0; j < 3; ++j) {
-          // Moved aside: the ninth rounding.
+          // The symbolic translation is the ninth rounding.
           const Vec3 r = (corner[1][j] - corner[0][i]) + aside;
           const V value = dot(r, cross(edge_a, edge_b[j])), away = hn::Abs(value);
           const V size = largest(r), error = error_a * size_b[j] * size;
@@ -272,7 +272,7 @@ class PairSigns {
       }
   }
 
-  /// Pairs that cross, or do not, wherever points move by the room.
+  /// The pairs that cross, or do not, wherever points move within the tolerance.
   HWY_NOINLINE std::uint32_t find_settled(const TrianglePairs& pairs, std::uint32_t count) const {
     PairHeights heights;
     find_heights<true>(pairs, count, heights);
@@ -286,8 +286,8 @@ class PairSigns {
     return apart | (all & ~round.undecided(all, parts, round.settled));
   }
 
-  /// Pairs that are further apart than `reach` across or along the plane of one of them, for
-  /// certain.
+  /// The pairs that are certainly farther apart than `reach` across or along the plane of one of
+  /// them.
   HWY_NOINLINE std::uint32_t far_by_planes(const TrianglePairs& pairs, std::uint32_t count,
                                            double reach) const {
     const D d;
@@ -302,7 +302,7 @@ class PairSigns {
         const Vec3 u = corner[s][1] - corner[s][0], v = corner[s][2] - corner[s][0];
         const Vec3 normal = cross(u, v);
         const V wide = largest(u) + largest(v);
-        // What a coordinate of the normal is off by, in doubles of slivers.
+        // The error of a normal's coordinate, which matters for slivers.
         const V off = filter * (wide * wide);
         const auto beyond = [&](const Vec3& axis, V error, const auto& from, V gap) {
           const V reached = hn::Max(largest(other[0] - from),
@@ -326,7 +326,8 @@ class PairSigns {
     return out;
   }
 
-  /// Pairs that a plane along a triangle or along an edge of each keeps as far apart as `reach`.
+  /// The pairs that a plane along a triangle, or along an edge of each, separates by more than
+  /// `reach`.
   static HWY_NOINLINE std::uint32_t apart_by_axes(const TrianglePairs& pairs, std::uint32_t count,
                                                   double by) {
     const D d;
@@ -340,13 +341,13 @@ class PairSigns {
       }
       const V zero = hn::Zero(d), reach = hn::Set(d, by), filter = hn::Set(d, 6 * exact::kFilter);
       V beyond = zero;
-      // An axis and what both triangles reach along it, B's seen from a corner of A's.
+      // An axis and the extents of both triangles along it, B's relative to a corner of A's.
       const auto look = [&](const Vec3& axis, V low_a, V high_a, V low_b, V high_b, V off) {
         const V gap = hn::Max(low_b - high_a, low_a - high_b) - off;
         beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
       };
-      // Both ends of an edge are one along its axis, but for rounding: of edges that are parallel
-      // the axis is nothing else.
+      // Both ends of an edge coincide along its axis except for rounding. For parallel edges the
+      // axis is nothing but rounding.
       const auto rounding = [&](const Vec3& u, const Vec3& v) {
         const V size_u = largest(u), size_v = largest(v);
         return filter * ((size_u * size_v) * (size_u + size_v));

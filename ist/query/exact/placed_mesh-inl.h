@@ -1,4 +1,4 @@
-// Boxes and triangles of meshes in the other solid's frame, sixteen at a time: included once a
+// Boxes and triangles of meshes in the other solid's frame, sixteen at a time. Included once per
 // target.
 
 #if defined(IST_QUERY_PLACED_MESH_INL_H_) == defined(HWY_TARGET_TOGGLE)
@@ -19,7 +19,8 @@ namespace ist::HWY_NAMESPACE {
 
 /// Relative error of a few float operations.
 inline constexpr float kFloatError = 4e-7f;
-/// Where empty boxes lie. Infinities would be subtracted from each other.
+/// The position of empty boxes. It is not infinite, since infinities would be subtracted from each
+/// other.
 inline constexpr float kNowhere = 1e30f;
 
 using F = LaneTag<float>;
@@ -47,7 +48,7 @@ inline float highest(const float* lanes) {
   return hn::GetLane(hn::MaxOfLanes(d, most));
 }
 
-/// The boxes below a box block, seen from the other solid.
+/// The boxes below a box block in the other solid's frame.
 inline const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uint32_t i,
                                        const Similarity& map, float pad, PlacedMesh& kept) {
   const std::uint32_t number = tree.level[level].first + i;
@@ -70,7 +71,7 @@ inline const PlacedBoxes& placed_boxes(const MeshTree& tree, int level, std::uin
       middle[k] = half * (low + high);
       extent[k] = half * (high - low);
     }
-    // Unused lanes have extents below zero, and stay empty.
+    // Unused lanes have negative extents and stay empty.
     for (int k = 0; k < 3; ++k) {
       const auto c = (hn::Set(d, m[3 * k]) * middle[0] + hn::Set(d, m[3 * k + 1]) * middle[1]) +
                      (hn::Set(d, m[3 * k + 2]) * middle[2] + hn::Set(d, t[k]));
@@ -189,8 +190,8 @@ inline const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32
         (n[0] * hn::Load(d, out.corner[0][0] + l) + n[1] * hn::Load(d, out.corner[0][1] + l)) +
             n[2] * hn::Load(d, out.corner[0][2] + l),
         d, out.offset + l);
-    // Corners are rounded, so sides are off by some reach, and normals by that times the other
-    // side; what a product of sides loses to rounding comes on top.
+    // Corners are rounded, so sides have an error relative to the reach, and normals that error
+    // times the other side. The rounding of a product of sides comes on top.
     const auto length = [](const hn::Vec<F>(&x)[3]) {
       return hn::Abs(x[0]) + (hn::Abs(x[1]) + hn::Abs(x[2]));
     };
@@ -205,7 +206,7 @@ inline const PlacedTriangles& placed_triangles(const MeshTree& tree, std::uint32
   return out;
 }
 
-/// Which of sixteen boxes meet one.
+/// The boxes out of sixteen that intersect one, a bit each.
 HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&high)[3][kWidth],
                                  const float* one_low, const float* one_high) {
   const F d;
@@ -221,7 +222,7 @@ HWY_INLINE std::uint32_t meeting(const float (&low)[3][kWidth], const float (&hi
   return bits;
 }
 
-/// Places what a search has come to, once.
+/// Places each part of a mesh that a search visits once.
 class PlacedMeshes {
  public:
   PlacedMeshes(const CrossingSearch& search, ExactScratch& scratch)

@@ -1,4 +1,4 @@
-// On which sides of a triangle's plane the vertices of a block lie: included once a target.
+// The sides of a triangle's plane on which the vertices of a block are. Included once per target.
 
 #if defined(IST_QUERY_PLANE_SIDES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_PLANE_SIDES_INL_H_
@@ -17,11 +17,11 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// What a vertex is above or below by: what doubles round; or so much that it stays there wherever
-/// points move by the room, or B by what the search reaches.
+/// The margin by which a vertex is above or below: the rounding of doubles; or so much that it
+/// stays there wherever points move within the tolerance, or B within the search's reach.
 enum class Margin { rounding, room, reach };
 
-/// Which of a block's triangles have all corners among some of its vertices, a bit each.
+/// The triangles of a block whose corners are all among the given vertices, a bit each.
 HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertices& block) {
   const hn::CappedTag<std::uint16_t, kWidth> d;
   const auto others = hn::Set(d, static_cast<std::uint16_t>(~vertices));
@@ -31,14 +31,14 @@ HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertic
   return out;
 }
 
-/// The plane of a triangle, and what lies along it.
+/// The plane of a triangle, and axes along it.
 struct SeenPlane {
   Vec3 at, normal;
 
   SeenPlane(const PlacedPlanes& planes, std::uint32_t t)
       : at(one(planes.at, t)), normal(one(planes.normal, t)) {}
 
-  /// Of vertices l … of a block, times the length of the normal.
+  /// The heights of vertices l … of a block, times the length of the normal.
   HWY_INLINE V heights(const PlacedVertices& vertices, std::size_t l) const {
     const D d;
     return dot(Vec3{hn::Load(d, vertices.at[0] + l), hn::Load(d, vertices.at[1] + l),
@@ -54,14 +54,14 @@ struct SeenPlane {
   }
 };
 
-/// Vertices that lie above or below, a bit each.
+/// The vertices that are above or below, a bit each.
 struct PlaneSides {
   std::uint32_t above = 0, below = 0;
 };
 
-/// Of vertices of the other solid, seen from the plane of triangle t of a block; above and below
-/// what lies between `low` and `high`. `aside`: what they move by. `apart`: no coordinates of both
-/// blocks differ by more.
+/// Classifies vertices of the other solid by the plane of triangle t of a block: those above `high`
+/// and below `low`. `aside`: their symbolic translation. `apart`: a bound of the differences of
+/// coordinates of both blocks.
 HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlanes& planes,
                                std::uint32_t t, double low, double high, const exact::Point& aside,
                                double apart, Margin margin, double by) {

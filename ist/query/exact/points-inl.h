@@ -1,5 +1,5 @@
-// Points whose coordinates are lanes of doubles: included once a target. exact::Point is for one
-// double, as functions of a target's instructions are not called from outside of it.
+// Points whose coordinates are lanes of doubles. Included once per target. exact::Point has single
+// doubles, since functions for one target's instructions are not called from outside it.
 
 #if defined(IST_QUERY_POINTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_POINTS_INL_H_
@@ -38,10 +38,10 @@ HWY_INLINE Vec3 cross(const Vec3& a, const Vec3& b) {
 HWY_INLINE V largest(const Vec3& a) {
   return hn::Max(hn::Abs(a.x), hn::Max(hn::Abs(a.y), hn::Abs(a.z)));
 }
-/// No less than its length.
+/// An upper bound of a vector's length.
 HWY_INLINE V length_bound(const Vec3& a) { return (hn::Abs(a.x) + hn::Abs(a.y)) + hn::Abs(a.z); }
 
-// What formulas are written in (query/exact/overlap_formulas-inl.h).
+// The number types of formulas (query/exact/overlap_formulas-inl.h).
 using Real = V;
 using Mask = hn::Mask<D>;
 HWY_INLINE V constant(double x) { return hn::Set(D(), x); }

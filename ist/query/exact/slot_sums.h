@@ -24,7 +24,7 @@ class SlotSums {
     }
   }
 
-  // Of lane l alone.
+  // The same for lane l alone.
   IST_HD void add_triangle(const ExactTerms& terms, std::uint32_t l) noexcept {
     add_volume(terms.six_volumes[0], l);
     for (int k = 0; k < 3; ++k) moment_[k][l] += terms.moment[k][l];

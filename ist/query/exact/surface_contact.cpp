@@ -69,7 +69,7 @@ class ContactSearch : PairSigns {
         });
     add_areas();
     if (out.touching) return out;
-    // By no face, but maybe in a point or an edge.
+    // If no faces touch, a point or an edge may.
     const auto look_at_near = [&] {
       if (pairs.count != 0)
         look(((1u << pairs.count) - 1) & ~far_by_planes(pairs, pairs.count, search_.touch));
@@ -105,8 +105,8 @@ class ContactSearch : PairSigns {
   }
 
  private:
-  /// visit(A's block, its triangle, B's block, some of its triangles): until it returns true, of
-  /// blocks that are marked as near, or of pairs that are kept, those whose boxes meet.
+  /// Calls visit(A's block, its triangle, B's block, some of its triangles) until it returns true,
+  /// for triangles whose boxes intersect in blocks that are marked as near, or in kept pairs.
   template <class Visit>
   void visit_near(std::uint32_t count, const KeptPairs* kept, const Visit& visit) {
     for (std::uint32_t n = 0; n < (kept != nullptr ? kept->count : count); ++n) {
@@ -131,8 +131,8 @@ class ContactSearch : PairSigns {
     }
   }
 
-  /// Which of B's triangles may look straight at A's triangle i. In float: sums of a normal's
-  /// coordinates are no more than 1.8 times its length.
+  /// The triangles of B that may face A's triangle i. In float: the sum of a normal's coordinates
+  /// is at most 1.8 times its length.
   static std::uint32_t facing(const PlacedTriangles& a, std::uint32_t i, const PlacedTriangles& b) {
     const F d;
     const auto length_a = hn::Set(d, a.length[i]), slack_a = hn::Set(d, a.slack[i]);
@@ -149,8 +149,8 @@ class ContactSearch : PairSigns {
     return bits;
   }
 
-  /// Of pairs that lie in one plane, the area that they have in common, and it along A's normal; of
-  /// those that look the same way 0.
+  /// The common areas of pairs in one plane, and the same along A's normal; 0 for pairs that face
+  /// the same direction.
   static HWY_NOINLINE void find_areas(const TrianglePairs& pairs, double (&area)[8],
                                       double (&along)[3][8], double (&moment)[3][8]) {
     const D d;

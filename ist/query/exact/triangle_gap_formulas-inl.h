@@ -2,17 +2,17 @@
 // the terms of overlap_formulas-inl.h, with
 // those of careful_cross-inl.h and edge_gap_formulas-inl.h before.
 
-/// A triangle with what its points are found by. By a careful product its normal keeps its digits
-/// however thin it is: it is that of a triangle whose corners are off by roundings.
+/// A triangle with the data for its nearest points. A careful product keeps the digits of its
+/// normal however thin it is: it is the normal of a triangle whose corners differ by rounding.
 struct Flat {
   Vec3 corner[3], side[3];
-  Real inverse[3];  ///< of squared sides; of no length: 0
+  Real inverse[3];  ///< of squared sides; 0 if a side has no length
   Vec3 other;       ///< from the first corner to the last
   Vec3 normal;
   Real squared_normal, inverse_normal;
 };
 
-/// Of its three corners.
+/// Sets the data from its three corners.
 IST_FORMULA void flatten(Flat& t) {
   for (int c = 0; c < 3; ++c) {
     t.side[c] = t.corner[(c + 1) % 3] - t.corner[c];
@@ -24,7 +24,7 @@ IST_FORMULA void flatten(Flat& t) {
   t.inverse_normal = inverse_of(t.squared_normal);
 }
 
-/// A corner over a triangle. Its height comes back, times the normal's length.
+/// Takes a corner above a triangle. Returns its height times the normal's length.
 template <bool kCornerOfA>
 IST_FORMULA Real over_face(const Vec3& p, const Flat& t, NearestPoints& least) {
   const Real zero = constant(0.0);
@@ -42,8 +42,8 @@ IST_FORMULA Real over_face(const Vec3& p, const Flat& t, NearestPoints& least) {
   return height;
 }
 
-/// The nearest points of two triangles that do not cross. `unclear`: they may, as each reaches to
-/// both sides of the other's plane, where coordinates may be off by `slack`.
+/// The nearest points of two triangles that do not cross. `unclear`: they may cross, since each
+/// reaches to both sides of the other's plane, for coordinates with errors up to `slack`.
 IST_FORMULA NearestPoints nearest_points(const Flat& a, const Flat& b, double slack,
                                          Mask& unclear) {
   NearestPoints least{constant(HUGE_VAL), a.corner[0], a.corner[0]};

@@ -1,4 +1,4 @@
-// Distances of triangles: included once a target.
+// Distances of triangles. Included once per target.
 
 #if defined(IST_QUERY_TRIANGLE_GAPS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef IST_QUERY_TRIANGLE_GAPS_INL_H_
@@ -15,7 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Which triangles of two blocks are within a limit, or may be: in floats, which are off by `blur`.
+/// Finds the triangles of two blocks that may be within a limit, in float with an error of `blur`.
 class TriangleCulls {
  public:
   TriangleCulls(const PlacedTriangles& a, const PlacedTriangles& b, const WayAxes& axes, float blur)
@@ -28,7 +28,7 @@ class TriangleCulls {
     }
   }
 
-  /// Of A's triangles those that may be within of one of B's.
+  /// The triangles of A that may be within the limit of one of B's.
   std::uint32_t rows(double limit) {
     const F d;
     const auto most = hn::Set(d, rounded_up(limit) * rounded_up(limit));
@@ -41,9 +41,9 @@ class TriangleCulls {
     return bits;
   }
 
-  /// Of B's triangles those that may be within `limit` of A's triangle i: by their extents along
-  /// three axes, by the planes of both, and by those through A's sides. `least`, squared: none is
-  /// nearer, or than `wide`, which is no less than the limit.
+  /// The triangles of B that may be within `limit` of A's triangle i: by their extents along three
+  /// axes, by the planes of both, and by those through A's sides. `least`: a squared lower bound of
+  /// the distances of those within `wide`, which is no less than the limit.
   std::uint32_t lanes(std::uint32_t i, double limit, double wide, float& least) {
     const F d;
     using V = hn::Vec<F>;
@@ -58,7 +58,8 @@ class TriangleCulls {
       low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      // What a lane finds must not depend on the lanes beside it, whose number the processor has.
+      // A lane's result must not depend on the lanes beside it, whose number depends on the
+      // processor.
       V squared = less * apart(of_b_, low, high, l);
       const auto is_far = squared > far_squared;
       if (hn::AllTrue(d, is_far)) {
@@ -78,7 +79,7 @@ class TriangleCulls {
                    n[2] * hn::Set(d, a_.corner[c][2][i])) -
                   hn::Load(d, b_.offset + l);
       }
-      // Heights are off by what the normal is, and coordinates are.
+      // Heights have the errors of the normal and of coordinates.
       const V over_a = hn::Max(zero, (beyond(of_a) - hn::Set(d, over)) * inverse - blur),
               over_b = hn::Max(zero, (beyond(of_b) - hn::Load(d, b_.slack + l) * sizes) *
                                              hn::Load(d, inverse_b_ + l) -
@@ -108,12 +109,12 @@ class TriangleCulls {
 
  private:
   static constexpr float kLonger = 1 + 2e-6f;  ///< than a length in floats
-  /// How far three heights are all on one side; else below zero.
+  /// The distance of three heights that are all on one side; else negative.
   static hn::Vec<F> beyond(const hn::Vec<F> (&height)[3]) {
     return hn::Max(hn::Min(height[0], hn::Min(height[1], height[2])),
                    hn::Neg(hn::Max(height[0], hn::Max(height[1], height[2]))));
   }
-  /// Of lengths of normals, or less; 0 of what has none.
+  /// Lower bounds of the inverse lengths of normals; 0 if there is none.
   static void invert(const PlacedTriangles& t, float (&inverse)[kWidth]) {
     const F d;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
@@ -129,8 +130,8 @@ class TriangleCulls {
     const auto some = length > hn::Set(d, 1e-15f);
     return hn::IfThenElseZero(some, one / hn::IfThenElse(some, length, one));
   }
-  /// Of A's triangles: unit vectors in them, square to their sides and outward, and where the side
-  /// is along that, or more.
+  /// For A's triangles: unit vectors in their planes, perpendicular to their sides and outward, and
+  /// upper bounds of the sides' positions along them.
   void find_sides() {
     has_sides_ = true;
     const F d;
@@ -148,7 +149,7 @@ class TriangleCulls {
         }
         const V squared = (out[0] * out[0] + out[1] * out[1]) + out[2] * out[2],
                 side_squared = (side[0] * side[0] + side[1] * side[1]) + side[2] * side[2];
-        // Of slivers, whose normals have no digits, nothing is told.
+        // Slivers, whose normals have no digits, decide nothing.
         const V inverse =
             hn::IfThenElseZero(squared > hn::Set(d, 0.9f) * side_squared,
                                inverse_of_length(hn::Sqrt(squared) * hn::Set(d, kLonger)));
@@ -181,7 +182,7 @@ class TriangleCulls {
     }
     return out;
   }
-  /// Squared distances of the lanes from `from` on to one box.
+  /// The squared distances of the lanes from `from` on to one box.
   static hn::Vec<F> apart(const Extents (&of)[3], const float (&low)[3], const float (&high)[3],
                           std::size_t from) {
     const F d;
@@ -206,13 +207,13 @@ class TriangleCulls {
   bool has_sides_ = false;
 };
 
-/// A box, and where it reaches along three axes.
+/// A box, and its extents along three axes.
 struct PlacedBox {
   double low[3], high[3];
   exact::Point middle, side[3];  ///< half of each side, from the middle
 };
 
-/// How far the triangles of a block reach along three axes, in double.
+/// The extents of a block's triangles along three axes, in double.
 class BlockExtents {
  public:
   BlockExtents(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes) {
@@ -230,7 +231,8 @@ class BlockExtents {
     }
   }
 
-  /// Those no further from triangle `t` of another, or from all of it, than a limit, squared.
+  /// The triangles that are within a squared limit of triangle `t` of another block, or of the
+  /// whole block.
   std::uint32_t near(const BlockExtents& other, std::uint32_t t, double squared_limit) const {
     double low[3], high[3];
     for (int k = 0; k < 3; ++k) low[k] = other.low_[k][t], high[k] = other.high_[k][t];
@@ -288,13 +290,14 @@ class BlockFaces : public BlockExtents {
     }
   }
 
-  /// The nearest triangle's distance from a box, or less; squared. `slack`: of distances.
+  /// A lower bound of the squared distance of the nearest triangle from a box. `slack`: the error
+  /// of distances.
   double squared_gap(const PlacedBox& box, double slack) const {
     const D d;
     const V zero = hn::Zero(d), off = hn::Set(d, slack), tiny = hn::Set(d, 1e-300);
     V least = hn::Set(d, HUGE_VAL);
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      // A triangle lies behind the plane through its point that is nearest to the middle.
+      // A triangle is behind the plane through its point nearest to the middle.
       const NearestPoints nearest = nearest_to(box.middle, l);
       const V distance = hn::Sqrt(nearest.squared);
       V reach = zero;
@@ -306,7 +309,7 @@ class BlockFaces : public BlockExtents {
     return hn::GetLane(hn::MinOfLanes(d, least));
   }
 
-  /// From the nearest triangle to a point, of any length.
+  /// The vector from the nearest triangle to a point, of any length.
   exact::Point way_to(const exact::Point& point) const {
     const D d;
     alignas(64) double squared[kWidth], way[3][kWidth];
@@ -352,8 +355,8 @@ struct alignas(64) PairGaps {
   double between[3][8];  ///< from there to B's
 };
 
-/// Measures pairs [0, count). Bit n of what comes back: pair n may cross, as each triangle reaches
-/// to both sides of the other's plane, where coordinates may be off by `slack`.
+/// Measures pairs [0, count). Bit n of the result: pair n may cross, since each triangle reaches to
+/// both sides of the other's plane, for coordinates with errors up to `slack`.
 HWY_INLINE std::uint32_t measure_pairs(const TrianglePairs& pairs, std::uint32_t count,
                                        double slack, PairGaps& out) {
   const D d;
