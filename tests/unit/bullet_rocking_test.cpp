@@ -88,7 +88,7 @@ TriangleMesh pebble(const Vector3d& half) {
   return mesh;
 }
 
-struct Solid {
+struct RockingSolid {
   const char* name;
   TriangleMesh mesh;
   double height;  // [u] of its centre when it lies
@@ -98,7 +98,7 @@ struct Solid {
 // A face with rounded edges is flat: its corners damp what rocks on it. By patches alone a bar rose
 // to three times its energy at 60 Hz, and none of these came to rest.
 TEST(BulletRocking, WhatIsRoundedLosesEnergyAndComesToRest) {
-  const std::vector<Solid> solids = {
+  const std::vector<RockingSolid> solids = {
       {"box, 15 mm", rounded_box({0.1, 0.04, 0.07}, 0.015), 0.07},
       {"plate, 10 mm", rounded_box({0.1, 0.1, 0.03}, 0.01), 0.03},
       {"bar, 15 mm", rounded_bar({0.1, 0.04, 0.07}, 0.015), 0.07},
@@ -109,7 +109,7 @@ TEST(BulletRocking, WhatIsRoundedLosesEnergyAndComesToRest) {
       {"pebble", pebble({0.1, 0.07, 0.03}), 0.03, true}};
   const Asset table = baked(box_mesh({-0.5, -0.5, -0.1}, {0.5, 0.5, 0.1}), "table", 500);
   constexpr double kMass = 2, kWeight = kMass * 9.81;
-  for (const Solid& solid : solids) {
+  for (const RockingSolid& solid : solids) {
     const Asset asset = baked(solid.mesh, solid.name, 500);
     const btTransform in_mesh = bullet::to_bullet(bullet::body_frame(asset.view()).in_mesh);
     for (const double hz : {60, 120, 240, 1000})
