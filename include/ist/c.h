@@ -342,7 +342,7 @@ typedef struct ist_workspace {
   uint64_t opaque[8];
 } ist_workspace_t;
 
-/* `capacity`: count of node pairs that may wait at once. It reserves 8 MB and 173 bytes per pair
+/* `capacity`: count of node pairs that may wait at once. It reserves 9 MB and 173 bytes per pair
  * of address space, touched as needed. 0 is the default, 1,048,576, which serves two trees of
  * 64,000 spheres at any pose. `allocator`: null is the heap. The previous content of `workspace` is
  * forgotten. */

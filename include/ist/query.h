@@ -203,7 +203,7 @@ struct MemoryHooks {
 class Workspace {
  public:
   /// `capacity`: count of node pairs that may wait at once; workspace_capacity() returns what two
-  /// solids need. It reserves 8 MB and 173 bytes per pair of address space (190 MB by default);
+  /// solids need. It reserves 9 MB and 173 bytes per pair of address space (190 MB by default);
   /// pages are touched as needed. The default serves two trees of 64,000 spheres at any pose.
   ///
   /// Throws std::bad_alloc.
