@@ -74,7 +74,8 @@ class LinkRoom {
     double share;                             ///< of the distance
     const std::vector<CoverSphere>* spheres;  ///< that contain the other
 
-    /// What points of the other are nearer, over the distance to the link, and belong to it.
+    /// The distance to the other link, over that to this one, below which a point belongs to the
+    /// other.
     double ratio() const { return (1 - share) / share; }
   };
 
@@ -83,7 +84,7 @@ class LinkRoom {
   bool is_free() const { return near_.empty(); }
   void add(const Near& near) { near_.push_back(near); }
 
-  /// To be called when all are added: sorts them by places of the link, which lies in `box`.
+  /// Sorts all that were added by places of the link, which is inside `box`.
   void sort(const Eigen::AlignedBox3d& box) {
     root_ = {box.center(), box.sizes().maxCoeff() / 2, {}, {}};
     for (std::uint32_t i = 0; i < near_.size(); ++i) root_.near.push_back(i);
@@ -118,7 +119,7 @@ class LinkRoom {
   }
 
  private:
-  /// A cube, and what may matter for places in it.
+  /// A cube, and the entries that may matter for places in it.
   struct Cell {
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     double half = 0;

@@ -94,9 +94,9 @@ struct EdgeTally {
 /// through their edges.
 class Meeting {
  public:
-  /// `margin`: where a sign is not settled, a plane does not keep them apart unless both blocks are
-  /// marked as near anyway. Planes through edges keep apart what is further than `reach`, or, of
-  /// blocks that are marked, what does not cross.
+  /// `margin`: a plane separates only if the signs are settled, or if both blocks are marked as
+  /// near anyway. Planes through edges separate triangles that are farther apart than `reach` or,
+  /// in marked blocks, that do not cross.
   Meeting(const CrossingSearch& search, ExactScratch& scratch, std::uint32_t a, std::uint32_t b,
           Margin margin, float reach)
       : search_(search), scratch_(scratch), margin_(margin), reach_(reach), number_{a, b} {

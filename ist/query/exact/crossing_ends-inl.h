@@ -14,15 +14,16 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// Edges that go through triangles, of crossings that wait until there are eight: they are written
-/// together, without a branch by which edge of which triangle it is.
+/// The piercing edges of crossings, gathered until there are eight. Then all are written together,
+/// without a branch on which edge of which triangle pierces.
 class PiercingEdges {
  public:
-  /// Of pair n, whose edges [A's, B's] are `pierced`: two of them, if signs agree with each other.
+  /// Adds the crossing of pair n. `pierced`: its piercing edges [A's, B's], two if signs agree with
+  /// each other.
   HWY_INLINE void add(const TrianglePairs& pairs, const PairHeights& heights,
                       const std::uint32_t (&pierced)[2][3], std::uint32_t n) {
-    // Edges, and those that a crossing ends at: an edge that goes down enters the other solid, A's
-    // at the end, B's at the start.
+    // The piercing edges, and those at the crossing's end. An edge that goes down enters the other
+    // solid: A's at the end, B's at the start.
     const std::uint32_t edges = bits_of(pierced[0], n) | bits_of(pierced[1], n) << 3,
                         ends = bits_of(heights.positive[0], n) |
                                (bits_of(heights.positive[1], n) ^ 7) << 3;

@@ -36,7 +36,7 @@ struct CrossingsFound {
   bool consistent = true;       ///< signs agree with each other
 };
 
-/// How the surfaces of two solids without common volume touch.
+/// The contact of two solids without common volume.
 struct SurfaceContact {
   bool touching = false;     ///< points of both are within CrossingSearch::touch of each other
   double area = 0;           ///< of the faces that lie on each other, back to back

@@ -36,8 +36,8 @@ IST_HD inline double gap_error(const MeshTree& a, const MeshTree& b, const PairP
 }
 /// For a larger B the fourth powers of lengths would overflow, so A is mapped to its frame instead.
 inline constexpr double kLargestGapScale = 1e30;
-/// Of solids that are far apart for their size all pairs are equally near up to rounding, and any
-/// will do.
+/// The relative rounding within which all pairs of solids that are far apart for their size are
+/// equally near, so that any will do.
 inline constexpr double kGapsAlike = 1e-13;
 /// The direction between parallel faces is their normal, of which a short difference has few
 /// digits. True if the direction is the normal of triangle t; then `level` is that normal, from A

@@ -135,13 +135,13 @@ IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const
     return FilteredPlane(u1 - u0, v1 - v0, moved * aside).height(r1 - r0);
 }
 
-/// How far B's point lies above triangle A's plane: > 0 outside.
+/// The height of B's point above triangle A's plane: > 0 outside.
 template <bool kExactly = true>
 IST_HD inline Determinant height_over_a(const Point (&a)[3], const Point& b, const Point& aside) {
   return determinant_of<kExactly>(b, a[0], a[1], a[0], a[2], a[0], 1, aside);
 }
 
-/// How far A's point lies above triangle B's plane.
+/// The height of A's point above triangle B's plane.
 template <bool kExactly = true>
 IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, const Point& aside) {
   return determinant_of<kExactly>(a, b[0], b[1], b[0], b[2], b[0], -1, aside);

@@ -227,8 +227,8 @@ class PairSigns {
     }
   }
 
-  /// Of signs that are not certain, by bounds that are as close as exact::FilteredPlane has them:
-  /// products of coordinates that are 0 round nothing.
+  /// Decides signs that are not certain by bounds as tight as those of exact::FilteredPlane, where
+  /// products of zero coordinates have no rounding.
   HWY_NOINLINE void find_ways_closer(const TrianglePairs& pairs, std::uint32_t which,
                                      WaysRound& out) const {
     const D d;

@@ -84,8 +84,8 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
   return out;
 }
 
-/// Which triangles of the other block, moved by `aside`, have all corners further than `by` beyond
-/// an edge of triangle t, in its plane.
+/// The triangles of the other block, translated by `aside`, whose corners are all farther than `by`
+/// beyond an edge of triangle t, in its plane.
 HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32_t t,
                                          const PlacedVertices& other, const exact::Point& aside,
                                          double by) {

@@ -60,11 +60,11 @@ class PointGrid {
       for (int y = y_from; y <= y_to; ++y) scan_row(c, y, z, reach * reach, visit);
   }
 
-  /// The nearest point no further than `limit`: looked for within `guess` first. The smallest place
-  /// among equals.
+  /// The nearest point within `limit`, of equals that with the smallest place. The search tries
+  /// `guess` first.
   Nearest nearest(const Eigen::Vector3d& p, double guess, double limit) const {
     const Eigen::Vector3f c = p.cast<float>();
-    // From the middle to both sides: what is found there leaves less to look at.
+    // Rows are visited outward from the middle, since near points prune the others.
     const auto outward = [](const std::pair<int, int>& range, int middle, const auto& take) {
       middle = std::clamp(middle, range.first, std::max(range.first, range.second));
       for (int i = middle; i <= range.second; ++i) take(i);
@@ -80,7 +80,7 @@ class PointGrid {
       const auto reach = static_cast<float>(radius);
       best.distance2 = reach * reach;
       const auto take = [&](std::uint32_t i, float d2) {
-        if (d2 < best.distance2 || i < best.place) best = {d2, i};
+        if (d2 < best.distance2 || (d2 == best.distance2 && i < best.place)) best = {d2, i};
       };
       outward(cells(2, c.z() - reach, c.z() + reach), middle(2, c.z()), [&](int z) {
         outward(cells(1, c.y() - reach, c.y() + reach), middle(1, c.y()),

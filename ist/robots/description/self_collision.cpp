@@ -196,8 +196,8 @@ void SelfCollisionStudy::open_grippers(const std::vector<SphereBody>& bodies) {
   }
 }
 
-/// Draws positions in which no solids overlap, until `free` and these are kFree. `compared`: by
-/// pair.
+/// Draws positions in which no solids overlap until there are kFree, `free` included. `compared`:
+/// by pair.
 void SelfCollisionStudy::draw_free(const std::vector<SphereBody>& bodies,
                                    const std::vector<std::uint8_t>& compared, std::size_t free) {
   std::vector<std::pair<std::size_t, const Pair*>> order;  // those that overlap most often first
