@@ -56,6 +56,15 @@ IST_HD inline std::uint32_t atomic_replace(std::uint32_t* at, std::uint32_t expe
   return expected;
 #endif
 }
+IST_HD inline std::uint64_t atomic_replace(std::uint64_t* at, std::uint64_t expected,
+                                           std::uint64_t value) {
+#ifdef __CUDA_ARCH__
+  return atomicCAS(reinterpret_cast<unsigned long long*>(at), expected, value);
+#else
+  __atomic_compare_exchange_n(at, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
+  return expected;
+#endif
+}
 
 IST_HD inline std::uint32_t atomic_max(std::uint32_t* at, std::uint32_t value) {
 #ifdef __CUDA_ARCH__
@@ -95,9 +104,19 @@ IST_HD inline Words4 load_fresh(const Words4* at) {
 #endif
 }
 
+/// A value that others read meanwhile.
+IST_HD inline void atomic_store(std::uint32_t* at, std::uint32_t value) {
+  IST_GPU_OR_HOST(*static_cast<volatile std::uint32_t*>(at) = value,
+                  __atomic_store_n(at, value, __ATOMIC_RELEASE));
+}
+
 /// A value that others may be changing.
 IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
   return IST_GPU_OR_HOST(*static_cast<const volatile std::uint32_t*>(at),
+                         __atomic_load_n(at, __ATOMIC_ACQUIRE));
+}
+IST_HD inline std::uint64_t atomic_load(const std::uint64_t* at) {
+  return IST_GPU_OR_HOST(*static_cast<const volatile std::uint64_t*>(at),
                          __atomic_load_n(at, __ATOMIC_ACQUIRE));
 }
 

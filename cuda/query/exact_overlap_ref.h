@@ -141,6 +141,29 @@ class OverlapRef {
   IST_HD static constexpr std::uint32_t width() { return static_cast<std::uint32_t>(Team::kWidth); }
   IST_HD void meet() const { team_.sync(); }
   IST_HD bool any(bool flag) const { return team_.any(flag); }
+  IST_HD int exclusive_count(bool flag, int& total) const {
+    return team_.exclusive_count(flag, total);
+  }
+  template <class T>
+  IST_HD static T load(const T& at) {
+    return atomic_load(&at);
+  }
+  IST_HD static double load(const double& at) {
+    return double_of(atomic_load(reinterpret_cast<const std::uint64_t*>(&at)));
+  }
+  IST_HD static void store(std::uint32_t& at, std::uint32_t to) { atomic_store(&at, to); }
+  IST_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t by) {
+    return atomic_add(&at, by);
+  }
+  IST_HD static std::uint32_t exchange(std::uint32_t& at, std::uint32_t to) {
+    return atomic_exchange(&at, to);
+  }
+  template <class T>
+  IST_HD static T replace(T& at, T from, T to) {
+    return atomic_replace(&at, from, to);
+  }
+  IST_HD static void least(double& at, double x) { lower(at, x, 1); }
+  IST_HD static void most(double& at, double x) { lower(at, x, -1); }
   IST_HD const MeshTree& mesh(int side) const { return pair_.mesh[side]; }
   IST_HD PieceMemory& pieces() { return pieces_; }
   IST_HD const Similarity& map() const { return pair_.place.a_from_b; }
@@ -247,6 +270,16 @@ class OverlapRef {
   }
 
  private:
+  /// Writes x if sign · x is less than what is there.
+  IST_HD static void lower(double& at, double x, double sign) {
+    auto* const bits = reinterpret_cast<std::uint64_t*>(&at);
+    for (std::uint64_t now = atomic_load(bits); sign * x < sign * double_of(now);) {
+      const std::uint64_t before = atomic_replace(bits, now, bits_of(x));
+      if (before == now) return;
+      now = before;
+    }
+  }
+
   /// Calls work(l) for the eight lanes of pieces.
   template <class Work>
   IST_HD void for_each_lane(const Work& work) {
@@ -294,18 +327,14 @@ class OverlapRef {
     for (int t = 0; t < OctantPieces::kTriangles; ++t) {
       out.of_b[t][l] = t < 2 ? static_cast<std::uint8_t>(t) : (by_b[t - 2] ? 1 : 0);
       out.times[t][l] = t < 2 ? 1 : times[t - 2];
-      out.six_volumes[t][l] = found.of[t].six_volumes;
-      for (int k = 0; k < 3; ++k) {
-        out.moment[t][k][l] = found.of[t].moment[k];
-        out.area[t][k][l] = found.of[t].area[k];
-        out.torque[t][k][l] = found.of[t].torque[k];
-      }
+      for (int n = 0; n < OctantPieces::kTerms; ++n)
+        out.term[t][n][l] = octants::term(found.of[t], n);
     }
-    out.sum_six_volumes[l] = found.all.six_volumes;
+    out.sum[0][l] = found.all.six_volumes;
     for (int k = 0; k < 3; ++k) {
-      out.sum_moment[k][l] = found.all.moment[k];
-      out.sum_torque[k][l] = found.all.torque[k];
-      for (int s = 0; s < 2; ++s) out.sum_area[s][k][l] = found.area[s][k];
+      out.sum[1 + k][l] = found.all.moment[k];
+      for (int s = 0; s < 2; ++s) out.sum[4 + 3 * s + k][l] = found.area[s][k];
+      out.sum[10 + k][l] = found.all.torque[k];
     }
   }
 

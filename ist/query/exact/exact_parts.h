@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "query/exact/exact_overlap.h"
 #include "query/exact/overlap_octants.h"
@@ -19,6 +20,29 @@ class MeshOverlap : public ExactQuery {
   static constexpr std::uint32_t width() noexcept { return 1; }
   static void meet() noexcept {}
   static bool any(bool flag) noexcept { return flag; }
+  static int exclusive_count(bool flag, int& total) noexcept {
+    total = flag ? 1 : 0;
+    return 0;
+  }
+  template <class T>
+  static T load(const T& at) noexcept {
+    return at;
+  }
+  static void store(std::uint32_t& at, std::uint32_t to) noexcept { at = to; }
+  static std::uint32_t add(std::uint32_t& at, std::uint32_t by) noexcept {
+    return std::exchange(at, at + by);
+  }
+  static std::uint32_t exchange(std::uint32_t& at, std::uint32_t to) noexcept {
+    return std::exchange(at, to);
+  }
+  static void least(double& at, double x) noexcept { at = x < at ? x : at; }
+  static void most(double& at, double x) noexcept { at = x > at ? x : at; }
+  template <class T>
+  static T replace(T& at, T from, T to) noexcept {
+    const T before = at;
+    if (before == from) at = to;
+    return before;
+  }
 
   const MeshTree& mesh(int side) const noexcept { return sides_[side].mesh; }
   const PartMemory& memory() const noexcept { return memory_; }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include <ist/asset_layout.h>
@@ -49,6 +50,8 @@ struct OctantSums {
   exact::Point moment = {};   ///< 24 ∫ x
   exact::Point area[2] = {};  ///< ∫ n dA over A's and over B's surface
   exact::Point torque = {};   ///< ½ ∫ x × n dA over B's surface less that over A's
+  static constexpr std::uint32_t kNumbers = 13;  ///< the volume, moment, areas of A and B, torque
+  IST_HD double& number(std::uint32_t k) noexcept { return (&six_volumes)[k]; }
   // In the first octant of a part:
   exact::Point centre = {};          ///< the part's centroid from the whole's origin, A's axes
   exact::Point low = {}, high = {};  ///< its box in the axes, from the centre
@@ -104,14 +107,13 @@ struct alignas(64) ExactTerms {
 /// The terms that eight crossings add to octants, one per lane: triangles of A and of B between the
 /// segment and the apex, and those between the apex and a pierced edge opposite to it, at each end.
 struct alignas(64) OctantPieces {
-  static constexpr int kTriangles = 4, kEnd = 2, kNear = 4;
+  static constexpr int kTriangles = 4, kEnd = 2, kNear = 4, kTerms = 10;
   /// Relative to the centre, along the octants' axes: the apexes of A and B, from kEnd on the ends,
   /// and from kNear on the nearer ends of their edges.
   double at[6][3][8];
-  double times[4][8];  ///< how often a triangle counts
-  double six_volumes[4][8], moment[4][3][8], area[4][3][8], torque[4][3][8];
-  /// All of them together, the areas by surface.
-  double sum_six_volumes[8], sum_moment[3][8], sum_area[2][3][8], sum_torque[3][8];
+  double times[4][8];                   ///< how often a triangle counts
+  double term[4][kTerms][8];            ///< numbers of exact::OctantTerms
+  double sum[OctantSums::kNumbers][8];  ///< all four in one octant
   std::uint8_t octant[6][8];  ///< a bit an axis: the corner's coordinate is not less than 0
   std::uint8_t of_b[4][8];    ///< the triangle is of B's surface
 
@@ -128,6 +130,16 @@ struct alignas(64) OctantPieces {
 struct alignas(64) OctantView {
   double centre[3][8];
   exact::Point origin, axis[3];
+  std::uint32_t slot[8];  ///< of the octants of a lane's part; kNoIndex if it is not divided
+  int planes[8];          ///< of a lane's part
+};
+
+/// The pieces into which up to three planes cut a triangle. A piece's number has a digit from 0 to
+/// 2 for each plane, the first plane's in front.
+struct CutPieces {
+  static constexpr std::uint32_t kCount = 27;
+  double term[kCount][OctantPieces::kTerms];
+  std::int8_t octant[kCount];  ///< -1: there is no such piece
 };
 
 /// The working memory for pieces of the boundary.
@@ -137,25 +149,15 @@ struct PieceMemory {
     OctantPieces octants;
   };
   OctantView view;
+  CutPieces cut;
   std::int8_t whole[kWidth];  ///< how often the cone over a triangle's edge counts
   bool says;                  ///< a flag from the leading lane to the others
+  std::uint32_t taken;        ///< entries of PartMemory::ends that lists of edges have taken
+  std::uint32_t part[8];      ///< of a lane's piece; kNoIndex if the piece does not count
+  std::uint32_t block[8];     ///< a lane's block that is inside as a whole
 };
 
-/// Adds lane l of terms.
-IST_HD inline void add_triangle_term(const ExactTerms& terms, std::uint32_t l,
-                                     ExactSums& sums) noexcept {
-  sums.six_volumes.add(terms.six_volumes[0][l]);
-  sums.moment =
-      sums.moment + exact::Point{terms.moment[0][l], terms.moment[1][l], terms.moment[2][l]};
-}
-IST_HD inline void add_crossing_term(const ExactTerms& terms, std::uint32_t l,
-                                     ExactSums& sums) noexcept {
-  add_triangle_term(terms, l, sums);
-  sums.six_volumes.add(terms.six_volumes[1][l]);
-  sums.six_volumes.add(terms.six_volumes[2][l]);
-  sums.force = sums.force + exact::Point{terms.force[0][l], terms.force[1][l], terms.force[2][l]};
-  sums.torque =
-      sums.torque + exact::Point{terms.torque[0][l], terms.torque[1][l], terms.torque[2][l]};
-}
+static_assert(offsetof(OctantSums, torque.z) == 8 * (OctantSums::kNumbers - 1));
+static_assert(offsetof(ExactSums, torque.z) == offsetof(ExactSums, moment.x) + 8 * 8);
 
 }  // namespace ist

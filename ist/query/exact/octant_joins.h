@@ -32,11 +32,23 @@ IST_HD inline void move(OctantSums& from, double share, OctantSums& to) {
   for (int s = 0; s < 2; ++s) give(share, from.area[s], to.area[s]);
 }
 
+/// A triangle's term n: its volume, moment, area, torque.
+IST_HD inline double term(const exact::OctantTerms& terms, int n) {
+  return n == 0  ? terms.six_volumes
+         : n < 4 ? terms.moment[n - 1]
+         : n < 7 ? terms.area[n - 4]
+                 : terms.torque[n - 7];
+}
+
+/// Adds a triangle's term to number n of sums, unless that is an area of the other surface.
+template <class TermOf>
+IST_HD void add_number(OctantSums& sums, std::uint32_t n, bool of_b, const TermOf& term_of) {
+  if (n >= 4 && n < 10 && (n >= 7) != of_b) return;
+  sums.number(n) += term_of(n < 7 ? n : n - 3);
+}
 IST_HD inline void add(OctantSums& sums, bool of_b, const exact::OctantTerms& terms) {
-  sums.six_volumes += terms.six_volumes;
-  sums.moment = sums.moment + terms.moment;
-  sums.area[of_b] = sums.area[of_b] + terms.area;
-  sums.torque = sums.torque + terms.torque;
+  for (std::uint32_t n = 0; n < OctantSums::kNumbers; ++n)
+    add_number(sums, n, of_b, [&](std::uint32_t k) { return term(terms, static_cast<int>(k)); });
 }
 
 IST_HD inline double both_areas(const OctantSums& sums) {

@@ -42,9 +42,11 @@ class OverlapOctants : public OverlapParts<Overlap> {
                       : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
     const double least = this->whole().volume() / static_cast<double>(room);
     meet();
-    if (leads()) pieces().says = begin_octants(parts, least) && find_planes(parts, near);
+    if (leads()) pieces().says = begin_octants(parts, least);
     meet();
-    if (pieces().says) sum_octants();
+    bool any = pieces().says;
+    if (any) any = this->any(find_planes(parts, near));
+    if (any) sum_octants();
     return leads() ? write_all(parts, least, near) : 0;
   }
 
@@ -116,53 +118,100 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return out;
   }
 
-  /// Adds a piece that no plane before `kPlane` cuts.
-  template <int kPlane = 0>
-  IST_HD_COLD static void add_triangle(OctantSums* octants, bool of_b, double times,
-                                       const Corner& p, const Corner& q, const Corner& r) noexcept {
-    const int unlike = (p.octant ^ q.octant) | (p.octant ^ r.octant);
-    if (unlike == 0) {
-      octants::add(octants[p.octant], of_b,
-                   exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(),
-                                       r.point()));
+  /// Cuts a triangle into three by a plane, and keeps one. If the plane does not cut it, it is the
+  /// first, and the others do not exist (false).
+  IST_HD static bool keep_piece(int plane, int piece, Corner (&at)[3]) noexcept {
+    const int bit = 1 << plane;
+    if ((((at[0].octant ^ at[1].octant) | (at[0].octant ^ at[2].octant)) & bit) == 0)
+      return piece == 0;
+    // One corner is alone on its side.
+    const int alone = ((at[1].octant ^ at[2].octant) & bit) == 0   ? 0
+                      : ((at[0].octant ^ at[2].octant) & bit) == 0 ? 1
+                                                                   : 2;
+    const Corner lone = at[alone], next = at[(alone + 1) % 3], other = at[(alone + 2) % 3];
+    Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
+    if (piece != 0) {
+      to_next.octant ^= bit;
+      to_other.octant ^= bit;
+    }
+    at[0] = piece == 0 ? lone : to_next;
+    at[1] = piece == 0 ? to_next : piece == 1 ? next : other;
+    at[2] = piece == 1 ? other : to_other;
+    return true;
+  }
+  IST_HD static exact::OctantTerms terms_of(bool of_b, double times,
+                                            const Corner (&at)[3]) noexcept {
+    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, at[0].point(), at[1].point(),
+                               at[2].point());
+  }
+
+  /// Adds a triangle piece by piece. No plane before `plane` cuts it.
+  IST_HD_COLD static void add_pieces_of(OctantSums* octants, bool of_b, double times,
+                                        const Corner (&at)[3], int plane = 0) noexcept {
+    if (plane == 3 || (at[0].octant == at[1].octant && at[0].octant == at[2].octant)) {
+      octants::add(octants[at[0].octant], of_b, terms_of(of_b, times, at));
       return;
     }
-    if constexpr (kPlane < 3) {
-      constexpr int kBit = 1 << kPlane;
-      if ((unlike & kBit) == 0) {
-        add_triangle<kPlane + 1>(octants, of_b, times, p, q, r);
-        return;
-      }
-      // One corner is alone on its side.
-      const Corner* const corners[3] = {&p, &q, &r};
-      const int alone = ((q.octant ^ r.octant) & kBit) == 0   ? 0
-                        : ((p.octant ^ r.octant) & kBit) == 0 ? 1
-                                                              : 2;
-      const Corner &lone = *corners[alone], &next = *corners[(alone + 1) % 3],
-                   &other = *corners[(alone + 2) % 3];
-      Corner to_next = between(lone, next, kPlane), to_other = between(lone, other, kPlane);
-      add_triangle<kPlane + 1>(octants, of_b, times, lone, to_next, to_other);
-      to_next.octant ^= kBit;
-      to_other.octant ^= kBit;
-      add_triangle<kPlane + 1>(octants, of_b, times, to_next, next, other);
-      add_triangle<kPlane + 1>(octants, of_b, times, to_next, other, to_other);
+    for (int piece = 0; piece < 3; ++piece) {
+      Corner kept[3] = {at[0], at[1], at[2]};
+      if (keep_piece(plane, piece, kept)) add_pieces_of(octants, of_b, times, kept, plane + 1);
     }
+  }
+  /// The same by a team, whose lanes compute the pieces.
+  IST_HD void add_cut(OctantSums* octants, bool of_b, double times,
+                      const Corner (&at)[3]) noexcept {
+    CutPieces& cut = pieces().cut;
+    for (std::uint32_t p = lane(); p < CutPieces::kCount; p += width())
+      find_piece(static_cast<int>(p), of_b, times, at, cut);
+    meet();
+    for (std::uint32_t n = lane(); n < OctantSums::kNumbers; n += width())
+      for (std::uint32_t p = 0; p < CutPieces::kCount; ++p)
+        if (cut.octant[p] >= 0)
+          octants::add_number(octants[cut.octant[p]], n, of_b,
+                              [&](std::uint32_t k) { return cut.term[p][k]; });
+    meet();
+  }
+  IST_HD_COLD static void find_piece(int p, bool of_b, double times, const Corner (&at)[3],
+                                     CutPieces& cut) noexcept {
+    Corner kept[3] = {at[0], at[1], at[2]};
+    const bool exists =
+        keep_piece(0, p / 9, kept) && keep_piece(1, p / 3 % 3, kept) && keep_piece(2, p % 3, kept);
+    cut.octant[p] = static_cast<std::int8_t>(exists ? kept[0].octant : -1);
+    if (!exists) return;
+    const exact::OctantTerms terms = terms_of(of_b, times, kept);
+    for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[p][n] = octants::term(terms, n);
+  }
+
+  /// Sets lane l of the view to the part of an element, or to none if it is kNoIndex. False if
+  /// that part is not divided.
+  IST_HD bool look(std::uint32_t l, std::uint32_t element) noexcept {
+    OctantView& view = pieces().view;
+    view.slot[l] = element == kNoIndex ? kNoIndex : slot_of(element);
+    if (view.slot[l] == kNoIndex) return false;
+    const OctantSums& first = memory().octant_sums[8 * view.slot[l]];
+    view.planes[l] = first.planes;
+    for (int k = 0; k < 3; ++k) view.centre[k][l] = first.centre[k];
+    return true;
+  }
+  IST_HD OctantSums* octants_seen(std::uint32_t l) noexcept {
+    const std::uint32_t slot = pieces().view.slot[l];
+    return slot == kNoIndex ? nullptr : &memory().octant_sums[8 * slot];
   }
 
   /// Adds the pieces of a crossing. Most are in one octant.
-  IST_HD void add_pieces(std::uint32_t l, OctantSums* octants) noexcept {
+  IST_HD void add_pieces(std::uint32_t l) noexcept {
+    OctantSums* const octants = octants_seen(l);
+    if (octants == nullptr) return;
     const OctantPieces& seen = pieces().octants;
+    const int planes = pieces().view.planes[l];
     int all = 7, any = 0;
     for (int c = 0; c < 6; ++c) {
-      all &= seen.octant[c][l] & octants->planes;
-      any |= seen.octant[c][l] & octants->planes;
+      all &= seen.octant[c][l] & planes;
+      any |= seen.octant[c][l] & planes;
     }
     if (all == any) {
-      OctantSums& sums = octants[all];
-      sums.six_volumes += seen.sum_six_volumes[l];
-      sums.moment = sums.moment + of_lane(seen.sum_moment, l);
-      for (int s = 0; s < 2; ++s) sums.area[s] = sums.area[s] + of_lane(seen.sum_area[s], l);
-      sums.torque = sums.torque + of_lane(seen.sum_torque, l);
+      for (std::uint32_t k = lane(); k < OctantSums::kNumbers; k += width())
+        octants[all].number(k) += seen.sum[k][l];
       return;
     }
     for (int t = 0; t < OctantPieces::kTriangles; ++t)
@@ -175,57 +224,56 @@ class OverlapOctants : public OverlapParts<Overlap> {
   IST_HD void add_seen(OctantSums* octants, bool of_b, int t, std::uint32_t l, int p, int q,
                        int r) noexcept {
     const OctantPieces& seen = pieces().octants;
-    const int planes = octants->planes;
+    const int planes = pieces().view.planes[l];
     const Corner at[3] = {seen_corner(p, l, planes), seen_corner(q, l, planes),
                           seen_corner(r, l, planes)};
     if (at[0].octant == at[1].octant && at[0].octant == at[2].octant)
-      octants::add(octants[at[0].octant], of_b,
-                   {seen.six_volumes[t][l], of_lane(seen.moment[t], l), of_lane(seen.area[t], l),
-                    of_lane(seen.torque[t], l)});
+      for (std::uint32_t n = lane(); n < OctantSums::kNumbers; n += width())
+        octants::add_number(octants[at[0].octant], n, of_b,
+                            [&](std::uint32_t k) { return seen.term[t][k][l]; });
+    else if constexpr (Parts::width() == 1)
+      add_pieces_of(octants, of_b, seen.times[t][l], at);
     else
-      add_triangle(octants, of_b, seen.times[t][l], at[0], at[1], at[2]);
-  }
-  IST_HD static Point of_lane(const double (&of)[3][8], std::uint32_t l) noexcept {
-    return {of[0][l], of[1][l], of[2][l]};
+      add_cut(octants, of_b, seen.times[t][l], at);
   }
 
-  IST_HD OctantSums* octants_of(std::uint32_t element) noexcept {
-    const ExactPart& part = memory().parts[this->part_of(element)];
-    const std::uint32_t slot = memory().parts[part.kept].slot;
-    return slot == kNoIndex ? nullptr : &memory().octant_sums[8 * slot];
+  IST_HD std::uint32_t slot_of(std::uint32_t element) noexcept {
+    const std::uint32_t part = this->known_part(element);
+    return part == kNoIndex ? kNoIndex : memory().parts[memory().parts[part].kept].slot;
   }
 
   /// Finds the boxes of parts, and the planes that cut them: those across which octants are not one
   /// anyway. False if there are none.
   IST_HD bool find_planes(std::uint32_t parts, double near) noexcept {
-    const auto reach = [&](OctantSums& sums, const Point& x) {
+    const auto reach = [&](std::uint32_t element, const Point& x) {
+      const std::uint32_t slot = slot_of(element);
+      if (slot == kNoIndex) return;
+      OctantSums& sums = memory().octant_sums[8 * slot];
       const Point from = in_axes(x - sums.centre);
       for (int k = 0; k < 3; ++k) {
-        if (from[k] < sums.low[k]) sums.low[k] = from[k];
-        if (from[k] > sums.high[k]) sums.high[k] = from[k];
+        this->least(sums.low[k], from[k]);
+        this->most(sums.high[k], from[k]);
       }
     };
     // The surface between its curves may extend beyond these.
-    for (std::uint32_t i = 0; i < this->crossings(); ++i)
-      if (OctantSums* const sums = octants_of(i)) reach(*sums, this->place_of(i, 0));
-    for (int side = 0; side < 2; ++side) {
-      this->for_each_pierced(side, [&](std::uint32_t b) {
-        const std::uint32_t r = this->record_of(side, b);
-        for_each_bit(this->inside_of(r), [&](std::uint32_t v) {
-          if (OctantSums* const sums = octants_of(this->vertex_element(r, v)))
-            reach(*sums, this->at(r, v));
-        });
-      });
-      this->for_each_inside(side, [&](std::uint32_t b) {
-        OctantSums* const sums = octants_of(this->block_element(side, b));
-        if (sums == nullptr || octants::is_large(*sums, near)) return;
+    for (std::uint32_t i = lane(); i < this->crossings(); i += width())
+      reach(i, this->place_of(i, 0));
+    for (std::uint32_t r = lane(); r < this->records(); r += width())
+      if (this->pierced_of(r) != 0)
+        for_each_bit(this->inside_of(r),
+                     [&](std::uint32_t v) { reach(this->vertex_element(r, v), this->at(r, v)); });
+    meet();
+    for (int side = 0; side < 2; ++side)
+      this->for_each_of_lane(side, [&](std::uint32_t b) {
+        const std::uint32_t element = this->block_element(side, b), slot = slot_of(element);
+        if (slot == kNoIndex || is_large(memory().octant_sums[8 * slot], near)) return;
         const MeshBlock& block = mesh(side).blocks[b];
         for (std::uint32_t v = 0; v < block.vertices; ++v)
-          reach(*sums, this->vertex(side, block.vertex[v]));
+          reach(element, this->vertex(side, block.vertex[v]));
       });
-    }
+    meet();
     bool any = false;
-    for (std::uint32_t p = 0; p < parts; ++p) {
+    for (std::uint32_t p = 0; leads() && p < parts; ++p) {
       ExactPart& part = memory().parts[p];
       if (part.slot == kNoIndex) continue;
       OctantSums& sums = memory().octant_sums[8 * part.slot];
@@ -234,6 +282,16 @@ class OverlapOctants : public OverlapParts<Overlap> {
       any = any || sums.planes != 0;
     }
     return any;
+  }
+
+  /// octants::is_large() of a box that others may be enlarging.
+  IST_HD bool is_large(const OctantSums& of, double near) const noexcept {
+    OctantSums box;
+    for (int k = 0; k < 3; ++k) {
+      box.low[k] = this->load(k == 0 ? of.low.x : k == 1 ? of.low.y : of.low.z);
+      box.high[k] = this->load(k == 0 ? of.high.x : k == 1 ? of.high.y : of.high.z);
+    }
+    return octants::is_large(box, near);
   }
 
   /// Sums the pieces of parts (ExactTerms) by octants.
@@ -247,22 +305,15 @@ class OverlapOctants : public OverlapParts<Overlap> {
         for (double& x : view.centre[k]) x = 0;
       }
     }
+    meet();
     for (std::uint32_t first = 0; first < this->crossings(); first += 8) {
       const std::uint32_t left = this->crossings() - first, count = left < 8 ? left : 8;
-      OctantSums* octants[8] = {};
-      if (leads()) {
-        pieces().says = false;
-        for (std::uint32_t l = 0; l < count; ++l) {
-          octants[l] = octants_of(first + l);
-          if (octants[l] == nullptr) continue;
-          pieces().says = true;
-          for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
-        }
-      }
+      bool any = false;
+      for (std::uint32_t l = lane(); l < count; l += width()) any = look(l, first + l) || any;
+      any = this->any(any);
       meet();
-      if (pieces().says) this->find_octant_pieces(first);
-      for (std::uint32_t l = 0; l < count; ++l)
-        if (octants[l] != nullptr) add_pieces(l, octants[l]);
+      if (any) this->find_octant_pieces(first);
+      for (std::uint32_t l = 0; any && l < count; ++l) add_pieces(l);
       meet();
     }
     for (int side = 0; side < 2; ++side) {
@@ -270,51 +321,44 @@ class OverlapOctants : public OverlapParts<Overlap> {
         const std::uint32_t r = this->record_of(side, b);
         this->count_triangles(r);
         for (std::uint32_t first = 0; first < mesh(side).blocks[b].triangles; first += 8)
-          sum_triangles(side, r, first);
+          sum_triangles(side, b, r, first);
       });
       this->for_each_inside(side, [&](std::uint32_t b) { sum_block(side, b); });
     }
   }
 
-  /// Adds eight triangles of a crossed block: the lanes compute them, one adds them.
-  IST_HD void sum_triangles(int side, std::uint32_t r, std::uint32_t first) noexcept {
-    const MeshBlock& block = this->block_of(r);
+  /// Adds eight triangles of block b, which is crossed and has record r, or is inside as a whole
+  /// and has none (kNoIndex).
+  IST_HD void sum_triangles(int side, std::uint32_t b, std::uint32_t r,
+                            std::uint32_t first) noexcept {
+    const MeshBlock& block = mesh(side).blocks[b];
     const std::uint32_t left = block.triangles - first, count = left < 8 ? left : 8;
     OctantPieces& seen = pieces().octants;
-    OctantView& view = pieces().view;
-    OctantSums* octants[8] = {};
-    if (leads()) {
-      pieces().says = false;
-      for (std::uint32_t l = 0; l < count; ++l) {
-        const int whole = pieces().whole[first + l];
-        const std::uint32_t element = whole == 0 ? kNoIndex : this->triangle_element(r, first + l);
-        octants[l] = element == kNoIndex ? nullptr : octants_of(element);
-        seen.times[0][l] = octants[l] == nullptr ? 0 : whole;
-        if (octants[l] == nullptr) continue;
-        pieces().says = true;
-        for (int k = 0; k < 3; ++k) view.centre[k][l] = octants[l]->centre[k];
-      }
-    }
-    meet();
-    for (std::uint32_t l = lane(); pieces().says && l < count; l += width()) {
-      if (seen.times[0][l] == 0) continue;
-      // Corners start at the apex.
-      const std::uint32_t apex = this->opposite_edge(r, first + l) + 2;
+    bool any = false;
+    for (std::uint32_t l = lane(); l < count; l += width()) {
+      const std::uint32_t t = first + l;
+      const int whole = r == kNoIndex ? 1 : pieces().whole[t];
+      if (!look(l, whole == 0      ? kNoIndex
+                   : r == kNoIndex ? this->block_element(side, b)
+                                   : this->triangle_element(r, t)))
+        continue;
+      any = true;
+      // Corners of a crossed block's triangle start at the apex.
+      const std::uint32_t apex = r == kNoIndex ? 0 : this->opposite_edge(r, t) + 2;
       Point at[3];
-      for (std::uint32_t k = 0; k < 3; ++k)
-        at[k] = see(this->at(r, block.corner[(apex + k) % 3][first + l]), k, l);
-      const exact::OctantTerms terms = exact::octant_terms(
-          0.5 * seen.times[0][l], (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
-      seen.six_volumes[0][l] = terms.six_volumes;
-      for (int k = 0; k < 3; ++k) {
-        seen.moment[0][k][l] = terms.moment[k];
-        seen.area[0][k][l] = terms.area[k];
-        seen.torque[0][k][l] = terms.torque[k];
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t v = block.corner[(apex + k) % 3][t];
+        at[k] = see(r == kNoIndex ? this->vertex(side, block.vertex[v]) : this->at(r, v), k, l);
       }
+      const exact::OctantTerms terms =
+          exact::octant_terms(0.5 * whole, (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
+      seen.times[0][l] = whole;
+      for (int n = 0; n < OctantPieces::kTerms; ++n) seen.term[0][n][l] = octants::term(terms, n);
     }
+    any = this->any(any);
     meet();
-    for (std::uint32_t l = 0; l < count; ++l)
-      if (octants[l] != nullptr) add_seen(octants[l], side == 1, 0, l, 0, 1, 2);
+    for (std::uint32_t l = 0; any && l < count; ++l)
+      if (OctantSums* const octants = octants_seen(l)) add_seen(octants, side == 1, 0, l, 0, 1, 2);
     meet();
   }
 
@@ -339,38 +383,36 @@ class OverlapOctants : public OverlapParts<Overlap> {
   /// Adds a block that is inside as a whole, by its integrals if it is in one octant.
   IST_HD void sum_block(int side, std::uint32_t b) noexcept {
     const MeshBlock& block = mesh(side).blocks[b];
-    OctantSums* octants = nullptr;
-    if (leads()) {
-      octants = octants_of(this->block_element(side, b));
-      pieces().says = octants != nullptr;
-      for (int k = 0; octants != nullptr && k < 3; ++k)
-        for (double& x : pieces().view.centre[k]) x = octants->centre[k];
+    const std::uint32_t slot = slot_of(this->block_element(side, b));
+    if (slot == kNoIndex) return;
+    OctantSums* const octants = &memory().octant_sums[8 * slot];
+    int all = 7, some = 0;
+    for (std::uint32_t v = lane(); v < block.vertices; v += width()) {
+      const Point from = in_axes(this->vertex(side, block.vertex[v]) - octants->centre);
+      const int octant = (from.x >= 0 ? 1 : 0) | (from.y >= 0 ? 2 : 0) | (from.z >= 0 ? 4 : 0);
+      all &= octant;
+      some |= octant;
     }
-    meet();
-    // Eight vertices at a time.
-    for (std::uint32_t v = lane(); pieces().says && v < block.vertices; v += width())
-      see(this->vertex(side, block.vertex[v]), v / 8, v % 8);
-    meet();
-    if (octants == nullptr) return;
-    Corner at[kWidth];
-    int all = 7, any = 0;
-    for (std::uint32_t v = 0; v < block.vertices; ++v) {
-      at[v] = seen_corner(static_cast<int>(v / 8), v % 8, octants->planes);
-      all &= at[v].octant;
-      any |= at[v].octant;
+    bool is_cut = false;
+    int in = 0;
+    for (int bit = 1; bit < 8; bit *= 2) {
+      if ((octants->planes & bit) == 0) continue;
+      const bool above = this->any((some & bit) != 0), below = this->any((all & bit) == 0);
+      is_cut = is_cut || (above && below);
+      in |= above ? bit : 0;
     }
-    if (all == any) {
-      const LaneSums found = this->lane_sums(side, b, octants->centre);
-      OctantSums& sums = octants[all];
-      sums.six_volumes += found.six_volumes;
-      sums.moment = sums.moment + in_axes(found.moment);
-      sums.area[side] = sums.area[side] + in_axes(found.normal);
-      sums.torque = sums.torque + (side == 1 ? 0.5 : -0.5) * in_axes(found.torque);
+    if (is_cut) {
+      for (std::uint32_t first = 0; first < block.triangles; first += 8)
+        sum_triangles(side, b, kNoIndex, first);
       return;
     }
-    for (std::uint32_t t = 0; t < block.triangles; ++t)
-      add_triangle(octants, side == 1, 1, at[block.corner[0][t]], at[block.corner[1][t]],
-                   at[block.corner[2][t]]);
+    if (leads()) {
+      const LaneSums found = this->lane_sums(side, b, octants->centre);
+      octants::add(octants[in], side == 1,
+                   {found.six_volumes, in_axes(found.moment), in_axes(found.normal),
+                    (side == 1 ? 0.5 : -0.5) * in_axes(found.torque)});
+    }
+    meet();
   }
 
   /// Appends the octants of a part. Returns the number written then; `first` if they do not sum to

@@ -1,60 +1,26 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
-#include "base/bits.h"
-#include "query/exact/exact_sums.h"
-#include "query/exact/heap_sort.h"
-#include "query/exact/mesh_tree.h"
+#include "query/exact/overlap_joins.h"
 
 // The connected parts of an overlap, on the host and on a GPU.
 
 namespace ist {
 
-/// The number of bits of a triangle's name, so that eight times a pair's name fits into 64.
-inline constexpr int kTriangleBits = 28;
-
-template <class Visit>
-IST_HD void for_each_bit(std::uint64_t bits, const Visit& visit) {
-  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(lowest_bit(bits)));
-}
-
-/// The least power of two that is at least n.
-IST_HD inline std::uint32_t power_from(std::uint32_t n) {
-  std::uint32_t power = 1;
-  while (power < n) power *= 2;
-  return power;
-}
-
-/// Surfaces hang together by the curves where they cross and by vertices inside the other solid.
-///
-/// `Overlap` is what a query found, with these members; sides are 0, A's, and 1, B's:
-///
-/// - leads(), lane(), width(), meet(), any(flag): of a team's lanes the one that does what is done
-///   one by one, this one's number, how many; all come together; whether one raises the flag
-/// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
-/// - crossings(), triangle(side, i), end_of(i, e), way_of(i, e), place_of(i, e): crossings in the
-///   order of the meshes; an end's share of the way along its edge, and its place from the origin
-/// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks,
-/// those
-///   of a side among these numbers
-/// - block_of(r), inside_of(r), pierced_of(r), opposite_edge(r, triangle), at(r, vertex)
-/// - is_inside(side, block), is_pierced(side, block), for_each_inside(side, visit),
-///   for_each_pierced(side, visit): blocks, in their order
-/// - vertex(side, number), lane_sums(side, block, origin): from the origin
-/// - find_crossing_terms(first), find_triangle_terms(r, h), count_triangles(r): pieces() of eight
-///   crossings, of a crossed block's half, of its triangles. All of a team together
+/// The parts of an overlap, their names and sums.
 template <class Overlap>
-class OverlapParts : public Overlap {
+class OverlapParts : public OverlapJoins<Overlap> {
+  using Joins = OverlapJoins<Overlap>;
+
  public:
-  using Overlap::Overlap;
+  using Joins::Joins;
 
   /// Divides the overlap. Returns how many parts there are, at most PartMemory::most_parts (all
   /// further ones are in the last): PartMemory::parts, by their first crossings.
   IST_HD std::uint32_t divide() noexcept {
     start(false);
-    join();
+    this->join();
     name_parts();
     one_ = are_one();
     return finish();
@@ -66,50 +32,59 @@ class OverlapParts : public Overlap {
   }
 
  protected:
-  using Overlap::lane;
-  using Overlap::leads;
-  using Overlap::meet;
-  using Overlap::memory;
-  using Overlap::mesh;
-  using Overlap::opposite_edge;
-  using Overlap::pieces;
-  using Overlap::width;
+  using Joins::block_element;
+  using Joins::block_of;
+  using Joins::lane;
+  using Joins::leads;
+  using Joins::load;
+  using Joins::meet;
+  using Joins::memory;
+  using Joins::mesh;
+  using Joins::opposite_edge;
+  using Joins::pieces;
+  using Joins::records;
+  using Joins::root;
+  using Joins::top;
+  using Joins::vertex_element;
+  using Joins::width;
 
   /// `one`: everything that counts is known to be in one part.
   IST_HD void start(bool one) noexcept {
     parts_ = 0;
     one_ = one;
-    by_names_ = true;
-    first_vertex_ = this->crossings();
-    first_block_[0] = first_vertex_ + kWidth * records();
-    first_block_[1] = first_block_[0] + mesh(0).level[0].count;
+    this->number_elements();
   }
 
-  IST_HD void join() noexcept {
-    begin();
-    meet();
-    join_within_blocks();
-    meet();
-    if (!leads()) return;
-    join_curves();
-    for (int side = 0; side < 2; ++side) join_holes(side);
-    join_edges();
-    for (int side = 0; side < 2; ++side) join_vertices(side);
-    for (int side = 0; side < 2; ++side) join_blocks(side);
-  }
-
+  /// Numbers the parts that have crossings by their first ones, which are their roots.
   IST_HD void name_parts() noexcept {
-    if (!leads()) return;
-    if (one_) {
-      memory().parts[0] = {};
-      parts_ = 1;
+    const std::uint32_t last = memory().most_parts - 1, n = one_ ? 1 : this->crossings();
+    if (one_ && leads()) memory().parts[0] = {};
+    for (std::uint32_t first = 0; !one_ && first < n; first += width()) {
+      const std::uint32_t i = first + lane();
+      int total = 0;
+      const bool is_root = i < n && load(memory().parent[i]) == i;
+      const std::uint32_t number =
+          parts_ + static_cast<std::uint32_t>(this->exclusive_count(is_root, total));
+      if (is_root) {
+        memory().part[i] = number < last ? number : last;
+        if (number <= last) memory().parts[number] = {};
+        if (number <= last) memory().parts[number].kept = number;
+      }
+      parts_ += static_cast<std::uint32_t>(total);
     }
-    for (std::uint32_t i = 0; i < this->crossings(); ++i) {
-      ExactPart& part = memory().parts[part_of(i)];
+    parts_ = one_ ? 1 : parts_ <= last ? parts_ : last + 1;
+    meet();
+    for (std::uint32_t i = lane(); i < this->crossings(); i += width()) {
       const std::uint64_t id =
           (std::uint64_t{this->triangle(0, i)} << kTriangleBits | this->triangle(1, i)) + 1;
-      if (part.id == 0 || id < part.id) part.id = id;
+      lower(memory().parts[part_of(i)].id, id);
     }
+    // The lanes find the parts of all elements at once, for the sums.
+    for (std::uint32_t r = lane(); width() > 1 && r < records(); r += width())
+      for_each_bit(this->inside_of(r), [&](std::uint32_t v) { note_part(vertex_element(r, v)); });
+    for (int side = 0; width() > 1 && side < 2; ++side)
+      this->for_each_of_lane(side, [&](std::uint32_t b) { note_part(block_element(side, b)); });
+    meet();
   }
 
   /// True if everything that counts is in one part.
@@ -128,8 +103,8 @@ class OverlapParts : public Overlap {
       }
     }
     for (int side = 0; side < 2; ++side)
-      for_each_of_lane(side,
-                       [&](std::uint32_t b) { one = one && top(block_element(side, b)) == first; });
+      this->for_each_of_lane(
+          side, [&](std::uint32_t b) { one = one && top(block_element(side, b)) == first; });
     return !this->any(!one);
   }
 
@@ -163,347 +138,113 @@ class OverlapParts : public Overlap {
     return known = part;
   }
 
-  // Elements are crossings, vertices of crossed blocks, and blocks inside as a whole.
-  IST_HD std::uint32_t vertex_element(std::uint32_t record, std::uint32_t vertex) const noexcept {
-    return first_vertex_ + kWidth * record + vertex;
+  /// The part of an element once parts are summed; kNoIndex if none of its part was summed.
+  IST_HD std::uint32_t known_part(std::uint32_t element) const noexcept {
+    if (one_) return 0;
+    const std::uint32_t known = memory().part[element];
+    return known != kNoIndex ? known : memory().part[top(element)];
   }
-  IST_HD std::uint32_t block_element(int side, std::uint32_t block) const noexcept {
-    return first_block_[side] + block;
-  }
+
   /// The element to which a triangle of a crossed block belongs where it counts as a whole.
   IST_HD std::uint32_t triangle_element(std::uint32_t r, std::uint32_t t) const noexcept {
     if (one_) return 0;
     const std::uint32_t edge = 3 * t + opposite_edge(r, t);
-    if (this->pierced_of(r) >> edge & 1) return memory().middles[first_middle(r) + edge];
+    if (this->pierced_of(r) >> edge & 1) return memory().middles[this->first_middle(r) + edge];
     return vertex_element(r, block_of(r).corner[edge % 3][t]);
   }
 
-  IST_HD const MeshBlock& block_of(std::uint32_t record) const noexcept {
-    return mesh(this->side_of(record)).blocks[this->number_of(record)];
-  }
-
   std::uint32_t parts_ = 0;
-  bool one_ = false;      ///< all that counts is in one part
-  bool by_names_ = true;  ///< connections follow from names of crossings and their ends
+  bool one_ = false;  ///< everything that counts is in one part
 
  private:
-  /// Flags of an end in the list of its edge, above the number of the next.
-  static constexpr std::uint64_t kEnters = std::uint64_t{1} << 32,
-                                 kFromFirst = std::uint64_t{2} << 32;
-
-  IST_HD std::uint32_t records() const noexcept {
-    return this->end_record(0) > this->end_record(1) ? this->end_record(0) : this->end_record(1);
-  }
-
-  IST_HD std::uint32_t root(std::uint32_t element) noexcept {
-    std::uint32_t* const parent = memory().parent;
-    while (parent[element] != element) {
-      parent[element] = parent[parent[element]];
-      element = parent[element];
-    }
-    return element;
-  }
-
-  /// The same without changing any links.
-  IST_HD std::uint32_t top(std::uint32_t element) const noexcept {
-    const std::uint32_t* const parent = memory().parent;
-    while (parent[element] != element) element = parent[element];
-    return element;
-  }
-
-  /// Joins two elements. The lower number becomes the root, so that parts do not depend on the
-  /// order.
-  IST_HD void unite(std::uint32_t x, std::uint32_t y) noexcept {
-    x = root(x);
-    y = root(y);
-    if (x < y) memory().parent[y] = x;
-    if (y < x) memory().parent[x] = y;
-  }
-
-  /// The index of a crossed block's first edge.
-  IST_HD static std::uint32_t first_middle(std::uint32_t record) noexcept {
-    return 3 * kWidth * record;
-  }
-
-  /// Makes each element its own root, and empties the lists of ends of edges.
-  IST_HD void begin() noexcept {
-    const auto alone = [&](std::uint32_t element) {
-      memory().parent[element] = element;
-      memory().part[element] = kNoIndex;
-    };
-    for (std::uint32_t i = lane(); i < first_block_[0]; i += width()) alone(i);
-    for (int side = 0; side < 2; ++side)
-      for_each_of_lane(side, [&](std::uint32_t b) { alone(block_element(side, b)); });
-    for (std::uint32_t r = lane(); r < records(); r += width())
-      for_each_bit(this->pierced_of(r), [&](std::uint32_t edge) {
-        memory().middles[first_middle(r) + edge] = kNoIndex;
-      });
-  }
-
-  /// Calls visit(block) for this lane's share of the blocks inside as a whole.
-  template <class Visit>
-  IST_HD void for_each_of_lane(int side, const Visit& visit) noexcept {
-    std::uint32_t next = lane();
-    this->for_each_inside(side, [&](std::uint32_t b) {
-      if (next == 0) visit(b);
-      next = next == 0 ? width() - 1 : next - 1;
-    });
-  }
-
-  /// Joins vertices inside along edges that nothing pierces. Each lane has its own crossed blocks.
-  IST_HD void join_within_blocks() noexcept {
-    for (std::uint32_t r = lane(); r < records(); r += width()) {
-      const std::uint64_t pierced = this->pierced_of(r);
-      const std::uint32_t inside = this->inside_of(r);
-      if (pierced == 0 || inside == 0) continue;
-      const MeshBlock& block = block_of(r);
-      for (std::uint32_t edge = 0; edge < 3u * block.triangles; ++edge) {
-        const std::uint32_t p = block.corner[edge % 3][edge / 3],
-                            q = block.corner[(edge + 1) % 3][edge / 3];
-        if ((pierced >> edge & 1) == 0 && (inside >> p & 1) != 0)
-          unite(vertex_element(r, p), vertex_element(r, q));
-      }
+  /// Lowers a number that is 0 until it is set.
+  IST_HD void lower(std::uint64_t& at, std::uint64_t to) noexcept {
+    for (std::uint64_t now = load(at); now == 0 || to < now;) {
+      const std::uint64_t before = this->replace(at, now, to);
+      if (before == now) return;
+      now = before;
     }
   }
 
-  /// Joins segments that end at the same point, which is on an edge of two triangles and in a
-  /// triangle of the other solid. A hash table finds it by its name.
-  IST_HD void join_curves() noexcept {
-    PiercedEnd* const ends = memory().ends;
-    std::uint64_t* const table = memory().keys;  // numbers of ends, from 1
-    std::uint64_t* const next = memory().other_keys;
-    const std::uint32_t mask = power_from(2 * this->crossings() + 1) - 1;
-    for (std::uint32_t i = 0; i <= mask; ++i) table[i] = 0;
-    for (std::uint32_t i = 0; i < 2 * this->crossings(); ++i) {
-      const CrossingEnd end = this->end_of(i / 2, static_cast<int>(i % 2));
-      const int side = end.of_b ? 1 : 0;
-      const MeshBlock& block = mesh(side).blocks[end.triangle / kWidth];
-      const std::uint32_t lane = end.triangle % kWidth;
-      const std::uint32_t r = this->record_of(side, end.triangle / kWidth);
-      std::uint32_t& first = memory().middles[first_middle(r) + 3 * lane + end.edge];
-      next[i] = first | (end.enters ? kEnters : 0) | (end.from_first ? kFromFirst : 0);
-      first = i;
-      const std::uint32_t p = block.vertex[block.corner[end.edge][lane]],
-                          q = block.vertex[block.corner[(end.edge + 1) % 3][lane]];
-      const std::uint64_t edge = std::uint64_t{p < q ? p : q} << 32 | (p < q ? q : p);
-      const std::uint32_t other = this->triangle(end.of_b ? 0 : 1, i / 2);
-      ends[i] = {edge, 0, i / 2, other, end.of_b};
-      const std::uint64_t mixed =
-          (edge ^ (std::uint64_t{other} << 20)) * 0x9e3779b97f4a7c15u + (end.of_b ? 1 : 0);
-      std::uint64_t slot = (mixed ^ mixed >> 29) >> 3 & mask;
-      for (; table[slot] != 0; slot = (slot + 1) & mask) {
-        const PiercedEnd& found = ends[table[slot] - 1];
-        if (found.edge == edge && found.other == other && found.of_b == end.of_b) break;
-      }
-      if (table[slot] != 0)
-        unite(i / 2, ends[table[slot] - 1].crossing);
-      else
-        table[slot] = i + 1;
-    }
+  /// Keeps the part of an element if it is known.
+  IST_HD void note_part(std::uint32_t element) noexcept {
+    const std::uint32_t part = memory().part[root(element)];
+    if (part != kNoIndex) memory().part[element] = part;
   }
 
-  /// Joins a curve that is in one triangle and surrounds what is outside to the narrowest curve
-  /// around it there, or to the triangle's corners.
-  IST_HD void join_holes(int side) noexcept {
-    using exact::Point;
-    CurveExtent* const curves = memory().curves;
-    const std::uint32_t count = this->crossings();
-    std::uint32_t alone = 0;  // curves in one triangle
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const std::uint32_t first = root(i);
-      std::uint32_t& triangle = curves[first].triangle;
-      if (first == i) {
-        triangle = this->triangle(side, i);
-        ++alone;
-      } else if (triangle != kNoIndex && triangle != this->triangle(side, i)) {
-        triangle = kNoIndex;
-        --alone;
-      }
+  /// Finds the parts of eight pieces. element_of(l) is kNoIndex if piece l does not count.
+  template <class ElementOf>
+  IST_HD void find_parts(std::uint32_t count, const ElementOf& element_of) noexcept {
+    bool unknown = false;
+    for (std::uint32_t l = lane(); l < count; l += width()) {
+      const std::uint32_t element = element_of(l);
+      std::uint32_t& part = pieces().part[l];
+      part = element == kNoIndex ? kNoIndex : width() == 1 ? part_of(element) : known_part(element);
+      unknown = unknown || (element != kNoIndex && part == kNoIndex);
     }
-    if (alone == 0) return;
-    by_names_ = false;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      CurveExtent& curve = curves[root(i)];
-      const Point from = this->place_of(i, 0), to = this->place_of(i, 1);
-      if (root(i) == i) curve = {curve.triangle, from, from, {0, 0, 0}};
-      for (int k = 0; k < 3; ++k) {
-        if (from[k] < curve.low[k]) curve.low[k] = from[k];
-        if (from[k] > curve.high[k]) curve.high[k] = from[k];
-      }
-      curve.area = curve.area + (side == 1 ? -1.0 : 1.0) * cross(from, to);
-    }
-    for (std::uint32_t i = 0; i < count; ++i) {
-      const CurveExtent& hole = curves[i];
-      if (root(i) != i || hole.triangle == kNoIndex) continue;
-      const std::uint32_t number = hole.triangle / kWidth, lane = hole.triangle % kWidth;
-      const MeshBlock& block = mesh(side).blocks[number];
-      const std::uint32_t r = this->record_of(side, number);
-      const Point corner = this->at(r, block.corner[0][lane]);
-      const Point normal = cross(this->at(r, block.corner[1][lane]) - corner,
-                                 this->at(r, block.corner[2][lane]) - corner);
-      if (dot(hole.area, normal) >= 0) continue;
-      std::uint32_t around = kNoIndex;
-      double narrowest = HUGE_VAL;
-      for (std::uint32_t j = 0; j < count; ++j) {
-        const CurveExtent& curve = curves[root(j)];
-        if (this->triangle(side, j) != hole.triangle || root(j) == i) continue;
-        const Point wide = curve.high - curve.low;
-        const bool holds = curve.low.x <= hole.low.x && curve.low.y <= hole.low.y &&
-                           curve.low.z <= hole.low.z && curve.high.x >= hole.high.x &&
-                           curve.high.y >= hole.high.y && curve.high.z >= hole.high.z;
-        if (!holds || !(dot(wide, wide) < narrowest)) continue;
-        narrowest = dot(wide, wide);
-        around = j;
-      }
-      if (around != kNoIndex)
-        unite(i, around);
-      else if (this->is_inside(side, number))
-        unite(i, block_element(side, number));
-      else if (this->inside_of(r) >> block.corner[0][lane] & 1)
-        unite(i, vertex_element(r, block.corner[0][lane]));
-    }
+    unknown = this->any(unknown);
+    meet();
+    if (!unknown) return;
+    for (std::uint32_t l = 0; leads() && l < count; ++l)
+      if (const std::uint32_t element = element_of(l); element != kNoIndex)
+        pieces().part[l] = part_of(element);
+    meet();
   }
 
-  /// Joins the ends of the pieces of edges that are inside.
-  IST_HD void join_edges() noexcept {
-    for (std::uint32_t r = 0; r < records(); ++r) {
-      const MeshBlock& block = block_of(r);
-      for_each_bit(this->pierced_of(r), [&](std::uint32_t edge) {
-        // The triangle on the edge's other side has the same ends.
-        const std::uint32_t t = edge / 3;
-        if (edge % 3 != opposite_edge(r, t) &&
-            block.vertex[block.corner[edge % 3][t]] > block.vertex[block.corner[(edge + 1) % 3][t]])
-          return;
-        std::uint32_t& middle = memory().middles[first_middle(r) + edge];
-        middle = join_edge(r, edge, middle);
-      });
-    }
-  }
-
-  /// Returns what the middle of the edge hangs together with. `first`: of the list of its ends.
-  ///
-  /// Where copies coincide ends lie nearer to each other than they are known, and their order may
-  /// say that nothing is inside in the middle: the nearest end stands for it, so that sums lose
-  /// nothing.
-  IST_HD std::uint32_t join_edge(std::uint32_t r, std::uint32_t edge,
-                                 std::uint32_t first) noexcept {
-    PiercedEnd* const ends = memory().ends;
-    std::uint32_t count = 0;
-    for (std::uint32_t i = first; i != kNoIndex;) {
-      const std::uint64_t next = memory().other_keys[i];
-      ends[count++] = {next, this->way_of(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};
-      i = static_cast<std::uint32_t>(next);
-    }
-    by_names_ = by_names_ && count <= 2;
-    if (count > 1)
-      heap_sort(ends, count, [](const PiercedEnd& x, const PiercedEnd& y) {
-        const bool first_half = (x.edge & kFromFirst) != 0;
-        if (first_half != ((y.edge & kFromFirst) != 0)) return first_half;
-        return x.t < y.t || (x.t == y.t && x.crossing < y.crossing);
-      });
-    const MeshBlock& block = block_of(r);
-    const std::uint32_t p = block.corner[edge % 3][edge / 3],
-                        q = block.corner[(edge + 1) % 3][edge / 3];
-    const std::uint32_t insides = this->inside_of(r);
-    std::uint32_t inside = insides >> p & 1 ? vertex_element(r, p) : kNoIndex;
-    std::uint32_t middle = inside, nearest = ends[0].crossing;
-    for (std::uint32_t i = 0; i < count; ++i) {
-      if ((ends[i].edge & kEnters) != 0) {
-        inside = ends[i].crossing;
-      } else {
-        if (inside != kNoIndex) unite(inside, ends[i].crossing);
-        inside = kNoIndex;
-      }
-      if ((ends[i].edge & kFromFirst) == 0) continue;
-      middle = inside;
-      nearest = ends[i].crossing;
-    }
-    if (inside != kNoIndex && (insides >> q & 1) != 0) unite(inside, vertex_element(r, q));
-    return middle != kNoIndex ? middle : nearest;
-  }
-
-  /// Calls visit(r) for a side's crossed blocks with pierced edges and vertices inside.
-  template <class Visit>
-  IST_HD void for_each_mixed(int side, const Visit& visit) const noexcept {
-    for (std::uint32_t r = this->first_record(side); r < this->end_record(side); ++r)
-      if (this->side_of(r) == side && this->pierced_of(r) != 0 && this->inside_of(r) != 0) visit(r);
-  }
-
-  /// Joins vertices inside that different blocks share. A hash table finds them.
-  IST_HD void join_vertices(int side) noexcept {
-    int count = 0;
-    for_each_mixed(side, [&](std::uint32_t r) { count += count_bits(this->inside_of(r)); });
-    std::uint64_t* const table = memory().keys;  // vertex and element
-    const std::uint32_t mask = power_from(2 * static_cast<std::uint32_t>(count) + 1) - 1;
-    constexpr std::uint64_t kEmpty = ~std::uint64_t{0};
-    for (std::uint32_t i = 0; i <= mask; ++i) table[i] = kEmpty;
-    for_each_mixed(side, [&](std::uint32_t r) {
-      const MeshBlock& block = block_of(r);
-      for_each_bit(this->inside_of(r), [&](std::uint32_t v) {
-        const std::uint32_t vertex = block.vertex[v], element = vertex_element(r, v);
-        std::uint32_t slot = vertex * 2654435769u >> 7 & mask;
-        while (table[slot] != kEmpty && table[slot] >> 32 != vertex) slot = (slot + 1) & mask;
-        if (table[slot] == kEmpty)
-          table[slot] = std::uint64_t{vertex} << 32 | element;
+  /// Adds the terms of eight pieces to their parts in order. Each lane adds one of the numbers.
+  IST_HD void add_terms(std::uint32_t count, int volumes) noexcept {
+    const ExactTerms& terms = pieces().terms;
+    for (std::uint32_t l = 0; l < count; ++l) {
+      if (pieces().part[l] == kNoIndex) continue;
+      ExactSums& sums = memory().parts[pieces().part[l]].sums;
+      for (std::uint32_t k = lane(); k < (volumes == 1 ? 4u : 10u); k += width()) {
+        if (k > 0)
+          (&sums.moment.x)[k - 1] += (&terms.moment[0][0])[8 * (k - 1) + l];
         else
-          unite(element, static_cast<std::uint32_t>(table[slot]));
-      });
-    });
-  }
-
-  /// Joins blocks inside as a whole with each other and with vertices inside of crossed ones.
-  IST_HD void join_blocks(int side) noexcept {
-    const MeshTree& all = mesh(side);
-    this->for_each_inside(side, [&](std::uint32_t b) {
-      const MeshBlock& block = all.blocks[b];
-      for (std::uint32_t k = 0; k < block.neighbours; ++k) {
-        const std::uint32_t other = all.neighbours[block.first_neighbour + k] / kWidth;
-        if (this->is_inside(side, other)) {
-          if (other < b) unite(block_element(side, b), block_element(side, other));
-        } else if (this->is_pierced(side, other)) {
-          const std::uint32_t r = this->record_of(side, other);
-          const MeshBlock& beside = all.blocks[other];
-          for (std::uint32_t v = 0; v < beside.vertices; ++v)
-            for (std::uint32_t w = 0; w < block.vertices; ++w)
-              if (block.vertex[w] == beside.vertex[v])
-                unite(block_element(side, b), vertex_element(r, v));
-        }
+          for (int v = 0; v < volumes; ++v) sums.six_volumes.add(terms.six_volumes[v][l]);
       }
-    });
+    }
+    meet();
   }
 
   IST_HD void sum_parts() noexcept {
-    const auto sums_of = [&](std::uint32_t element) -> ExactSums& {
-      return memory().parts[part_of(element)].sums;
-    };
     for (std::uint32_t first = 0; first < this->crossings(); first += 8) {
+      const std::uint32_t left = this->crossings() - first, count = left < 8 ? left : 8;
       this->find_crossing_terms(first);
-      for (std::uint32_t l = 0; leads() && l < 8 && first + l < this->crossings(); ++l)
-        add_crossing_term(pieces().terms, l, sums_of(first + l));
-      meet();
+      find_parts(count, [&](std::uint32_t l) { return first + l; });
+      add_terms(count, 3);
     }
     for (int side = 0; side < 2; ++side) {
       this->for_each_pierced(side, [&](std::uint32_t b) {
-        const std::uint32_t r = this->record_of(side, b);
+        const std::uint32_t r = this->record_of(side, b), all = mesh(side).blocks[b].triangles;
         this->count_triangles(r);
-        for (std::uint32_t h = 0; 8 * h < mesh(side).blocks[b].triangles; ++h) {
+        for (std::uint32_t h = 0; 8 * h < all; ++h) {
+          const std::uint32_t left = all - 8 * h, count = left < 8 ? left : 8;
           this->find_triangle_terms(r, h);
-          for (std::uint32_t l = 0; leads() && l < 8; ++l) {
-            const std::uint32_t t = 8 * h + l;
-            if (t >= mesh(side).blocks[b].triangles || pieces().whole[t] == 0) continue;
-            add_triangle_term(pieces().terms, l, sums_of(triangle_element(r, t)));
-          }
-          meet();
+          find_parts(count, [&](std::uint32_t l) {
+            return pieces().whole[8 * h + l] == 0 ? kNoIndex : triangle_element(r, 8 * h + l);
+          });
+          add_terms(count, 1);
         }
       });
-      if (leads())
-        this->for_each_inside(side, [&](std::uint32_t b) {
-          const LaneSums found = this->lane_sums(side, b, {0, 0, 0});
-          ExactSums& sums = sums_of(block_element(side, b));
-          sums.six_volumes.add(found.six_volumes);
-          sums.moment = sums.moment + found.moment;
-        });
+      std::uint32_t count = 0;
+      this->for_each_inside(side, [&](std::uint32_t b) {
+        if (leads()) pieces().block[count] = b;
+        if (++count == 8) add_blocks(side, count);
+      });
+      if (count > 0) add_blocks(side, count);
     }
+  }
+  IST_HD void add_blocks(int side, std::uint32_t& count) noexcept {
+    meet();
+    for (std::uint32_t l = lane(); l < count; l += width()) {
+      const LaneSums found = this->lane_sums(side, pieces().block[l], {0, 0, 0});
+      pieces().terms.six_volumes[0][l] = found.six_volumes;
+      for (int k = 0; k < 3; ++k) pieces().terms.moment[k][l] = found.moment[k];
+    }
+    find_parts(count, [&](std::uint32_t l) { return block_element(side, pieces().block[l]); });
+    add_terms(count, 1);
+    count = 0;
   }
 
   /// A part with negative volume is the wall of a cavity. It is added to the largest part, the best
@@ -516,8 +257,6 @@ class OverlapParts : public Overlap {
     for (std::uint32_t p = 0; p < parts_; ++p)
       if (parts[p].sums.volume() < 0) parts[p].kept = largest;
   }
-
-  std::uint32_t first_vertex_ = 0, first_block_[2] = {0, 0};  ///< elements
 };
 
 }  // namespace ist

@@ -10,7 +10,7 @@ HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
 HWY_INLINE void store(V v, double* to) { hn::Store(v, D(), to); }
-HWY_INLINE void store(const Vec3& v, double (&to)[3][8], std::size_t l) {
+HWY_INLINE void store(const Vec3& v, double (*to)[8], std::size_t l) {
   store(v.x, to[0] + l);
   store(v.y, to[1] + l);
   store(v.z, to[2] + l);
@@ -109,15 +109,15 @@ void sum_octant_pieces(const Crossings& crossings, std::uint32_t first, const Oc
       const OctantTerms& terms = found.of[t];
       bytes(t < 2 ? (t == 1 ? once : zero) : hn::IfThenElseZero(by_b[t - 2], once), out.of_b[t]);
       store(times[t], out.times[t] + l);
-      store(terms.six_volumes, out.six_volumes[t] + l);
-      store(terms.moment, out.moment[t], l);
-      store(terms.area, out.area[t], l);
-      store(terms.torque, out.torque[t], l);
+      store(terms.six_volumes, out.term[t][0] + l);
+      store(terms.moment, out.term[t] + 1, l);
+      store(terms.area, out.term[t] + 4, l);
+      store(terms.torque, out.term[t] + 7, l);
     }
-    store(found.all.six_volumes, out.sum_six_volumes + l);
-    store(found.all.moment, out.sum_moment, l);
-    store(found.all.torque, out.sum_torque, l);
-    for (int s = 0; s < 2; ++s) store(found.area[s], out.sum_area[s], l);
+    store(found.all.six_volumes, out.sum[0] + l);
+    const Vec3* const sums[] = {&found.all.moment, &found.area[0], &found.area[1],
+                                &found.all.torque};
+    for (int n = 0; n < 4; ++n) store(*sums[n], out.sum + 1 + 3 * n, l);
   }
 }
 
