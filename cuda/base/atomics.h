@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <cstring>
 
 #include "base/host_device.h"
 
@@ -104,13 +105,13 @@ IST_HD inline Words4 load_fresh(const Words4* at) {
 #endif
 }
 
-/// A value that others read meanwhile.
+/// Writes a value that others may be reading.
 IST_HD inline void atomic_store(std::uint32_t* at, std::uint32_t value) {
   IST_GPU_OR_HOST(*static_cast<volatile std::uint32_t*>(at) = value,
                   __atomic_store_n(at, value, __ATOMIC_RELEASE));
 }
 
-/// A value that others may be changing.
+/// Reads a value that others may be changing.
 IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
   return IST_GPU_OR_HOST(*static_cast<const volatile std::uint32_t*>(at),
                          __atomic_load_n(at, __ATOMIC_ACQUIRE));
@@ -118,6 +119,24 @@ IST_HD inline std::uint32_t atomic_load(const std::uint32_t* at) {
 IST_HD inline std::uint64_t atomic_load(const std::uint64_t* at) {
   return IST_GPU_OR_HOST(*static_cast<const volatile std::uint64_t*>(at),
                          __atomic_load_n(at, __ATOMIC_ACQUIRE));
+}
+IST_HD inline double atomic_load(const double* at) {
+  const std::uint64_t bits = atomic_load(reinterpret_cast<const std::uint64_t*>(at));
+  double x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
+}
+
+/// Writes x if sign · x is less than what is there.
+IST_HD inline void atomic_lower(double* at, double x, double sign) {
+  std::uint64_t to;
+  std::memcpy(&to, &x, sizeof to);
+  for (double now = atomic_load(at); sign * x < sign * now;) {
+    std::uint64_t from;
+    std::memcpy(&from, &now, sizeof from);
+    if (atomic_replace(reinterpret_cast<std::uint64_t*>(at), from, to) == from) return;
+    now = atomic_load(at);
+  }
 }
 
 }  // namespace ist::gpu

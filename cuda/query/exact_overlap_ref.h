@@ -148,9 +148,6 @@ class OverlapRef {
   IST_HD static T load(const T& at) {
     return atomic_load(&at);
   }
-  IST_HD static double load(const double& at) {
-    return double_of(atomic_load(reinterpret_cast<const std::uint64_t*>(&at)));
-  }
   IST_HD static void store(std::uint32_t& at, std::uint32_t to) { atomic_store(&at, to); }
   IST_HD static std::uint32_t add(std::uint32_t& at, std::uint32_t by) {
     return atomic_add(&at, by);
@@ -162,8 +159,8 @@ class OverlapRef {
   IST_HD static T replace(T& at, T from, T to) {
     return atomic_replace(&at, from, to);
   }
-  IST_HD static void least(double& at, double x) { lower(at, x, 1); }
-  IST_HD static void most(double& at, double x) { lower(at, x, -1); }
+  IST_HD static void least(double& at, double x) { atomic_lower(&at, x, 1); }
+  IST_HD static void most(double& at, double x) { atomic_lower(&at, x, -1); }
   IST_HD const MeshTree& mesh(int side) const { return pair_.mesh[side]; }
   IST_HD PieceMemory& pieces() { return pieces_; }
   IST_HD const Similarity& map() const { return pair_.place.a_from_b; }
@@ -270,16 +267,6 @@ class OverlapRef {
   }
 
  private:
-  /// Writes x if sign · x is less than what is there.
-  IST_HD static void lower(double& at, double x, double sign) {
-    auto* const bits = reinterpret_cast<std::uint64_t*>(&at);
-    for (std::uint64_t now = atomic_load(bits); sign * x < sign * double_of(now);) {
-      const std::uint64_t before = atomic_replace(bits, now, bits_of(x));
-      if (before == now) return;
-      now = before;
-    }
-  }
-
   /// Calls work(l) for the eight lanes of pieces.
   template <class Work>
   IST_HD void for_each_lane(const Work& work) {

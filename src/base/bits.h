@@ -22,18 +22,6 @@ IST_HD inline float float_of(std::uint32_t bits) {
   return x;
 }
 
-IST_HD inline std::uint64_t bits_of(double x) {
-  std::uint64_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return bits;
-}
-
-IST_HD inline double double_of(std::uint64_t bits) {
-  double x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
-
 /// The bits of a float as an integer of the same order.
 IST_HD inline std::uint32_t ordered_bits(float x) {
   const std::uint32_t bits = bits_of(x);
@@ -46,13 +34,17 @@ IST_HD inline float from_ordered_bits(std::uint32_t ordered) {
 
 /// The bits of a double as an integer of the same order.
 IST_HD inline std::uint64_t ordered_bits(double x) {
-  const std::uint64_t bits = bits_of(x);
+  std::uint64_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
   return bits ^ ((bits >> 63) != 0 ? 0xFFFFFFFFFFFFFFFFull : 0x8000000000000000ull);
 }
 
 IST_HD inline double from_ordered_bits(std::uint64_t ordered) {
-  return double_of(ordered ^
-                   ((ordered >> 63) != 0 ? 0x8000000000000000ull : 0xFFFFFFFFFFFFFFFFull));
+  const std::uint64_t bits =
+      ordered ^ ((ordered >> 63) != 0 ? 0x8000000000000000ull : 0xFFFFFFFFFFFFFFFFull);
+  double x;
+  std::memcpy(&x, &bits, sizeof x);
+  return x;
 }
 
 IST_HD inline int count_bits(std::uint32_t bits) {
