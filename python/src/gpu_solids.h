@@ -4,7 +4,9 @@
 #include <ist/types.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -43,20 +45,19 @@ class DeviceSolids {
   std::shared_ptr<const cuda::Moment> launch(const GpuPairs& pairs, cuda::Stream stream,
                                              std::vector<std::shared_ptr<void>> lent,
                                              const Launch& batch) {
-    const int device = solids_->device();
-    const bool captured = cuda::captures(device, stream);
     // Few pairs and many are cut up differently, in workspaces of their own: an answer does not
     // depend on what was asked before.
-    Room& room = rooms_[pairs.count > kFewGpuPairs ? 1 : 0];
-    if (room.workspace == nullptr || room.workspace->most_pairs() < pairs.count) {
-      if (captured)
-        throw Error("GPU: a batch of " + std::to_string(pairs.count) +
-                    " pairs is captured, but no batch this large ran before: run one without "
-                    "capturing first");
-      make_room(room, pairs.count);
-    }
-    if (captured) room.captured = true;
-    return in_order(stream, std::move(lent), [&] { batch(*solids_, *room.workspace); });
+    GpuWorkspace& workspace =
+        ready(workspaces_[pairs.count > kFewGpuPairs ? 1 : 0], pairs.count, 4096, stream,
+              [](std::size_t most, const GpuSettings& on) { return new GpuWorkspace(most, on); });
+    return in_order(stream, std::move(lent), [&] { batch(*solids_, workspace); });
+  }
+
+  /// What exact batches of a pair_id keep from call to call.
+  GpuKept& kept(std::uint32_t pair_id, std::size_t pairs, cuda::Stream stream) {
+    return ready(kept_[pair_id], pairs, 64, stream, [](std::size_t most, const GpuSettings& on) {
+      return new GpuKept(most, 8192, on);
+    });
   }
 
   /// Likewise what works in no workspace.
@@ -80,26 +81,41 @@ class DeviceSolids {
     std::vector<std::shared_ptr<void>> lent;
   };
 
-  struct Room {
-    std::unique_ptr<GpuWorkspace> workspace;
+  /// Device memory of batches that grows with them.
+  template <class Memory>
+  struct Growing {
+    std::unique_ptr<Memory> now;
     bool captured = false;
+    std::vector<std::unique_ptr<Memory>> before;  ///< in use by graphs, as long as these solids
   };
 
-  void make_room(Room& room, std::size_t pairs) {
-    GpuSettings settings;
-    settings.device = solids_->device();
-    if (!in_flight_.empty()) in_flight_.back().done->wait();
-    // A graph that was captured uses the old one as long as these solids.
-    if (room.captured) captured_.push_back(std::move(room.workspace));
-    room = {};
-    std::size_t most = 4096;
-    while (most < pairs) most *= 2;
-    room.workspace = std::make_unique<GpuWorkspace>(most, settings);
+  /// Memory for so many pairs. make(most, settings) makes a larger one, for `least` or more.
+  template <class Memory, class Make>
+  Memory& ready(Growing<Memory>& of, std::size_t pairs, std::size_t least, cuda::Stream stream,
+                const Make& make) {
+    const bool captured = cuda::captures(solids_->device(), stream);
+    if (of.now == nullptr || of.now->most_pairs() < pairs) {
+      if (captured)
+        throw Error("GPU: a batch of " + std::to_string(pairs) +
+                    " pairs is captured, but no batch this large ran before: run one without "
+                    "capturing first");
+      GpuSettings settings;
+      settings.device = solids_->device();
+      if (!in_flight_.empty()) in_flight_.back().done->wait();
+      if (of.captured) of.before.push_back(std::move(of.now));
+      of.captured = false;
+      of.now.reset();
+      std::size_t most = least;
+      while (most < pairs) most *= 2;
+      of.now.reset(make(most, settings));
+    }
+    of.captured = of.captured || captured;
+    return *of.now;
   }
 
   std::unique_ptr<GpuSolids> solids_;
-  Room rooms_[2];  ///< of few pairs, and of many
-  std::vector<std::unique_ptr<GpuWorkspace>> captured_;
+  Growing<GpuWorkspace> workspaces_[2];             ///< of few pairs, and of many
+  std::map<std::uint32_t, Growing<GpuKept>> kept_;  ///< by pair_id
   std::deque<Batch> in_flight_;
 };
 

@@ -97,7 +97,7 @@ relative_error: accepted relative error of the volume, such as 0.005 for 0.5 %, 
     Asset has no mesh or one that errs more, a pair_budget is set, or copies of an Asset coincide.
 pair_id: your id of this pair of solids, 0: none. Calls with the same id, and their rows, are steps
     of one motion: 'exact' keeps nearby triangles from step to step and returns the same answers
-    faster.
+    faster. On a GPU it keeps 8 KB a row for each id, as long as the ist.Solids.
 threads: 0: all cores. The bits of the answers do not depend on it. The GIL is released.
 
 Rows that cannot be answered are NaN with a status and do not affect others. invalid_input: NaN, a
@@ -199,12 +199,15 @@ void add_penetration(py::module_& module) {
           refuse_given("not on a GPU", {{"scale_gradients", scale_gradients},
                                         {"max_visits", max_visits != 0},
                                         {"relative_error", relative_error != 0}});
-          const GpuPenetrationSettings settings{named(measure, "measure", kMeasures), pair_budget};
+          GpuPenetrationSettings settings{named(measure, "measure", kMeasures), pair_budget};
           return ask<GpuPenetrations>(
               sides, pair, given, {},
               [&](const GpuSolids& all, const GpuPairs& pairs, GpuWorkspace& workspace,
-                  const GpuPenetrations& to,
-                  cuda::Stream on) { penetration_batch(all, pairs, settings, workspace, to, on); });
+                  const GpuPenetrations& to, cuda::Stream on) {
+                if (pair_id != 0 && settings.measure == Measure::exact)
+                  settings.kept = &sides.solids->kept(pair_id, pairs.count, on);
+                penetration_batch(all, pairs, settings, workspace, to, on);
+              });
         }
         refuse_output(given);
         return py::cast(answer(pair.rows(),

@@ -102,6 +102,16 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
 GpuWorkspace::~GpuWorkspace() = default;
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 
+struct GpuKept::Impl {
+  std::size_t most_pairs, bytes_each;
+  Alive alive;
+  mutable std::unique_ptr<testing::HostBatch> batch;  ///< made by the first launch
+};
+GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettings&)
+    : impl_(std::make_unique<Impl>(Impl{most_pairs, bytes_each, {}, {}})) {}
+GpuKept::~GpuKept() = default;
+std::size_t GpuKept::most_pairs() const noexcept { return impl_->most_pairs; }
+
 namespace {
 
 /// answer(solids, rows) → found, and write(found), when the stream comes to it.
@@ -126,7 +136,19 @@ void penetration_batch(const GpuSolids& solids, const GpuPairs& pairs,
                        const GpuPenetrations& to, CUstream_st* stream) {
   launch(
       solids, pairs, workspace, stream,
-      [settings, most_pairs = workspace.most_pairs()](const auto& there, const auto& rows) {
+      [settings, most_pairs = workspace.most_pairs(),
+       kept = settings.kept == nullptr ? Alive().shown() : settings.kept->impl().alive.shown()](
+          const auto& there, const auto& rows) {
+        if (settings.kept != nullptr) {
+          need(kept);
+          const GpuKept::Impl& keeps = settings.kept->impl();
+          if (keeps.batch == nullptr) {
+            keeps.batch = std::make_unique<testing::HostBatch>(there);
+            keeps.batch->keep(static_cast<std::uint32_t>(keeps.most_pairs),
+                              static_cast<std::uint32_t>(keeps.bytes_each));
+          }
+          return keeps.batch->run(rows, settings.measure);
+        }
         testing::HostBatch batch(there);
         batch.cut_for(most_pairs);
         return batch.run(rows, settings.measure, 0, settings.pair_budget);

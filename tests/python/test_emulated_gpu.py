@@ -131,6 +131,28 @@ def test_the_exact_measure_is_that_of_the_cpu(random_poses):
     assert (found.status.numpy() == 0).all()
 
 
+def test_a_pair_id_keeps_what_is_near(random_poses):
+    mesh = ist.sample_mesh("cube")
+    cube, edge = ist.bake_mesh_only(mesh), np.ptp(mesh.vertices[:, 0])
+    solids, plain = (ist.Solids([cube], device="cuda") for _ in range(2))
+    poses = random_poses(80, 0.5)
+    poses[:, 4:] *= edge
+    names = ("volume", "force", "torque", "status", "node_visits")
+    searched = []
+    for count, pair_id in [(40, 7), (40, 7), (40, 7), (40, 8), (80, 7), (80, 7), (80, 0)]:
+        poses[:, 4] += 1e-9 * edge
+        asked = dict(a=0, b=0, measure="exact", wanted=names)
+        found, expected = (
+            {n: getattr(answer, n).numpy() for n in names}
+            for answer in (batch(solids, poses=OnDevice(poses[:count].copy()), pair_id=pair_id, **asked),
+                           batch(plain, poses=OnDevice(poses[:count].copy()), **asked)))
+        searched.append((found.pop("node_visits") != 0).mean() / (expected.pop("node_visits") != 0).mean())
+        for name in expected:
+            assert np.array_equal(found[name], expected[name]), name
+    # Another id, more rows than before and no id begin anew.
+    assert [share < 1 for share in searched] == [False, True, True, False, False, True, False], searched
+
+
 def test_exact_patches_are_those_of_the_cpu(random_poses):
     mesh = ist.sample_mesh("cube")
     cube, edge = ist.bake_mesh_only(mesh), np.ptp(mesh.vertices[:, 0])

@@ -312,7 +312,7 @@ class OverlapJoins : public Overlap {
     }
   }
 
-  /// Returns what the middle of the edge hangs together with. `first`: of the list of its ends.
+  /// Returns the element to which the middle of the edge belongs. `first`: of the list of its ends.
   ///
   /// Where copies coincide ends lie nearer to each other than they are known, and their order may
   /// say that nothing is inside in the middle: the nearest end stands for it, so that sums lose
