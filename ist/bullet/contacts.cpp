@@ -86,12 +86,14 @@ struct PairAlgorithm::State {
   State(const btCollisionShape& first, const btCollisionShape& second, const Contacts& world)
       : meeting(first, second, &world) {}
 
-  Meeting meeting;
-  std::optional<Places> before;  // where the shapes were in the last step
-  Points points;
+  // A step of a pair that stays apart reads these alone, which share few cache lines.
   btTransform second_in_first;  // when last asked
   double still = -1;            // [u] the answer is valid until a point has moved by more than this
   bool apart = true;            // it has no points
+  bool has_before = false;
+  Meeting meeting;
+  Places before;  // where the shapes were in the last step, if `has_before`
+  Points points;
   ContactMemory memory;
   ContactForce pushed;
 };
@@ -229,7 +231,7 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
   const bool placed = first.isKinematicObject() || second.isKinematicObject();
   // Most pairs of a heap are apart and stay so.
   if (holds && state_->apart && !placed && typeid(*result) == typeid(btManifoldResult)) {
-    state_->before.reset();
+    state_->has_before = false;
     return;
   }
   const Settings settings = contacts_.settings_of(first, second);
@@ -260,12 +262,13 @@ void PairAlgorithm::processCollision(const btCollisionObjectWrapper* a,
     return;
   }
   const double step = info.m_timeStep > 0 ? info.m_timeStep : 1.0 / 60;
-  if (state_->before) {
+  if (state_->has_before) {
     const auto time = static_cast<btScalar>(step);
-    state_->points.unsaid = {unsaid_motion(first, (*state_->before)[0], at_first, time),
-                             unsaid_motion(second, (*state_->before)[1], at_second, time)};
+    state_->points.unsaid = {unsaid_motion(first, state_->before[0], at_first, time),
+                             unsaid_motion(second, state_->before[1], at_second, time)};
   }
-  state_->before = Places{at_first, at_second};
+  state_->before = {at_first, at_second};
+  state_->has_before = true;
   if (holds) {
     state_->points.move(first, second, step);
   } else {

@@ -65,11 +65,11 @@ std::optional<Penetration> push_across(const Penetration& apart, const Separatio
 
 Meeting::Meeting(const btCollisionShape& first, const btCollisionShape& second,
                  const Contacts* world)
-    : world_(world),
-      pair_id_(static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(this) >> 3)),
-      // SDF shapes of Bullet's have the same type.
-      first_(dynamic_cast<const Shape*>(&first)),
-      second_(dynamic_cast<const Shape*>(&second)) {
+    // SDF shapes of Bullet's have the same type.
+    : first_(dynamic_cast<const Shape*>(&first)),
+      second_(dynamic_cast<const Shape*>(&second)),
+      world_(world),
+      pair_id_(static_cast<std::uint32_t>(reinterpret_cast<std::uintptr_t>(this) >> 3)) {
   if (has_shape() && first_ == nullptr) partner_ = Partner::of(first);
   if (has_shape() && second_ == nullptr) partner_ = Partner::of(second);
 }

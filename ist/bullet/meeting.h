@@ -23,7 +23,7 @@ class Meeting {
 
   /// One of them is a Shape.
   bool has_shape() const { return first_ != nullptr || second_ != nullptr; }
-  bool is_met() const { return partner_.has_value() || (first_ != nullptr && second_ != nullptr); }
+  bool is_met() const { return (first_ != nullptr && second_ != nullptr) || partner_.has_value(); }
 
   /// The shapes' transforms are given. The contact pushes the second. `likely_apart`: looks first
   /// whether the shapes are; it changes no contact.
@@ -54,10 +54,10 @@ class Meeting {
   TimeOfImpact impact(const Places& from, const Places& to, const Places& in_body,
                       const Settings& settings) const;
 
-  const Contacts* world_;
-  std::uint32_t pair_id_;         // no two at a time have the same
   const Shape* first_ = nullptr;  // null: partner_
   const Shape* second_ = nullptr;
+  const Contacts* world_;
+  std::uint32_t pair_id_;  // no two at a time have the same
   std::optional<Partner> partner_;
 };
 

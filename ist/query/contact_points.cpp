@@ -145,9 +145,9 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
   if (!(area_ > 0) || !flat_ || !(facing > 0)) return;
   const double square = facing * facing / normal.squaredNorm();
   if (!(square > kRound * kRound)) return;
-  const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
   const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
   if ((p - middle_).squaredNorm() > (reach_ + radius) * (reach_ + radius)) return;
+  const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
   if (!(square > kFacing * kFacing)) {
     const auto is_here = [&](const Corner& x) { return std::abs(x.z) <= near_; };
     flat_ = is_at_rim(face) || std::none_of(face.begin(), face.end(), is_here);
@@ -236,12 +236,11 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
       const auto [level, block] = waiting[--count];
       if (level == 0) {
         const MeshBlock& from = blocks[block];
-        const auto place = [&](int k, std::uint32_t t) -> Vector3d {
-          return turn * Vector3d(vertices + 3 * std::size_t{from.vertex[from.corner[k][t]]}) +
-                 shift;
-        };
+        Vector3d x[kWidth];
+        for (std::uint32_t v = 0; v < from.vertices; ++v)
+          x[v] = turn * Vector3d(vertices + 3 * std::size_t{from.vertex[v]}) + shift;
         for (std::uint32_t t = 0; t < from.triangles; ++t)
-          add_triangle(of_b, place(0, t), place(1, t), place(2, t));
+          add_triangle(of_b, x[from.corner[0][t]], x[from.corner[1][t]], x[from.corner[2][t]]);
         continue;
       }
       const BoxBlock& boxes = at<BoxBlock>(asset, mesh.level[level].blocks)[block];
