@@ -118,43 +118,59 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return out;
   }
 
-  /// Cuts a triangle into three by a plane, and keeps one. If the plane does not cut it, it is the
-  /// first, and the others do not exist (false).
-  IST_HD static bool keep_piece(int plane, int piece, Corner (&at)[3]) noexcept {
-    const int bit = 1 << plane;
-    if ((((at[0].octant ^ at[1].octant) | (at[0].octant ^ at[2].octant)) & bit) == 0)
-      return piece == 0;
-    // One corner is alone on its side.
-    const int alone = ((at[1].octant ^ at[2].octant) & bit) == 0   ? 0
-                      : ((at[0].octant ^ at[2].octant) & bit) == 0 ? 1
-                                                                   : 2;
-    const Corner lone = at[alone], next = at[(alone + 1) % 3], other = at[(alone + 2) % 3];
-    Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
-    if (piece != 0) {
-      to_next.octant ^= bit;
-      to_other.octant ^= bit;
+  /// A triangle that a plane cuts into three pieces.
+  struct Cut {
+    int bit, alone;  ///< the corner that is alone on its side
+    const Corner &lone, &next, &other;
+    Corner to_next, to_other;  ///< where the plane cuts, on the side of `lone`
+
+    IST_HD static bool is_one(const Corner (&at)[3], int bit) noexcept {
+      return (((at[0].octant ^ at[1].octant) | (at[0].octant ^ at[2].octant)) & bit) == 0;
     }
-    at[0] = piece == 0 ? lone : to_next;
-    at[1] = piece == 0 ? to_next : piece == 1 ? next : other;
-    at[2] = piece == 1 ? other : to_other;
-    return true;
-  }
+    IST_HD Cut(const Corner (&at)[3], int plane) noexcept
+        : bit(1 << plane),
+          alone(((at[1].octant ^ at[2].octant) & bit) == 0   ? 0
+                : ((at[0].octant ^ at[2].octant) & bit) == 0 ? 1
+                                                             : 2),
+          lone(at[alone]),
+          next(at[(alone + 1) % 3]),
+          other(at[(alone + 2) % 3]),
+          to_next(between(lone, next, plane)),
+          to_other(between(lone, other, plane)) {}
+    /// Writes one of the three to another place.
+    IST_HD void piece(int number, Corner (&out)[3]) const noexcept {
+      Corner on[2] = {to_next, to_other};
+      for (Corner& x : on) x.octant ^= number == 0 ? 0 : bit;
+      out[0] = number == 0 ? lone : on[0];
+      out[1] = number == 0 ? on[0] : number == 1 ? next : other;
+      out[2] = number == 1 ? other : on[1];
+    }
+  };
   IST_HD static exact::OctantTerms terms_of(bool of_b, double times,
                                             const Corner (&at)[3]) noexcept {
     return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, at[0].point(), at[1].point(),
                                at[2].point());
   }
 
-  /// Adds a triangle piece by piece. No plane before `plane` cuts it.
+  /// Adds a triangle piece by piece. No plane before `kPlane` cuts it.
+  template <int kPlane = 0>
   IST_HD_COLD static void add_pieces_of(OctantSums* octants, bool of_b, double times,
-                                        const Corner (&at)[3], int plane = 0) noexcept {
-    if (plane == 3 || (at[0].octant == at[1].octant && at[0].octant == at[2].octant)) {
+                                        const Corner (&at)[3]) noexcept {
+    if (Cut::is_one(at, 7)) {
       octants::add(octants[at[0].octant], of_b, terms_of(of_b, times, at));
       return;
     }
-    for (int piece = 0; piece < 3; ++piece) {
-      Corner kept[3] = {at[0], at[1], at[2]};
-      if (keep_piece(plane, piece, kept)) add_pieces_of(octants, of_b, times, kept, plane + 1);
+    if constexpr (kPlane < 3) {
+      if (Cut::is_one(at, 1 << kPlane)) {
+        add_pieces_of<kPlane + 1>(octants, of_b, times, at);
+        return;
+      }
+      const Cut cut(at, kPlane);
+      for (int number = 0; number < 3; ++number) {
+        Corner piece[3];
+        cut.piece(number, piece);
+        add_pieces_of<kPlane + 1>(octants, of_b, times, piece);
+      }
     }
   }
   /// The same by a team, whose lanes compute the pieces.
@@ -162,7 +178,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
                       const Corner (&at)[3]) noexcept {
     CutPieces& cut = pieces().cut;
     for (std::uint32_t p = lane(); p < CutPieces::kCount; p += width())
-      find_piece(static_cast<int>(p), of_b, times, at, cut);
+      find_piece(p, of_b, times, at, cut);
     meet();
     for (std::uint32_t n = lane(); n < OctantSums::kNumbers; n += width())
       for (std::uint32_t p = 0; p < CutPieces::kCount; ++p)
@@ -171,13 +187,21 @@ class OverlapOctants : public OverlapParts<Overlap> {
                               [&](std::uint32_t k) { return cut.term[p][k]; });
     meet();
   }
-  IST_HD_COLD static void find_piece(int p, bool of_b, double times, const Corner (&at)[3],
-                                     CutPieces& cut) noexcept {
+  IST_HD_COLD static void find_piece(std::uint32_t p, bool of_b, double times,
+                                     const Corner (&at)[3], CutPieces& cut) noexcept {
     Corner kept[3] = {at[0], at[1], at[2]};
-    const bool exists =
-        keep_piece(0, p / 9, kept) && keep_piece(1, p / 3 % 3, kept) && keep_piece(2, p % 3, kept);
-    cut.octant[p] = static_cast<std::int8_t>(exists ? kept[0].octant : -1);
-    if (!exists) return;
+    cut.octant[p] = -1;
+    std::uint32_t digits = p, unit = CutPieces::kCount / 3;
+    for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
+      if (Cut::is_one(kept, 1 << plane)) {
+        if (digits / unit != 0) return;  // the only piece is the first
+        continue;
+      }
+      Corner piece[3];
+      Cut(kept, plane).piece(static_cast<int>(digits / unit), piece);
+      for (int k = 0; k < 3; ++k) kept[k] = piece[k];
+    }
+    cut.octant[p] = static_cast<std::int8_t>(kept[0].octant);
     const exact::OctantTerms terms = terms_of(of_b, times, kept);
     for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[p][n] = octants::term(terms, n);
   }
@@ -328,7 +352,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
   }
 
   /// Adds eight triangles of block b, which is crossed and has record r, or is inside as a whole
-  /// and has none (kNoIndex).
+  /// and has none (kNoIndex): then its vertices are seen.
   IST_HD void sum_triangles(int side, std::uint32_t b, std::uint32_t r,
                             std::uint32_t first) noexcept {
     const MeshBlock& block = mesh(side).blocks[b];
@@ -338,17 +362,14 @@ class OverlapOctants : public OverlapParts<Overlap> {
     for (std::uint32_t l = lane(); l < count; l += width()) {
       const std::uint32_t t = first + l;
       const int whole = r == kNoIndex ? 1 : pieces().whole[t];
-      if (!look(l, whole == 0      ? kNoIndex
-                   : r == kNoIndex ? this->block_element(side, b)
-                                   : this->triangle_element(r, t)))
-        continue;
+      if (r != kNoIndex && !look(l, whole == 0 ? kNoIndex : this->triangle_element(r, t))) continue;
       any = true;
       // Corners of a crossed block's triangle start at the apex.
       const std::uint32_t apex = r == kNoIndex ? 0 : this->opposite_edge(r, t) + 2;
       Point at[3];
       for (std::uint32_t k = 0; k < 3; ++k) {
         const std::uint32_t v = block.corner[(apex + k) % 3][t];
-        at[k] = see(r == kNoIndex ? this->vertex(side, block.vertex[v]) : this->at(r, v), k, l);
+        at[k] = r == kNoIndex ? see_again(v, k, l) : see(this->at(r, v), k, l);
       }
       const exact::OctantTerms terms =
           exact::octant_terms(0.5 * whole, (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
@@ -375,6 +396,14 @@ class OverlapOctants : public OverlapParts<Overlap> {
     seen.octant[c][l] = static_cast<std::uint8_t>(octant);
     return from;
   }
+  /// The same of a seen vertex.
+  IST_HD Point see_again(std::uint32_t vertex, std::uint32_t c, std::uint32_t l) noexcept {
+    OctantPieces& seen = pieces().octants;
+    const std::uint32_t of = kVertices + vertex / 8, in = vertex % 8;
+    for (int k = 0; k < 3; ++k) seen.at[c][k][l] = seen.at[of][k][in];
+    seen.octant[c][l] = seen.octant[of][in];
+    return {seen.at[of][0][in], seen.at[of][1][in], seen.at[of][2][in]};
+  }
   IST_HD Corner seen_corner(int c, std::uint32_t l, int planes) noexcept {
     const OctantPieces& seen = pieces().octants;
     return {{seen.at[c][0][l], seen.at[c][1][l], seen.at[c][2][l]}, seen.octant[c][l] & planes};
@@ -386,13 +415,15 @@ class OverlapOctants : public OverlapParts<Overlap> {
     const std::uint32_t slot = slot_of(this->block_element(side, b));
     if (slot == kNoIndex) return;
     OctantSums* const octants = &memory().octant_sums[8 * slot];
+    for (std::uint32_t l = lane(); l < 8; l += width()) look(l, this->block_element(side, b));
+    meet();
     int all = 7, some = 0;
     for (std::uint32_t v = lane(); v < block.vertices; v += width()) {
-      const Point from = in_axes(this->vertex(side, block.vertex[v]) - octants->centre);
-      const int octant = (from.x >= 0 ? 1 : 0) | (from.y >= 0 ? 2 : 0) | (from.z >= 0 ? 4 : 0);
-      all &= octant;
-      some |= octant;
+      see(this->vertex(side, block.vertex[v]), kVertices + v / 8, v % 8);
+      all &= pieces().octants.octant[kVertices + v / 8][v % 8];
+      some |= pieces().octants.octant[kVertices + v / 8][v % 8];
     }
+    meet();
     bool is_cut = false;
     int in = 0;
     for (int bit = 1; bit < 8; bit *= 2) {
@@ -458,6 +489,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return count;
   }
 
+  static constexpr std::uint32_t kVertices = 3;  ///< a block's vertices are seen as corners from it
   Point axis_[3] = {};
 };
 
