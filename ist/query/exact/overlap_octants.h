@@ -122,55 +122,61 @@ class OverlapOctants : public OverlapParts<Overlap> {
   struct Cut {
     int bit, alone;  ///< the corner that is alone on its side
     const Corner &lone, &next, &other;
-    Corner to_next, to_other;  ///< where the plane cuts, on the side of `lone`
+    Corner to_next[2], to_other[2];  ///< where the plane cuts, on the side of `lone` and beyond
 
-    IST_HD static bool is_one(const Corner (&at)[3], int bit) noexcept {
-      return (((at[0].octant ^ at[1].octant) | (at[0].octant ^ at[2].octant)) & bit) == 0;
-    }
-    IST_HD Cut(const Corner (&at)[3], int plane) noexcept
+    IST_HD Cut(const Corner& p, const Corner& q, const Corner& r, int plane) noexcept
         : bit(1 << plane),
-          alone(((at[1].octant ^ at[2].octant) & bit) == 0   ? 0
-                : ((at[0].octant ^ at[2].octant) & bit) == 0 ? 1
-                                                             : 2),
-          lone(at[alone]),
-          next(at[(alone + 1) % 3]),
-          other(at[(alone + 2) % 3]),
-          to_next(between(lone, next, plane)),
-          to_other(between(lone, other, plane)) {}
-    /// Writes one of the three to another place.
-    IST_HD void piece(int number, Corner (&out)[3]) const noexcept {
-      Corner on[2] = {to_next, to_other};
-      for (Corner& x : on) x.octant ^= number == 0 ? 0 : bit;
-      out[0] = number == 0 ? lone : on[0];
-      out[1] = number == 0 ? on[0] : number == 1 ? next : other;
-      out[2] = number == 1 ? other : on[1];
+          alone(((q.octant ^ r.octant) & bit) == 0   ? 0
+                : ((p.octant ^ r.octant) & bit) == 0 ? 1
+                                                     : 2),
+          lone(alone == 0   ? p
+               : alone == 1 ? q
+                            : r),
+          next(alone == 0   ? q
+               : alone == 1 ? r
+                            : p),
+          other(alone == 0   ? r
+                : alone == 1 ? p
+                             : q) {
+      to_next[0] = to_next[1] = between(lone, next, plane);
+      to_other[0] = to_other[1] = between(lone, other, plane);
+      to_next[1].octant ^= bit;
+      to_other[1].octant ^= bit;
+    }
+    IST_HD const Corner& corner(int piece, int k) const noexcept {
+      if (k == 0) return piece == 0 ? lone : to_next[1];
+      if (k == 1) return piece == 0 ? to_next[0] : piece == 1 ? next : other;
+      return piece == 0 ? to_other[0] : piece == 1 ? other : to_other[1];
     }
   };
-  IST_HD static exact::OctantTerms terms_of(bool of_b, double times,
-                                            const Corner (&at)[3]) noexcept {
-    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, at[0].point(), at[1].point(),
-                               at[2].point());
+  IST_HD static bool are_alike(const Corner& p, const Corner& q, const Corner& r,
+                               int bits) noexcept {
+    return (((p.octant ^ q.octant) | (p.octant ^ r.octant)) & bits) == 0;
+  }
+  IST_HD static exact::OctantTerms terms_of(bool of_b, double times, const Corner& p,
+                                            const Corner& q, const Corner& r) noexcept {
+    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(),
+                               r.point());
   }
 
   /// Adds a triangle piece by piece. No plane before `kPlane` cuts it.
   template <int kPlane = 0>
   IST_HD_COLD static void add_pieces_of(OctantSums* octants, bool of_b, double times,
-                                        const Corner (&at)[3]) noexcept {
-    if (Cut::is_one(at, 7)) {
-      octants::add(octants[at[0].octant], of_b, terms_of(of_b, times, at));
+                                        const Corner& p, const Corner& q,
+                                        const Corner& r) noexcept {
+    if (are_alike(p, q, r, 7)) {
+      octants::add(octants[p.octant], of_b, terms_of(of_b, times, p, q, r));
       return;
     }
     if constexpr (kPlane < 3) {
-      if (Cut::is_one(at, 1 << kPlane)) {
-        add_pieces_of<kPlane + 1>(octants, of_b, times, at);
+      if (are_alike(p, q, r, 1 << kPlane)) {
+        add_pieces_of<kPlane + 1>(octants, of_b, times, p, q, r);
         return;
       }
-      const Cut cut(at, kPlane);
-      for (int number = 0; number < 3; ++number) {
-        Corner piece[3];
-        cut.piece(number, piece);
-        add_pieces_of<kPlane + 1>(octants, of_b, times, piece);
-      }
+      const Cut cut(p, q, r, kPlane);
+      for (int piece = 0; piece < 3; ++piece)
+        add_pieces_of<kPlane + 1>(octants, of_b, times, cut.corner(piece, 0), cut.corner(piece, 1),
+                                  cut.corner(piece, 2));
     }
   }
   /// The same by a team, whose lanes compute the pieces.
@@ -193,16 +199,18 @@ class OverlapOctants : public OverlapParts<Overlap> {
     cut.octant[p] = -1;
     std::uint32_t digits = p, unit = CutPieces::kCount / 3;
     for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
-      if (Cut::is_one(kept, 1 << plane)) {
-        if (digits / unit != 0) return;  // the only piece is the first
+      const auto piece = static_cast<int>(digits / unit);
+      if (are_alike(kept[0], kept[1], kept[2], 1 << plane)) {
+        if (piece != 0) return;  // the first is all of it
         continue;
       }
-      Corner piece[3];
-      Cut(kept, plane).piece(static_cast<int>(digits / unit), piece);
-      for (int k = 0; k < 3; ++k) kept[k] = piece[k];
+      const Cut by_plane(kept[0], kept[1], kept[2], plane);
+      const Corner next[3] = {by_plane.corner(piece, 0), by_plane.corner(piece, 1),
+                              by_plane.corner(piece, 2)};
+      for (int k = 0; k < 3; ++k) kept[k] = next[k];
     }
     cut.octant[p] = static_cast<std::int8_t>(kept[0].octant);
-    const exact::OctantTerms terms = terms_of(of_b, times, kept);
+    const exact::OctantTerms terms = terms_of(of_b, times, kept[0], kept[1], kept[2]);
     for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[p][n] = octants::term(terms, n);
   }
 
@@ -256,7 +264,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
         octants::add_number(octants[at[0].octant], n, of_b,
                             [&](std::uint32_t k) { return seen.term[t][k][l]; });
     else if constexpr (Parts::width() == 1)
-      add_pieces_of(octants, of_b, seen.times[t][l], at);
+      add_pieces_of(octants, of_b, seen.times[t][l], at[0], at[1], at[2]);
     else
       add_cut(octants, of_b, seen.times[t][l], at);
   }
