@@ -226,8 +226,8 @@ class OverlapRef {
     return lane_sums_at(side, 1, b, origin_ + from);
   }
 
-  IST_HD void find_crossing_terms(std::uint32_t first) {
-    for_each_lane([&](std::uint32_t l) {
+  IST_HD void find_crossing_terms(std::uint32_t first, std::uint32_t count = 8) {
+    for_each_lane(count, [&](std::uint32_t l) {
       exact::PieceTerms terms = {};
       if (const std::uint32_t i = first + l; i < crossings_) {
         const CrossingRef& of = crossing(i);
@@ -247,9 +247,9 @@ class OverlapRef {
       pieces_.whole[t] = static_cast<std::int8_t>(t < block.triangles ? whole_of(r, t) : 0);
     meet();
   }
-  IST_HD void find_triangle_terms(std::uint32_t r, std::uint32_t h) {
+  IST_HD void find_triangle_terms(std::uint32_t r, std::uint32_t h, std::uint32_t count = 8) {
     const MeshBlock& block = mesh(side_of(r)).blocks[number_of(r)];
-    for_each_lane([&](std::uint32_t l) {
+    for_each_lane(count, [&](std::uint32_t l) {
       exact::PieceTerms terms = {};
       if (const std::uint32_t t = 8 * h + l; t < block.triangles) {
         const std::uint32_t apex = (opposite_edge(r, t) + 2) % 3;
@@ -261,20 +261,21 @@ class OverlapRef {
     });
   }
   IST_HD void find_octant_pieces(std::uint32_t first) {
-    for_each_lane([&](std::uint32_t l) {
+    for_each_lane(8, [&](std::uint32_t l) {
       if (first + l < crossings_) see_octants(first + l, l);
     });
   }
 
  private:
-  /// Calls work(l) for the eight lanes of pieces.
+  /// Calls work(l) for `count` pieces.
   template <class Work>
-  IST_HD void for_each_lane(const Work& work) {
-    for (std::uint32_t l = lane(); l < 8; l += width()) work(l);
+  IST_HD void for_each_lane(std::uint32_t count, const Work& work) {
+    for (std::uint32_t l = lane(); l < count; l += width()) work(l);
     meet();
   }
-  IST_HD void put(const exact::PieceTerms& terms, int volumes, std::uint32_t l) {
-    ExactTerms& out = pieces_.terms;
+  IST_HD void put(const exact::PieceTerms& terms, int volumes, std::uint32_t of) {
+    ExactTerms& out = pieces_.more_terms[of / 8];
+    const std::uint32_t l = of % 8;
     for (int k = 0; k < volumes; ++k) out.six_volumes[k][l] = terms.six_volumes[k];
     out.rounding[l] = terms.rounding;
     for (int k = 0; k < 3; ++k) {
@@ -395,20 +396,20 @@ class OverlapRef {
   IST_HD void sum_whole() {
     if (leads()) *slots_ = SlotSums();
     meet();
-    for (std::uint32_t first = 0; first < crossings_; first += 8) {
-      find_crossing_terms(first);
-      for (std::uint32_t l = lane(); l < 8; l += width()) slots_->add_crossing(pieces_.terms, l);
+    for (std::uint32_t first = 0; first < crossings_; first += 32) {
+      find_crossing_terms(first, 32);
+      for (std::uint32_t l = lane(); l < 8; l += width())
+        for (std::uint32_t eight = 0; eight < 4 && first + 8 * eight < crossings_; ++eight)
+          slots_->add_crossing(pieces_.more_terms[eight], l);
       meet();
     }
     for (int side = 0; side < 2; ++side) {
       for_each_pierced(side, [&](std::uint32_t b) {
         count_triangles(record_of(side, b));
-        for (std::uint32_t h = 0; h < 2; ++h) {
-          find_triangle_terms(record_of(side, b), h);
-          for (std::uint32_t l = lane(); l < 8; l += width())
-            slots_->add_triangle(pieces_.terms, l);
-          meet();
-        }
+        find_triangle_terms(record_of(side, b), 0, kWidth);
+        for (std::uint32_t l = lane(); l < 8; l += width())
+          for (int h = 0; h < 2; ++h) slots_->add_triangle(pieces_.more_terms[h], l);
+        meet();
       });
       if (leads()) add_insides(side);
     }

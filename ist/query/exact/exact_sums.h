@@ -146,6 +146,7 @@ struct CutPieces {
 struct PieceMemory {
   union {
     ExactTerms terms;
+    ExactTerms more_terms[4];  ///< of 32 pieces
     OctantPieces octants;
   };
   OctantView view;

@@ -185,7 +185,8 @@ class OverlapJoins : public Overlap {
 
   /// Names the ends of segments, lists them by their edges, and empties the table of join_curves().
   IST_HD void list_ends() noexcept {
-    for (std::uint32_t i = lane(); i <= curve_mask(); i += width()) memory().keys[i] = 0;
+    const std::uint32_t mask = curve_mask();
+    for (std::uint32_t i = lane(); i <= mask; i += width()) memory().keys[i] = 0;
     for (std::uint32_t i = lane(); i < 2 * this->crossings(); i += width()) {
       const CrossingEnd end = this->end_of(i / 2, static_cast<int>(i % 2));
       const int side = end.of_b ? 1 : 0;
@@ -319,12 +320,15 @@ class OverlapJoins : public Overlap {
   /// nothing.
   IST_HD std::uint32_t join_edge(std::uint32_t r, std::uint32_t edge,
                                  std::uint32_t first) noexcept {
+    // The ends of edges are sorted where those of curves were, each lane's in a place of its own.
+    PiercedEnd* ends = memory().ends;
     std::uint32_t count = 0;
-    for (std::uint32_t i = first; i != kNoIndex; ++count)
-      i = static_cast<std::uint32_t>(memory().other_keys[i]);
-    // The ends of edges are sorted where those of curves were.
-    PiercedEnd* const ends = memory().ends + this->add(pieces().taken, count);
-    count = 0;
+    if (width() > 1) {
+      for (std::uint32_t i = first; i != kNoIndex; ++count)
+        i = static_cast<std::uint32_t>(memory().other_keys[i]);
+      ends += this->add(pieces().taken, count);
+      count = 0;
+    }
     for (std::uint32_t i = first; i != kNoIndex;) {
       const std::uint64_t next = memory().other_keys[i];
       ends[count++] = {next, this->way_of(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};

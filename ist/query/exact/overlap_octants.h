@@ -118,43 +118,65 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return out;
   }
 
-  /// Cuts a triangle into three by a plane, and keeps one. If the plane does not cut it, it is the
-  /// first, and the others do not exist (false).
-  IST_HD static bool keep_piece(int plane, int piece, Corner (&at)[3]) noexcept {
-    const int bit = 1 << plane;
-    if ((((at[0].octant ^ at[1].octant) | (at[0].octant ^ at[2].octant)) & bit) == 0)
-      return piece == 0;
-    // One corner is alone on its side.
-    const int alone = ((at[1].octant ^ at[2].octant) & bit) == 0   ? 0
-                      : ((at[0].octant ^ at[2].octant) & bit) == 0 ? 1
-                                                                   : 2;
-    const Corner lone = at[alone], next = at[(alone + 1) % 3], other = at[(alone + 2) % 3];
-    Corner to_next = between(lone, next, plane), to_other = between(lone, other, plane);
-    if (piece != 0) {
-      to_next.octant ^= bit;
-      to_other.octant ^= bit;
+  /// A triangle that a plane cuts into three pieces.
+  struct Cut {
+    int bit, alone;  ///< the corner that is alone on its side
+    const Corner &lone, &next, &other;
+    Corner to_next[2], to_other[2];  ///< where the plane cuts, on the side of `lone` and beyond
+
+    IST_HD Cut(const Corner& p, const Corner& q, const Corner& r, int plane) noexcept
+        : bit(1 << plane),
+          alone(((q.octant ^ r.octant) & bit) == 0   ? 0
+                : ((p.octant ^ r.octant) & bit) == 0 ? 1
+                                                     : 2),
+          lone(alone == 0   ? p
+               : alone == 1 ? q
+                            : r),
+          next(alone == 0   ? q
+               : alone == 1 ? r
+                            : p),
+          other(alone == 0   ? r
+                : alone == 1 ? p
+                             : q) {
+      to_next[0] = to_next[1] = between(lone, next, plane);
+      to_other[0] = to_other[1] = between(lone, other, plane);
+      to_next[1].octant ^= bit;
+      to_other[1].octant ^= bit;
     }
-    at[0] = piece == 0 ? lone : to_next;
-    at[1] = piece == 0 ? to_next : piece == 1 ? next : other;
-    at[2] = piece == 1 ? other : to_other;
-    return true;
+    IST_HD const Corner& corner(int piece, int k) const noexcept {
+      if (k == 0) return piece == 0 ? lone : to_next[1];
+      if (k == 1) return piece == 0 ? to_next[0] : piece == 1 ? next : other;
+      return piece == 0 ? to_other[0] : piece == 1 ? other : to_other[1];
+    }
+  };
+  IST_HD static bool are_alike(const Corner& p, const Corner& q, const Corner& r,
+                               int bits) noexcept {
+    return (((p.octant ^ q.octant) | (p.octant ^ r.octant)) & bits) == 0;
   }
-  IST_HD static exact::OctantTerms terms_of(bool of_b, double times,
-                                            const Corner (&at)[3]) noexcept {
-    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, at[0].point(), at[1].point(),
-                               at[2].point());
+  IST_HD static exact::OctantTerms terms_of(bool of_b, double times, const Corner& p,
+                                            const Corner& q, const Corner& r) noexcept {
+    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(),
+                               r.point());
   }
 
-  /// Adds a triangle piece by piece. No plane before `plane` cuts it.
+  /// Adds a triangle piece by piece. No plane before `kPlane` cuts it.
+  template <int kPlane = 0>
   IST_HD_COLD static void add_pieces_of(OctantSums* octants, bool of_b, double times,
-                                        const Corner (&at)[3], int plane = 0) noexcept {
-    if (plane == 3 || (at[0].octant == at[1].octant && at[0].octant == at[2].octant)) {
-      octants::add(octants[at[0].octant], of_b, terms_of(of_b, times, at));
+                                        const Corner& p, const Corner& q,
+                                        const Corner& r) noexcept {
+    if (are_alike(p, q, r, 7)) {
+      octants::add(octants[p.octant], of_b, terms_of(of_b, times, p, q, r));
       return;
     }
-    for (int piece = 0; piece < 3; ++piece) {
-      Corner kept[3] = {at[0], at[1], at[2]};
-      if (keep_piece(plane, piece, kept)) add_pieces_of(octants, of_b, times, kept, plane + 1);
+    if constexpr (kPlane < 3) {
+      if (are_alike(p, q, r, 1 << kPlane)) {
+        add_pieces_of<kPlane + 1>(octants, of_b, times, p, q, r);
+        return;
+      }
+      const Cut cut(p, q, r, kPlane);
+      for (int piece = 0; piece < 3; ++piece)
+        add_pieces_of<kPlane + 1>(octants, of_b, times, cut.corner(piece, 0), cut.corner(piece, 1),
+                                  cut.corner(piece, 2));
     }
   }
   /// The same by a team, whose lanes compute the pieces.
@@ -162,7 +184,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
                       const Corner (&at)[3]) noexcept {
     CutPieces& cut = pieces().cut;
     for (std::uint32_t p = lane(); p < CutPieces::kCount; p += width())
-      find_piece(static_cast<int>(p), of_b, times, at, cut);
+      find_piece(p, of_b, times, at, cut);
     meet();
     for (std::uint32_t n = lane(); n < OctantSums::kNumbers; n += width())
       for (std::uint32_t p = 0; p < CutPieces::kCount; ++p)
@@ -171,14 +193,24 @@ class OverlapOctants : public OverlapParts<Overlap> {
                               [&](std::uint32_t k) { return cut.term[p][k]; });
     meet();
   }
-  IST_HD_COLD static void find_piece(int p, bool of_b, double times, const Corner (&at)[3],
-                                     CutPieces& cut) noexcept {
+  IST_HD_COLD static void find_piece(std::uint32_t p, bool of_b, double times,
+                                     const Corner (&at)[3], CutPieces& cut) noexcept {
     Corner kept[3] = {at[0], at[1], at[2]};
-    const bool exists =
-        keep_piece(0, p / 9, kept) && keep_piece(1, p / 3 % 3, kept) && keep_piece(2, p % 3, kept);
-    cut.octant[p] = static_cast<std::int8_t>(exists ? kept[0].octant : -1);
-    if (!exists) return;
-    const exact::OctantTerms terms = terms_of(of_b, times, kept);
+    cut.octant[p] = -1;
+    std::uint32_t digits = p, unit = CutPieces::kCount / 3;
+    for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
+      const auto piece = static_cast<int>(digits / unit);
+      if (are_alike(kept[0], kept[1], kept[2], 1 << plane)) {
+        if (piece != 0) return;  // the first is all of it
+        continue;
+      }
+      const Cut by_plane(kept[0], kept[1], kept[2], plane);
+      const Corner next[3] = {by_plane.corner(piece, 0), by_plane.corner(piece, 1),
+                              by_plane.corner(piece, 2)};
+      for (int k = 0; k < 3; ++k) kept[k] = next[k];
+    }
+    cut.octant[p] = static_cast<std::int8_t>(kept[0].octant);
+    const exact::OctantTerms terms = terms_of(of_b, times, kept[0], kept[1], kept[2]);
     for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[p][n] = octants::term(terms, n);
   }
 
@@ -232,7 +264,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
         octants::add_number(octants[at[0].octant], n, of_b,
                             [&](std::uint32_t k) { return seen.term[t][k][l]; });
     else if constexpr (Parts::width() == 1)
-      add_pieces_of(octants, of_b, seen.times[t][l], at);
+      add_pieces_of(octants, of_b, seen.times[t][l], at[0], at[1], at[2]);
     else
       add_cut(octants, of_b, seen.times[t][l], at);
   }
@@ -328,7 +360,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
   }
 
   /// Adds eight triangles of block b, which is crossed and has record r, or is inside as a whole
-  /// and has none (kNoIndex).
+  /// and has none (kNoIndex): then its vertices are seen.
   IST_HD void sum_triangles(int side, std::uint32_t b, std::uint32_t r,
                             std::uint32_t first) noexcept {
     const MeshBlock& block = mesh(side).blocks[b];
@@ -338,17 +370,14 @@ class OverlapOctants : public OverlapParts<Overlap> {
     for (std::uint32_t l = lane(); l < count; l += width()) {
       const std::uint32_t t = first + l;
       const int whole = r == kNoIndex ? 1 : pieces().whole[t];
-      if (!look(l, whole == 0      ? kNoIndex
-                   : r == kNoIndex ? this->block_element(side, b)
-                                   : this->triangle_element(r, t)))
-        continue;
+      if (r != kNoIndex && !look(l, whole == 0 ? kNoIndex : this->triangle_element(r, t))) continue;
       any = true;
       // Corners of a crossed block's triangle start at the apex.
       const std::uint32_t apex = r == kNoIndex ? 0 : this->opposite_edge(r, t) + 2;
       Point at[3];
       for (std::uint32_t k = 0; k < 3; ++k) {
         const std::uint32_t v = block.corner[(apex + k) % 3][t];
-        at[k] = see(r == kNoIndex ? this->vertex(side, block.vertex[v]) : this->at(r, v), k, l);
+        at[k] = r == kNoIndex ? see_again(v, k, l) : see(this->at(r, v), k, l);
       }
       const exact::OctantTerms terms =
           exact::octant_terms(0.5 * whole, (side == 1 ? 0.5 : -0.5) / 3, at[0], at[1], at[2]);
@@ -375,6 +404,14 @@ class OverlapOctants : public OverlapParts<Overlap> {
     seen.octant[c][l] = static_cast<std::uint8_t>(octant);
     return from;
   }
+  /// The same of a seen vertex.
+  IST_HD Point see_again(std::uint32_t vertex, std::uint32_t c, std::uint32_t l) noexcept {
+    OctantPieces& seen = pieces().octants;
+    const std::uint32_t of = kVertices + vertex / 8, in = vertex % 8;
+    for (int k = 0; k < 3; ++k) seen.at[c][k][l] = seen.at[of][k][in];
+    seen.octant[c][l] = seen.octant[of][in];
+    return {seen.at[of][0][in], seen.at[of][1][in], seen.at[of][2][in]};
+  }
   IST_HD Corner seen_corner(int c, std::uint32_t l, int planes) noexcept {
     const OctantPieces& seen = pieces().octants;
     return {{seen.at[c][0][l], seen.at[c][1][l], seen.at[c][2][l]}, seen.octant[c][l] & planes};
@@ -386,13 +423,15 @@ class OverlapOctants : public OverlapParts<Overlap> {
     const std::uint32_t slot = slot_of(this->block_element(side, b));
     if (slot == kNoIndex) return;
     OctantSums* const octants = &memory().octant_sums[8 * slot];
+    for (std::uint32_t l = lane(); l < 8; l += width()) look(l, this->block_element(side, b));
+    meet();
     int all = 7, some = 0;
     for (std::uint32_t v = lane(); v < block.vertices; v += width()) {
-      const Point from = in_axes(this->vertex(side, block.vertex[v]) - octants->centre);
-      const int octant = (from.x >= 0 ? 1 : 0) | (from.y >= 0 ? 2 : 0) | (from.z >= 0 ? 4 : 0);
-      all &= octant;
-      some |= octant;
+      see(this->vertex(side, block.vertex[v]), kVertices + v / 8, v % 8);
+      all &= pieces().octants.octant[kVertices + v / 8][v % 8];
+      some |= pieces().octants.octant[kVertices + v / 8][v % 8];
     }
+    meet();
     bool is_cut = false;
     int in = 0;
     for (int bit = 1; bit < 8; bit *= 2) {
@@ -458,6 +497,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
     return count;
   }
 
+  static constexpr std::uint32_t kVertices = 3;  ///< a block's vertices are seen as corners from it
   Point axis_[3] = {};
 };
 
