@@ -121,7 +121,11 @@ class OverlapJoins : public Overlap {
     return element;
   }
 
-  /// The same without changing any links.
+  IST_HD bool is_root(std::uint32_t element) const noexcept {
+    return load(memory().parent[element]) == element;
+  }
+
+  /// root() without changing any links.
   IST_HD std::uint32_t top(std::uint32_t element) const noexcept {
     const std::uint32_t* const parent = memory().parent;
     while (parent[element] != element) element = parent[element];
@@ -235,7 +239,7 @@ class OverlapJoins : public Overlap {
     CurveExtent* const curves = memory().curves;
     const std::uint32_t count = this->crossings();
     for (std::uint32_t i = lane(); i < count; i += width())
-      if (root(i) == i) curves[i].triangle = this->triangle(side, i);
+      if (is_root(i)) curves[i].triangle = this->triangle(side, i);
     meet();
     for (std::uint32_t i = lane(); i < count; i += width())
       if (const std::uint32_t first = root(i);
@@ -244,7 +248,7 @@ class OverlapJoins : public Overlap {
     meet();
     bool alone = false;
     for (std::uint32_t i = lane(); i < count; i += width())
-      alone = alone || (root(i) == i && load(curves[i].triangle) != kNoIndex);
+      alone = alone || (is_root(i) && load(curves[i].triangle) != kNoIndex);
     if (!this->any(alone)) return;
     if (leads()) join_holes_of(side, count);
     meet();

@@ -62,10 +62,10 @@ class OverlapParts : public OverlapJoins<Overlap> {
     for (std::uint32_t first = 0; !one_ && first < n; first += width()) {
       const std::uint32_t i = first + lane();
       int total = 0;
-      const bool is_root = i < n && load(memory().parent[i]) == i;
+      const bool starts = i < n && this->is_root(i);
       const std::uint32_t number =
-          parts_ + static_cast<std::uint32_t>(this->exclusive_count(is_root, total));
-      if (is_root) {
+          parts_ + static_cast<std::uint32_t>(this->exclusive_count(starts, total));
+      if (starts) {
         memory().part[i] = number < last ? number : last;
         if (number <= last) memory().parts[number] = {};
         if (number <= last) memory().parts[number].kept = number;
@@ -192,17 +192,18 @@ class OverlapParts : public OverlapJoins<Overlap> {
   }
 
   /// Adds the terms of eight pieces to their parts in order. Each lane adds one of the numbers.
-  IST_HD void add_terms(std::uint32_t count, int volumes) noexcept {
+  template <int kVolumes>
+  IST_HD void add_terms(std::uint32_t count) noexcept {
     const ExactTerms& terms = pieces().terms;
+    constexpr std::uint32_t kNumbers =
+        kVolumes == 1 ? 3 : 9;  // the moment, or also force and torque
     for (std::uint32_t l = 0; l < count; ++l) {
       if (pieces().part[l] == kNoIndex) continue;
       ExactSums& sums = memory().parts[pieces().part[l]].sums;
-      for (std::uint32_t k = lane(); k < (volumes == 1 ? 4u : 10u); k += width()) {
-        if (k > 0)
-          (&sums.moment.x)[k - 1] += (&terms.moment[0][0])[8 * (k - 1) + l];
-        else
-          for (int v = 0; v < volumes; ++v) sums.six_volumes.add(terms.six_volumes[v][l]);
-      }
+      if (leads())
+        for (int v = 0; v < kVolumes; ++v) sums.six_volumes.add(terms.six_volumes[v][l]);
+      for (std::uint32_t k = (lane() + width() - 1) % width(); k < kNumbers; k += width())
+        (&sums.moment.x)[k] += (&terms.moment[0][0])[8 * k + l];
     }
     meet();
   }
@@ -212,7 +213,7 @@ class OverlapParts : public OverlapJoins<Overlap> {
       const std::uint32_t left = this->crossings() - first, count = left < 8 ? left : 8;
       this->find_crossing_terms(first);
       find_parts(count, [&](std::uint32_t l) { return first + l; });
-      add_terms(count, 3);
+      add_terms<3>(count);
     }
     for (int side = 0; side < 2; ++side) {
       this->for_each_pierced(side, [&](std::uint32_t b) {
@@ -224,7 +225,7 @@ class OverlapParts : public OverlapJoins<Overlap> {
           find_parts(count, [&](std::uint32_t l) {
             return pieces().whole[8 * h + l] == 0 ? kNoIndex : triangle_element(r, 8 * h + l);
           });
-          add_terms(count, 1);
+          add_terms<1>(count);
         }
       });
       std::uint32_t count = 0;
@@ -243,7 +244,7 @@ class OverlapParts : public OverlapJoins<Overlap> {
       for (int k = 0; k < 3; ++k) pieces().terms.moment[k][l] = found.moment[k];
     }
     find_parts(count, [&](std::uint32_t l) { return block_element(side, pieces().block[l]); });
-    add_terms(count, 1);
+    add_terms<1>(count);
     count = 0;
   }
 
