@@ -15,13 +15,20 @@ target_link_libraries(ist_public INTERFACE Eigen3::Eigen)
 add_library(ist_internal INTERFACE)
 
 # ist_compile_together(target sources…): nine sources are one for the compiler, since half of its time
-# goes to headers and templates that all of them use. Sources that are compiled once an instruction set
-# stay alone; so do all where tools read how each is compiled, or a missing include is looked for.
+# goes to headers and templates that all of them use. On two cores all of a target's are one: that takes
+# a quarter less again, and there is nobody to share them out to. Sources that are compiled once an
+# instruction set stay alone; so do all where tools read how each is compiled, or a missing include is
+# looked for.
+cmake_host_system_information(RESULT ist_cores QUERY NUMBER_OF_LOGICAL_CORES)
 function(ist_compile_together target)
   if(CMAKE_DISABLE_PRECOMPILE_HEADERS OR CMAKE_EXPORT_COMPILE_COMMANDS)
     return()
   endif()
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 9)
+  set(sources 9)
+  if(ist_cores LESS_EQUAL 2)
+    set(sources 0)  # no limit
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE ${sources})
   foreach(source IN LISTS ARGN)
     file(STRINGS ${source} each_target REGEX "hwy/foreach_target" LIMIT_COUNT 1)
     if(each_target)

@@ -22,8 +22,8 @@ constexpr double kDeepOverlap = 0.225;
 constexpr double kStiffening = 0.42;
 // |force|³ / volume² over the depth is some hundreds for round contacts of the oracle's solids, and
 // more than 5,000 for faces, up to the last sphere that touches.
-constexpr double kRound = 1500;
-constexpr double kFlat = 4500;
+constexpr double kRoundedRatio = 1500;
+constexpr double kFlatRatio = 4500;
 
 /// [u] Scale of the layer in which a solid's matched spheres protrude and leave gaps: their mean
 /// radius, except for balls and the like, whose few large spheres fit better than that.
@@ -42,7 +42,7 @@ double skin_of(const PlacedAsset& a, const PlacedAsset& b) {
 /// 1 for contacts of flat faces, 0 for round ones. `depth`: over the skin.
 double flatness(double volume, double area, double depth) {
   const double ratio = area / volume;
-  return smooth_step((ratio * ratio * area / depth - kRound) / (kFlat - kRound));
+  return smooth_step((ratio * ratio * area / depth - kRoundedRatio) / (kFlatRatio - kRoundedRatio));
 }
 
 /// The share of volume and force that remains at a depth < kDeepOverlap, over the skin.

@@ -15,7 +15,7 @@ namespace {
 constexpr int kOnLine = kWindingPoints;  ///< points on a line along x
 constexpr std::size_t kLines = 128;      ///< whose points are summed in order, a block
 constexpr std::size_t kFewest = 16;      ///< blocks of volume samples
-constexpr std::size_t kMost = 512;       ///< the same, where the solid fills little of its box
+constexpr std::size_t kMostBlocks = 512;       ///< the same, where the solid fills little of its box
 constexpr double kEnough = 4096;         ///< samples in solid or winding number
 constexpr std::size_t kSurface = 8192;   ///< samples of a surface
 
@@ -73,7 +73,7 @@ std::vector<VolumeSums> sample_volumes(const Eigen::AlignedBox3d& bounds,
   };
   std::vector<VolumeSums> blocks;
   double met = 0;
-  while (blocks.size() < kMost && met < kEnough) {
+  while (blocks.size() < kMostBlocks && met < kEnough) {
     const std::size_t first = blocks.size(), last = std::max(kFewest, 2 * first);
     blocks.resize(last);
     std::vector<std::array<double, 2>> lines((last - first) * kLines);

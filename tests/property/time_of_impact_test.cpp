@@ -93,8 +93,8 @@ TEST(TimeOfImpact, OfASpinningRodAndAWall) {
 
 TEST(TimeOfImpact, OfPrimitives) {
   // A corner of the cube hits each of these at (h, 0, 0) when it has come so far.
-  const Eigen::Quaterniond corner_first =
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::Ones().normalized().eval(), Vector3d::UnitX());
+  const Eigen::Quaterniond corner_first(
+      Eigen::AngleAxisd(std::acos(std::sqrt(1.0 / 3)), Vector3d(0, 1, -1).normalized()));
   ImpactSettings settings;
   settings.tolerance = 1e-4;
   const Shape shapes[] = {BallShape{0.7}, CapsuleShape{0.7, 0.4}, CylinderShape{0.7, 0.4},

@@ -144,8 +144,8 @@ inline std::vector<BatchPair> grazing_pairs() {
   const Eigen::Quaterniond still = Eigen::Quaterniond::Identity(),
                            edge(Eigen::AngleAxisd(half, Eigen::Vector3d::UnitX())),
                            across(Eigen::AngleAxisd(half, Eigen::Vector3d::UnitY())),
-                           corner = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::Ones(),
-                                                                       Eigen::Vector3d::UnitZ());
+                           corner(Eigen::AngleAxisd(std::acos(std::sqrt(1.0 / 3)),
+                                                    Eigen::Vector3d(1, -1, 0).normalized()));
   for (const auto& [of_a, of_b] : {std::pair{still, still},
                                    {still, edge},
                                    {still, corner},

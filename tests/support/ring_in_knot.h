@@ -40,7 +40,7 @@ RingRun run_ring(double stiffness, double rate, double seconds, Ask ask) {
   ring.mass = 1;
   FreeBody body(
       ring, start,
-      Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), Eigen::Vector3d(0, 2, -1)));
+      Eigen::Quaterniond(Eigen::AngleAxisd(-std::atan2(2.0, -1.0), Eigen::Vector3d::UnitX())));
   RingRun run;
   double kinetic = 0, first = 0;
   for (int tick = 0; tick < seconds * rate; ++tick) {

@@ -116,6 +116,9 @@ TEST(Mjcf, SaysWhatIsWrongAndWhere) {
   expect("<worldbody><body><joint range='2 1'/></body></worldbody>", "the smaller first");
   expect("<worldbody><body name='a'/><body name='a'/></worldbody>", "duplicates the body");
   expect("<worldbody><body quat='0 0 0 0'/></worldbody>", "not all 0");
+  for (const char* turn : {"zaxis='0 0 0'", "axisangle='0 0 0 90'", "xyaxes='1 0 0 2 0 0'"})
+    expect("<worldbody><body " + std::string(turn) + "/></worldbody>",
+           "an axis of its rotation is 0, or both of xyaxes are parallel");
   expect("<asset><mesh name='m' file='a.stl'/><mesh name='m' file='b.stl'/></asset>",
          "duplicates the mesh \"m\"");
   expect("<worldbody><geom class='none'/></worldbody>", "its class \"none\" is not defined");

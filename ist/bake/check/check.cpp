@@ -18,7 +18,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-Vector3d vector(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
+Vector3d of_array(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
 
 Eigen::Matrix3d inertia(const AssetHeader& asset) {
   const double* m = asset.inertia;
@@ -77,7 +77,7 @@ std::vector<Invariant> sampled(const AssetHeader& asset, const CheckedSolid& sol
   Tally volume, mass;
   volume.add(points.off([](const Vector3d&) { return 1.0; }, asset.volume, asset.volume_error, 1),
              0);
-  const Vector3d centre = vector(asset.centre_of_mass);
+  const Vector3d centre = of_array(asset.centre_of_mass);
   const double reach = (solid.bounds().max() - centre)
                            .cwiseAbs()
                            .cwiseMax((solid.bounds().min() - centre).cwiseAbs())
@@ -139,10 +139,10 @@ std::vector<Invariant> check_mass(const AssetHeader& asset, const MeshMoments& m
 /// Box and ball contain the surface, and all places where the solid's surface may lie.
 std::vector<Invariant> check_bounds(const AssetHeader& asset, const CheckedMesh& checked) {
   const double unit = std::ldexp(1.0, asset.exponent);
-  const Vector3d origin = vector(asset.centre);
-  const Vector3d lower = (vector(asset.box_lower) - origin) / unit;
-  const Vector3d upper = (vector(asset.box_upper) - origin) / unit;
-  const Vector3d middle = (vector(asset.ball_centre) - origin) / unit;
+  const Vector3d origin = of_array(asset.centre);
+  const Vector3d lower = (of_array(asset.box_lower) - origin) / unit;
+  const Vector3d upper = (of_array(asset.box_upper) - origin) / unit;
+  const Vector3d middle = (of_array(asset.ball_centre) - origin) / unit;
   const double beyond = asset.polygonise_error;
   Tally box, tight, ball;
   for (std::size_t t = 0; t < checked.triangles().size(); ++t)

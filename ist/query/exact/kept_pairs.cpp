@@ -30,7 +30,7 @@ double side_of(const MeshTree& a, const MeshTree& b, double scale) {
 }
 
 // Relative to such a side.
-constexpr double kLeast = 0.007, kMost = 0.3;
+constexpr double kLeastMargin = 0.007, kMostMargin = 0.3;
 // The number of steps that a margin allows for. More steps keep more pairs and need fewer searches.
 constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
@@ -38,7 +38,7 @@ constexpr double kMostSteps = 3, kLeastSteps = 1.5;
 
 bool is_short(double step, const MeshTree& a, const MeshTree& b, double scale,
               double distance) noexcept {
-  return step < std::max(kMost * side_of(a, b, scale), 0.25 * distance);
+  return step < std::max(kMostMargin * side_of(a, b, scale), 0.25 * distance);
 }
 
 KeptRing::KeptRing(std::size_t capacity, const MemoryHooks& hooks)
@@ -75,7 +75,7 @@ bool KeptRing::serves(KeptPairs& kept, const MeshTree& b, double room) const noe
 
 void KeptRing::begin(KeptPairs& kept, const MeshTree& a, const MeshTree& b, double room) noexcept {
   const double side = side_of(a, b, kept.last.scale);
-  kept.margin = std::clamp(kept.steps * kept.step, kLeast * kept.steps * side, kMost * side);
+  kept.margin = std::clamp(kept.steps * kept.step, kLeastMargin * kept.steps * side, kMostMargin * side);
   if (kept.margin < kLeastSteps * kept.step) kept.margin = 0;
   kept.steps = std::min(1.1 * kept.steps, kMostSteps);
   kept.found_at = kept.last;

@@ -18,7 +18,7 @@
 namespace ist {
 namespace {
 
-constexpr std::uint32_t kNone = UINT32_MAX;
+constexpr std::uint32_t kNoCandidate = UINT32_MAX;
 constexpr std::int64_t kStepsAPair = 20;  ///< that finding and sorting it costs
 
 /// Which candidate contains which targets, in both directions.
@@ -66,19 +66,19 @@ class Choice {
   std::int64_t steps() const { return steps_; }  ///< taken so far: pairs that were looked at
 
   std::uint32_t most_helpful() const {
-    std::uint32_t best = kNone;
+    std::uint32_t best = kNoCandidate;
     for (std::uint32_t j = 0; j < gain_.size(); ++j)
-      if (in_[j] == 0 && gain_[j] > 0 && (best == kNone || gain_[j] > gain_[best])) best = j;
+      if (in_[j] == 0 && gain_[j] > 0 && (best == kNoCandidate || gain_[j] > gain_[best])) best = j;
     return best;
   }
 
   /// Among the candidates that contain the target, the one with the largest gain that has been out
   /// since before `now`.
   std::uint32_t most_helpful_for(std::uint32_t target, std::int64_t now) const {
-    std::uint32_t best = kNone;
+    std::uint32_t best = kNoCandidate;
     for (const std::uint32_t j : incidence_.holders[target]) {
       if (in_[j] != 0 || since_[j] > now) continue;
-      if (best == kNone || gain_[j] > gain_[best] ||
+      if (best == kNoCandidate || gain_[j] > gain_[best] ||
           (gain_[j] == gain_[best] && since_[j] < since_[best]))
         best = j;
     }
@@ -87,7 +87,7 @@ class Choice {
 
   /// Among the chosen ones except `kept`, the one whose removal costs least; free ones go first.
   std::uint32_t least_missed(std::int64_t now, std::uint32_t kept) const {
-    std::uint32_t best = kNone;
+    std::uint32_t best = kNoCandidate;
     const auto before = [&](std::uint32_t j, std::uint32_t k) {
       const bool bound_j = since_[j] > now, bound_k = since_[k] > now;
       if (bound_j != bound_k) return bound_k;
@@ -96,7 +96,7 @@ class Choice {
       return j < k;
     };
     for (const std::uint32_t j : chosen_)
-      if (j != kept && (best == kNone || before(j, best))) best = j;
+      if (j != kept && (best == kNoCandidate || before(j, best))) best = j;
     return best;
   }
 
@@ -190,7 +190,7 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
   Choice choice(incidence);
   while (choice.chosen().size() < count) {
     const std::uint32_t best = choice.most_helpful();
-    if (best == kNone) break;
+    if (best == kNoCandidate) break;
     choice.put_in(best, 0);
   }
   std::int64_t now = 0;
@@ -201,7 +201,7 @@ std::vector<std::uint32_t> choose_cover(std::span<const CoverSphere> candidates,
         mixed(seed + static_cast<std::uint64_t>(now) * 0x9E3779B97F4A7C15ull);
     const std::uint32_t target = choice.open()[random % choice.open().size()];
     const std::uint32_t in = choice.most_helpful_for(target, now);
-    if (in == kNone) continue;
+    if (in == kNoCandidate) continue;
     choice.put_in(in, now + 3 + static_cast<std::int64_t>((random >> 40) % 5));
     if (choice.chosen().size() > count)
       choice.take_out(choice.least_missed(now, in),
@@ -219,7 +219,7 @@ std::vector<std::uint32_t> choose_greedily(std::span<const CoverSphere> candidat
   Choice choice(incidence);
   while (!choice.open().empty()) {
     const std::uint32_t best = choice.most_helpful();
-    if (best == kNone) break;
+    if (best == kNoCandidate) break;
     choice.put_in(best, 0);
   }
   return choice.chosen();

@@ -63,9 +63,7 @@ ShapeMesh capsule_mesh(const CoverCapsule& capsule) {
   const double radius = capsule.radius / std::cos(0.75 * across);
   const Vector3d axis = capsule.end - capsule.begin;
   const bool ball = axis.isZero(0);
-  const Eigen::Matrix3d turn =
-      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), ball ? Vector3d::UnitZ() : axis)
-          .toRotationMatrix();
+  const Eigen::Matrix3d turn = turn_from_z(ball ? Vector3d::UnitZ() : axis).toRotationMatrix();
   ShapeMesh out;
   out.slack = radius - capsule.radius;
   TriangleMesh& mesh = out.mesh;

@@ -197,6 +197,12 @@ class MjcfReader {
   }
 
   Eigen::Quaterniond rotation(const Node& node, const Attributes& a) const {
+    const Eigen::Quaterniond turn = stated_rotation(node, a);
+    if (!(std::abs(turn.norm() - 1) < 1e-6))
+      fail(node, "an axis of its rotation is 0, or both of xyaxes are parallel");
+    return turn;
+  }
+  Eigen::Quaterniond stated_rotation(const Node& node, const Attributes& a) const {
     const auto given = [&](const char* key, std::size_t count) {
       const std::vector<double> v = numbers(node, key, a.at(key));
       if (v.size() != count)
@@ -231,7 +237,7 @@ class MjcfReader {
     }
     if (a.contains("zaxis")) {
       const std::vector<double> v = given("zaxis", 3);
-      return Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d(v[0], v[1], v[2]));
+      return turn_from_z(Vector3d(v[0], v[1], v[2]));
     }
     return Eigen::Quaterniond::Identity();
   }
@@ -368,8 +374,7 @@ class MjcfReader {
         const std::vector<double> v = numbers(node, "fromto", a.at("fromto"));
         if (v.size() != 6 || size.empty()) fail(node, "fromto must have 6 numbers, and size one");
         const Vector3d begin(v[0], v[1], v[2]), end(v[3], v[4], v[5]);
-        at = Eigen::Translation3d((begin + end) / 2) *
-             Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), end - begin);
+        at = Eigen::Translation3d((begin + end) / 2) * turn_from_z(end - begin);
         const double half = (end - begin).norm() / 2;
         size = type == "box" ? std::vector<double>{size[0], size[0], half}
                              : std::vector<double>{size[0], half};

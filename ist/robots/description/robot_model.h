@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -104,5 +105,14 @@ RobotModel read_robot(const std::string& path);
 
 /// The same of a file already in memory.
 RobotModel read_robot(SourceFile file);
+
+/// The shortest turn of the z axis onto a direction, which is not 0. Eigen's FromTwoVectors has a
+/// decomposition for directions that are opposite, which takes seconds to compile.
+inline Eigen::Quaterniond turn_from_z(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d to = direction.normalized();
+  if (to.z() < -1 + 1e-12) return {0, 1, 0, 0};
+  const double s = std::sqrt(2 * (1 + to.z()));
+  return {s / 2, -to.y() / s, to.x() / s, 0};
+}
 
 }  // namespace ist
