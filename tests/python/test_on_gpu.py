@@ -173,6 +173,19 @@ def test_separations_are_those_of_the_cpu(solids, assets, pairs):
     assert found.normal.shape == (3000, 3) and found.node_visits is None
 
 
+def test_a_pair_id_keeps_what_is_near(assets, pairs):
+    arguments = pairs(2000, 0.8)
+    names = ("volume", "force", "torque", "status", "node_visits")
+    for step in range(3):
+        arguments["poses"][:, 4] += 1e-7
+        kept, searched = (
+            host(ask(assets, **on_card(arguments), measure="exact", pair_id=number, wanted=names), names)
+            for number in (5, 0))
+        visits, all_visits = kept.pop("node_visits"), searched.pop("node_visits")
+        assert step == 0 or (visits != 0).sum() < (all_visits != 0).sum()
+        expect_same_bits(kept, searched)
+
+
 def test_exact_patches_are_those_of_the_cpu(solids, assets, pairs):
     arguments = pairs(2000)
     arguments["poses"][10, 3] = np.nan

@@ -134,12 +134,11 @@ struct alignas(64) OctantView {
   int planes[8];          ///< of a lane's part
 };
 
-/// The pieces into which up to three planes cut a triangle. A piece's number has a digit from 0 to
-/// 2 for each plane, the first plane's in front.
+/// The pieces into which up to three planes cut a triangle.
 struct CutPieces {
-  static constexpr std::uint32_t kCount = 27;
-  double term[kCount][OctantPieces::kTerms];
-  std::int8_t octant[kCount];  ///< -1: there is no such piece
+  static constexpr std::uint32_t kMost = 27;
+  double term[kMost][OctantPieces::kTerms];
+  std::uint8_t octant[kMost];
 };
 
 /// The working memory for pieces of the boundary.

@@ -179,39 +179,42 @@ class OverlapOctants : public OverlapParts<Overlap> {
                                   cut.corner(piece, 2));
     }
   }
-  /// The same by a team, whose lanes compute the pieces.
+  /// The same by a team: each lane finds a piece, and each adds one of the numbers.
   IST_HD void add_cut(OctantSums* octants, bool of_b, double times,
                       const Corner (&at)[3]) noexcept {
+    static_assert(Parts::width() >= CutPieces::kMost);
     CutPieces& cut = pieces().cut;
-    for (std::uint32_t p = lane(); p < CutPieces::kCount; p += width())
-      find_piece(p, of_b, times, at, cut);
+    Corner piece[3] = {at[0], at[1], at[2]};
+    const bool exists = lane() < CutPieces::kMost && find_piece(lane(), piece);
+    int count = 0;
+    const int place = this->exclusive_count(exists, count);
+    if (exists) {
+      const exact::OctantTerms terms = terms_of(of_b, times, piece[0], piece[1], piece[2]);
+      cut.octant[place] = static_cast<std::uint8_t>(piece[0].octant);
+      for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[place][n] = octants::term(terms, n);
+    }
     meet();
     for (std::uint32_t n = lane(); n < OctantSums::kNumbers; n += width())
-      for (std::uint32_t p = 0; p < CutPieces::kCount; ++p)
-        if (cut.octant[p] >= 0)
-          octants::add_number(octants[cut.octant[p]], n, of_b,
-                              [&](std::uint32_t k) { return cut.term[p][k]; });
+      for (int p = 0; p < count; ++p)
+        octants::add_number(octants[cut.octant[p]], n, of_b,
+                            [&](std::uint32_t k) { return cut.term[p][k]; });
     meet();
   }
-  IST_HD_COLD static void find_piece(std::uint32_t p, bool of_b, double times,
-                                     const Corner (&at)[3], CutPieces& cut) noexcept {
-    Corner kept[3] = {at[0], at[1], at[2]};
-    cut.octant[p] = -1;
-    std::uint32_t digits = p, unit = CutPieces::kCount / 3;
+  /// Cuts a triangle down to a piece, whose number has a digit from 0 to 2 for each plane, the
+  /// first plane's in front. False if there is no such piece.
+  IST_HD_COLD static bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
+    std::uint32_t digits = number, unit = CutPieces::kMost / 3;
     for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
       const auto piece = static_cast<int>(digits / unit);
-      if (are_alike(kept[0], kept[1], kept[2], 1 << plane)) {
-        if (piece != 0) return;  // the first is all of it
+      if (are_alike(at[0], at[1], at[2], 1 << plane)) {
+        if (piece != 0) return false;  // the first is all of it
         continue;
       }
-      const Cut by_plane(kept[0], kept[1], kept[2], plane);
-      const Corner next[3] = {by_plane.corner(piece, 0), by_plane.corner(piece, 1),
-                              by_plane.corner(piece, 2)};
-      for (int k = 0; k < 3; ++k) kept[k] = next[k];
+      const Cut cut(at[0], at[1], at[2], plane);
+      const Corner kept[3] = {cut.corner(piece, 0), cut.corner(piece, 1), cut.corner(piece, 2)};
+      for (int k = 0; k < 3; ++k) at[k] = kept[k];
     }
-    cut.octant[p] = static_cast<std::int8_t>(kept[0].octant);
-    const exact::OctantTerms terms = terms_of(of_b, times, kept[0], kept[1], kept[2]);
-    for (int n = 0; n < OctantPieces::kTerms; ++n) cut.term[p][n] = octants::term(terms, n);
+    return true;
   }
 
   /// Sets lane l of the view to the part of an element, or to none if it is kNoIndex. False if
