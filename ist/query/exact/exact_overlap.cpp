@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "query/exact/crossing_search.h"
@@ -16,6 +17,14 @@ using exact::kHalfUnit;
 using exact::Point;
 
 using exact::length_bound;
+
+/// Fetches all of a small mesh that a query reads, at once instead of line after line.
+void prefetch(const MeshTree& mesh) {
+  if (mesh.top > 1) return;
+  const auto* const end = reinterpret_cast<const std::byte*>(mesh.level[1].boxes + 1);
+  for (auto* line = reinterpret_cast<const std::byte*>(mesh.vertices); line < end; line += 64)
+    __builtin_prefetch(line);
+}
 
 }  // namespace
 
@@ -249,6 +258,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.complete = false;
       return out_;
     }
+  for (const Side& side : sides_) prefetch(side.mesh);
   clear_marks();
   out_.complete = begin_search(max_visits, pair_id);
   std::uint32_t left = 0, next = 0;
