@@ -18,11 +18,8 @@ using exact::Point;
 
 using exact::length_bound;
 
-/// Fetches all of a small mesh that a query reads, at once instead of line after line.
-void prefetch(const MeshTree& mesh) {
-  if (mesh.top > 1) return;
-  const auto* const end = reinterpret_cast<const std::byte*>(mesh.level[1].boxes + 1);
-  for (auto* line = reinterpret_cast<const std::byte*>(mesh.vertices); line < end; line += 64)
+void prefetch(const void* from, const void* to) {
+  for (auto* line = static_cast<const std::byte*>(from); line < to; line += 64)
     __builtin_prefetch(line);
 }
 
@@ -258,7 +255,11 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.complete = false;
       return out_;
     }
-  for (const Side& side : sides_) prefetch(side.mesh);
+  // All of small meshes at once instead of line after line, first what is read first.
+  for (const Side& side : sides_)
+    if (side.mesh.top == 1) prefetch(side.mesh.level[1].boxes, side.mesh.level[1].boxes + 1);
+  for (const Side& side : sides_)
+    if (side.mesh.top == 1) prefetch(side.mesh.vertices, side.mesh.level[1].boxes);
   clear_marks();
   out_.complete = begin_search(max_visits, pair_id);
   std::uint32_t left = 0, next = 0;
