@@ -293,6 +293,35 @@ class TriangleSearch : PairSigns {
   CrossingsFound found_;
 };
 
+/// Asks pairs that cross whether they do so wherever points move.
+class SettledSearch : PairSigns {
+ public:
+  SettledSearch(const CrossingSearch& search, ExactScratch& scratch)
+      : PairSigns(search), scratch_(scratch), placed_(search, scratch) {}
+
+  bool any(std::uint32_t count) {
+    TrianglePairs& pairs = *scratch_.pairs;
+    for (std::uint32_t i = 0; i < count; i += pairs.count) {
+      for (pairs.count = 0; pairs.count < 8 && i + pairs.count < count; ++pairs.count)
+        for (int s = 0; s < 2; ++s) {
+          const std::uint32_t triangle = scratch_.crossings.triangle(s, i + pairs.count);
+          put_triangle(s == 0 ? *search_.a : *search_.b, triangle,
+                       placed_.vertices(s == 1, triangle / kWidth), s, pairs);
+        }
+      if ((find_settled(pairs, pairs.count) & ((1u << pairs.count) - 1)) != 0) return true;
+    }
+    return false;
+  }
+
+ private:
+  ExactScratch& scratch_;
+  PlacedMeshes placed_;
+};
+
+bool search_settled(const CrossingSearch& search, std::uint32_t count, ExactScratch& scratch) {
+  return SettledSearch(search, scratch).any(count);
+}
+
 CrossingsFound search_triangles(const CrossingSearch& search, std::uint32_t first,
                                 std::uint32_t next, std::uint32_t count, KeptPairs* keep,
                                 ExactScratch& scratch) {
@@ -317,6 +346,7 @@ namespace ist {
 
 HWY_EXPORT(search_triangles);
 HWY_EXPORT(search_kept);
+HWY_EXPORT(search_settled);
 HWY_EXPORT(place_one);
 
 CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first, std::uint32_t next,
@@ -328,6 +358,11 @@ CrossingsFound find_crossings(const CrossingSearch& search, std::uint32_t first,
 CrossingsFound find_kept_crossings(const CrossingSearch& search, const KeptPairs& kept,
                                    ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_kept)(search, kept, scratch);
+}
+
+bool any_settled(const CrossingSearch& search, std::uint32_t count,
+                 ExactScratch& scratch) noexcept {
+  return HWY_DYNAMIC_DISPATCH(search_settled)(search, count, scratch);
 }
 
 const PlacedVertices& place_block(const CrossingSearch& search, bool of_b, std::uint32_t number,

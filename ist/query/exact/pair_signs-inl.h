@@ -76,7 +76,6 @@ class PairSigns {
       HWY_UNROLL(2)
       for (int s = 0; s < 2; ++s) HWY_UNROLL(3)
       for (int c = 0; c < 3; ++c) corner[s][c] = corner_of(pairs, s, c, l);
-      HWY_UNROLL(2)
       for (int side = 0; side < 2; ++side) {
         const Vec3(&plane)[3] = corner[1 - side];
         const Vec3 u = plane[1] - plane[0], v = plane[2] - plane[0];
@@ -206,7 +205,6 @@ class PairSigns {
         edge_b[j] = corner[1][(j + 1) % 3] - corner[1][j];
         size_b[j] = largest(edge_b[j]) + room;
       }
-      HWY_UNROLL(3)
       for (int i = 0; i < 3; ++i) {
         const Vec3 edge_a = corner[0][(i + 1) % 3] - corner[0][i];
         const V size_a = largest(edge_a) + room, error_a = filter * size_a;

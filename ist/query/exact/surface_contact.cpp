@@ -91,19 +91,6 @@ class ContactSearch : PairSigns {
     return out;
   }
 
-  bool any_settled(std::uint32_t count) {
-    TrianglePairs& pairs = *scratch_.pairs;
-    for (std::uint32_t i = 0; i < count; i += pairs.count) {
-      for (pairs.count = 0; pairs.count < 8 && i + pairs.count < count;) {
-        const std::uint32_t a = scratch_.crossings.triangle(0, i + pairs.count),
-                            b = scratch_.crossings.triangle(1, i + pairs.count);
-        gather(a, placed_.vertices(false, a / kWidth), b, placed_.vertices(true, b / kWidth));
-      }
-      if ((find_settled(pairs, pairs.count) & ((1u << pairs.count) - 1)) != 0) return true;
-    }
-    return false;
-  }
-
  private:
   /// Calls visit(A's block, its triangle, B's block, some of its triangles) until it returns true,
   /// for triangles whose boxes intersect in blocks that are marked as near, or in kept pairs.
@@ -197,10 +184,6 @@ SurfaceContact search_contact(const CrossingSearch& search, std::uint32_t count,
   return ContactSearch(search, scratch).contact(count, kept);
 }
 
-bool search_settled(const CrossingSearch& search, std::uint32_t count, ExactScratch& scratch) {
-  return ContactSearch(search, scratch).any_settled(count);
-}
-
 }  // namespace ist::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -208,16 +191,10 @@ HWY_AFTER_NAMESPACE();
 namespace ist {
 
 HWY_EXPORT(search_contact);
-HWY_EXPORT(search_settled);
 
 SurfaceContact find_contact(const CrossingSearch& search, std::uint32_t count,
                             const KeptPairs* kept, ExactScratch& scratch) noexcept {
   return HWY_DYNAMIC_DISPATCH(search_contact)(search, count, kept, scratch);
-}
-
-bool any_settled(const CrossingSearch& search, std::uint32_t count,
-                 ExactScratch& scratch) noexcept {
-  return HWY_DYNAMIC_DISPATCH(search_settled)(search, count, scratch);
 }
 
 }  // namespace ist
