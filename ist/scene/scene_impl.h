@@ -202,7 +202,7 @@ struct Scene::Impl {
   void find_candidates() noexcept {
     const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
     if (8 * moved.size() > still.size() + moving.size()) {
-      moving.pairs_within(both);
+      moving.pairs_with(moving, both);
       moving.pairs_with(still, both);
     } else {
       constexpr std::size_t kTogether = 64;
