@@ -26,11 +26,12 @@ HWY_INLINE hn::Vec<hn::Rebind<float, D>> float_below(V x) {
   return nearest - hn::Abs(nearest) * hn::Set(df, 1.2e-7f) - hn::Set(df, 1e-37f);
 }
 
-HWY_ATTR void place_all(BodyBlock& block) {
+HWY_ATTR void place_all(BodyBlock& block, std::uint32_t lanes) {
   const D d;
   const hn::Rebind<float, D> df;
   block.placed = 0;
   for (std::size_t i = 0; i < BodyBlock::kCount; i += hn::Lanes(d)) {
+    if ((lanes >> i & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const V q0 = hn::LoadU(d, block.q[0] + i), q1 = hn::LoadU(d, block.q[1] + i),
             q2 = hn::LoadU(d, block.q[2] + i), q3 = hn::LoadU(d, block.q[3] + i);
     const V norm = hn::Sqrt((q0 * q0 + q1 * q1) + (q2 * q2 + q3 * q3));
@@ -63,7 +64,9 @@ namespace ist {
 
 HWY_EXPORT(place_all);
 
-void place_boxes(BodyBlock& block) noexcept { HWY_DYNAMIC_DISPATCH(place_all)(block); }
+void place_boxes(BodyBlock& block, std::uint32_t lanes) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_all)(block, lanes);
+}
 
 }  // namespace ist
 #endif

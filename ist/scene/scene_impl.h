@@ -15,6 +15,7 @@
 namespace ist {
 
 constexpr std::uint32_t kNone = BoxTree::kNone;
+constexpr std::uint32_t kCount = BodyBlock::kCount;
 
 inline std::uint64_t key_of(std::uint32_t a, std::uint32_t b) noexcept {
   return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
@@ -25,15 +26,20 @@ inline ScenePairName name_of(std::uint64_t key) noexcept {
 
 struct Scene::Impl {
   struct Body {
-    SceneBody given;
+    SceneBody given;  ///< but its pose, which is in its block
     BodyBox kept;
-    Place place = Place::free;
   };
   /// What is asked of a body for every box that its own meets.
   struct Filtered {
     std::uint32_t number = 0, group = 0, layers = 0, meets = 0;
     bool moves = false, is_field = false;
-    bool moved = false;  ///< or added, since the last step
+    Place place = Place::free;
+  };
+  /// Of the bodies of a block, a bit each.
+  struct Lanes {
+    std::uint8_t in_vectors = 0;  ///< place_boxes() makes their boxes
+    std::uint8_t waiting = 0;     ///< for put_waiting()
+    std::uint8_t moved = 0;       ///< or added, since the last step
   };
 
   /// Two bodies of which one moved whose boxes meet.
@@ -55,8 +61,6 @@ struct Scene::Impl {
 
   explicit Impl(const SceneSettings& given)
       : settings(given), still(given.max_bodies), moving(given.max_bodies) {
-    bodies.reserve(given.max_bodies);
-    filtered.reserve(given.max_bodies);
     index_of.reserve(given.max_bodies);
     take_room(given.max_bodies);
     for (auto* const list : {&now, &before, &fresh}) list->reserve(given.max_pairs);
@@ -73,8 +77,14 @@ struct Scene::Impl {
 
   /// For as many bodies, also those that were removed since the last step.
   void take_room(std::size_t most) {
-    for (auto* const list : {&free_bodies, &moved, &endless, &refused, &refused_bodies})
+    bodies.reserve(most);
+    const std::size_t of_eight = (most + kCount - 1) / kCount;
+    filtered.reserve(kCount * of_eight);
+    blocks.reserve(of_eight);
+    lanes.reserve(of_eight);
+    for (auto* const list : {&free_bodies, &removed, &endless, &refused, &refused_bodies})
       list->reserve(most);
+    for (auto* const list : {&waiting, &moved}) list->reserve(of_eight);
     still.take_room(most);
     moving.take_room(most);
   }
@@ -82,96 +92,138 @@ struct Scene::Impl {
   SceneRule& rule_of(std::uint32_t i, std::uint32_t j) noexcept {
     return rules[filtered[i].group * kSceneGroups + filtered[j].group];
   }
-  Body* find(std::uint32_t number) noexcept {
+  bool is_at(std::uint32_t i, std::uint32_t number) const noexcept {
+    return filtered[i].number == number && filtered[i].place != Place::free;
+  }
+  /// The index of a body, kNone if there is none; quick if it is `guess`.
+  std::uint32_t find(std::uint32_t number, std::uint32_t guess = kNone) const noexcept {
+    if (guess < bodies.size() && is_at(guess, number)) return guess;
     const auto found = index_of.find(number);
-    return found == index_of.end() ? nullptr : &bodies[found->second];
+    return found == index_of.end() ? kNone : found->second;
   }
-  std::uint32_t index(const Body& body) const noexcept {
-    return static_cast<std::uint32_t>(&body - bodies.data());
+  BoxTree& tree_of(std::uint32_t i) noexcept { return filtered[i].moves ? moving : still; }
+  Pose pose_of(std::uint32_t i) const noexcept { return blocks[i / kCount].pose(i % kCount); }
+  PlacedSolid solid_of(std::uint32_t i) const noexcept {
+    PlacedSolid out = bodies[i].given.solid;
+    std::visit([&](auto& placed) { placed.pose = pose_of(i); }, out.placed);
+    return out;
   }
-  BoxTree& tree_of(const Body& body) noexcept { return body.given.moves ? moving : still; }
 
-  void note_moved(Body& body) noexcept {
-    const std::uint32_t i = index(body);
-    if (!std::exchange(filtered[i].moved, true)) moved.push_back(i);
+  /// Some of a block's.
+  void note_moved(std::uint32_t block, std::uint32_t of) noexcept {
+    Lanes& all = lanes[block];
+    if (all.moved == 0) moved.push_back(block);
+    moved_bodies += static_cast<std::size_t>(std::popcount(of & ~std::uint32_t{all.moved}));
+    all.moved = static_cast<std::uint8_t>(all.moved | of);
+  }
+  void note_moved(std::uint32_t i) noexcept { note_moved(i / kCount, 1u << i % kCount); }
+  bool has_moved(std::uint32_t i) const noexcept {
+    return (lanes[i / kCount].moved >> i % kCount & 1) != 0;
+  }
+  /// visit(index) of bodies that moved and have a box.
+  template <class Visit>
+  void each_moved(const Visit& visit) noexcept {
+    for (const std::uint32_t block : moved)
+      for (std::uint32_t of = lanes[block].moved; of != 0; of &= of - 1) {
+        const auto i = kCount * block + static_cast<std::uint32_t>(std::countr_zero(of));
+        if (filtered[i].place == Place::tree) visit(i);
+      }
   }
 
   std::vector<std::uint32_t>* list_of(Place place) noexcept {
     return place == Place::endless ? &endless : place == Place::refused ? &refused_bodies : nullptr;
   }
 
-  void take_out(Body& body) noexcept {
-    if (body.place == Place::tree) tree_of(body).remove(index(body));
-    if (auto* const list = list_of(body.place))
-      list->erase(std::find(list->begin(), list->end(), index(body)));
-    body.place = Place::free;
+  void take_out(std::uint32_t i) noexcept {
+    const Place place = std::exchange(filtered[i].place, Place::free);
+    if (place == Place::tree) tree_of(i).remove(i);
+    if (auto* const list = list_of(place)) list->erase(std::find(list->begin(), list->end(), i));
   }
 
-  static const Pose& pose_of(const Body& body) noexcept {
-    return std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
-                      body.given.solid.placed);
+  /// put_waiting() must follow, which puts bodies where they stand.
+  void wait(std::uint32_t block, std::uint32_t of) noexcept {
+    Lanes& all = lanes[block];
+    if (all.waiting == 0) waiting.push_back(block);
+    all.waiting = static_cast<std::uint8_t>(all.waiting | of);
   }
-
-  /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
-  void place(Body& body, bool at_once) noexcept {
-    SceneBox box;
-    const Place place = body.kept.place(pose_of(body), widths, body.given.motion, box);
-    put_down(body, at_once, place, box);
-  }
-  void put_down(Body& body, bool at_once, Place place, const SceneBox& box) noexcept {
-    note_moved(body);
-    if (place == Place::tree && body.place == Place::tree) {
-      if (at_once)
-        tree_of(body).put(index(body), box);
-      else
-        tree_of(body).move(index(body), box);
-      return;
+  /// `at_once`: many, so that hierarchies are refitted as a whole.
+  void put_waiting(bool at_once) noexcept {
+    for (const std::uint32_t b : waiting) {
+      BodyBlock& block = blocks[b];
+      std::uint32_t left = std::exchange(lanes[b].waiting, std::uint8_t{0});
+      const std::uint32_t quick = left & lanes[b].in_vectors;
+      note_moved(b, left);
+      if (quick != 0) place_boxes(block, quick);
+      for (; left != 0; left &= left - 1) {
+        const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+        const std::uint32_t i = kCount * b + k;
+        if ((quick & block.placed) >> k & 1) {
+          put_down(i, at_once, Place::tree, block.box(k));
+        } else {
+          SceneBox box;
+          const Place place =
+              (quick >> k & 1) != 0
+                  ? Place::refused
+                  : bodies[i].kept.place(block.pose(k), widths, bodies[i].given.motion, box);
+          put_down(i, at_once, place, box);
+        }
+      }
     }
-    take_out(body);
-    body.place = place;
-    if (place == Place::tree)
-      tree_of(body).add(index(body), box);
-    else
-      list_of(place)->push_back(index(body));
-  }
-  void place_all() noexcept {
-    for (const auto& [number, at] : index_of) place(bodies[at], true);
+    waiting.clear();
+    if (!at_once) return;
     still.refit();
     moving.refit();
   }
+  void put_down(std::uint32_t i, bool at_once, Place place, const SceneBox& box) noexcept {
+    if (place == Place::tree && filtered[i].place == Place::tree) {
+      if (at_once)
+        tree_of(i).put(i, box);
+      else
+        tree_of(i).move(i, box);
+      return;
+    }
+    take_out(i);
+    filtered[i].place = place;
+    if (place == Place::tree)
+      tree_of(i).add(i, box);
+    else
+      list_of(place)->push_back(i);
+  }
+  /// What of its box does not change with its pose.
+  void prepare(std::uint32_t i) noexcept {
+    const std::uint32_t k = i % kCount;
+    Lanes& all = lanes[i / kCount];
+    const bool quick = bodies[i].kept.put(blocks[i / kCount], k, widths);
+    all.in_vectors =
+        static_cast<std::uint8_t>((all.in_vectors & ~(1u << k)) | unsigned{quick} << k);
+    wait(i / kCount, 1u << k);
+  }
+  void prepare_all() noexcept {
+    for (const auto& [number, i] : index_of) prepare(i);
+    put_waiting(true);
+  }
 
-  /// set(body, values[i]) of each that there is. Returns how many.
+  /// set(index, values[i]) of each that there is. Returns how many.
   template <class Values, class Set>
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
-    const bool at_once = 8 * count > index_of.size();
-    std::size_t done = 0, waiting = 0;
-    Body* of[BodyBlock::kCount];
-    BodyBlock block;
-    for (std::size_t i = 0; i < count; ++i) {
-      Body* const body = find(numbers[i]);
-      if (body == nullptr) continue;
-      set(body->given, values[i]);
-      ++done;
-      if (!body->kept.put(block, waiting, pose_of(*body), widths)) {
-        place(*body, at_once);
+    std::size_t done = 0;
+    std::uint32_t at = 0;
+    for (std::size_t i = 0; i < count;) {
+      at = find(numbers[i], at);
+      if (at == kNone) {
+        ++i;
         continue;
       }
-      of[waiting++] = body;
-      if (waiting < BodyBlock::kCount) continue;
-      place_boxes(block);
-      for (std::size_t k = 0; k < waiting; ++k)
-        put_down(*of[k], at_once, block.placed >> k & 1 ? Place::tree : Place::refused,
-                 {{block.low[0][k], block.low[1][k], block.low[2][k]},
-                  {block.high[0][k], block.high[1][k], block.high[2][k]}});
-      waiting = 0;
+      // In a row, as far as its block goes.
+      const std::uint32_t first = at;
+      do set(at++, values[i++]);
+      while (at % kCount != 0 && i < count && is_at(at, numbers[i]));
+      wait(first / kCount, ((1u << (at - first)) - 1) << first % kCount);
+      done += at - first;
     }
-    for (std::size_t k = 0; k < waiting; ++k) place(*of[k], at_once);
-    if (at_once) {
-      still.refit();
-      moving.refit();
-    }
+    put_waiting(8 * count > index_of.size());
     return done;
   }
 
@@ -188,7 +240,7 @@ struct Scene::Impl {
   }
 
   void note(std::uint32_t i, std::uint32_t j) noexcept {
-    if ((!filtered[i].moved && !filtered[j].moved) || !may_meet(i, j)) return;
+    if ((!has_moved(i) && !has_moved(j)) || !may_meet(i, j)) return;
     if (found.size() + now.size() >= settings.max_pairs &&
         found.size() + count_kept() == settings.max_pairs) {
       exceeded = true;
@@ -201,7 +253,7 @@ struct Scene::Impl {
   /// Pairs of which a body moved whose boxes meet.
   void find_candidates() noexcept {
     const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
-    if (8 * moved.size() > still.size() + moving.size()) {
+    if (8 * moved_bodies > still.size() + moving.size()) {
       moving.pairs_with(moving, both);
       moving.pairs_with(still, both);
     } else {
@@ -212,38 +264,36 @@ struct Scene::Impl {
       const auto ask = [&] {
         const auto visit = [&](std::uint32_t k, std::uint32_t j) {
           // Two that moved find each other; two that cannot move are no pair.
-          if (j != of[k] && (!filtered[j].moved || of[k] < j)) note(of[k], j);
+          if (j != of[k] && (!has_moved(j) || of[k] < j)) note(of[k], j);
         };
         moving.each_meeting(std::span(boxes, count), visit);
         still.each_meeting(std::span(boxes, count), visit);
         count = 0;
       };
-      for (const std::uint32_t i : moved) {
-        if (bodies[i].place != Place::tree) continue;
+      each_moved([&](std::uint32_t i) {
         of[count] = i;
-        boxes[count++] = tree_of(bodies[i]).box_of(i);
+        boxes[count++] = tree_of(i).box_of(i);
         if (count == kTogether) ask();
-      }
+      });
       ask();
     }
     for (const std::uint32_t i : endless) {
-      if (filtered[i].moved) {
-        for (std::uint32_t j = 0; j < bodies.size(); ++j) {
-          const Body& other = bodies[j];
+      if (has_moved(i)) {
+        for (std::uint32_t j = 0; j < filtered.size(); ++j) {
+          const Place other = filtered[j].place;
           // Two that moved find each other.
-          if (other.place == Place::tree ||
-              (other.place == Place::endless && j != i && (!filtered[j].moved || i < j)))
+          if (other == Place::tree ||
+              (other == Place::endless && j != i && (!has_moved(j) || i < j)))
             note(i, j);
         }
         continue;
       }
-      for (const std::uint32_t j : moved)
-        if (bodies[j].place == Place::tree) note(i, j);
+      each_moved([&](std::uint32_t j) { note(i, j); });
     }
   }
 
   bool is_kept(const Candidate& two) const noexcept {
-    return !filtered[two.body[0]].moved && !filtered[two.body[1]].moved;
+    return !has_moved(two.body[0]) && !has_moved(two.body[1]);
   }
 
   /// Pairs of the step before of which no body moved: their answers stay.
@@ -271,7 +321,7 @@ struct Scene::Impl {
 
   void answer(Candidate& two, Workspace& workspace) noexcept {
     const Body &a = bodies[two.body[0]], &b = bodies[two.body[1]];
-    const PlacedSolid &solid_a = a.given.solid, &solid_b = b.given.solid;
+    const PlacedSolid solid_a = solid_of(two.body[0]), solid_b = solid_of(two.body[1]);
     const SceneRule& rule = rule_of(two.body[0], two.body[1]);
     if (rule.answer == SceneAnswer::overlap) {
       const YesNoAnswer found = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
@@ -357,7 +407,7 @@ struct Scene::Impl {
     moving.settle();
     SceneStep out;
     refused.clear();
-    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
+    for (const std::uint32_t i : refused_bodies) refused.push_back(filtered[i].number);
     std::sort(refused.begin(), refused.end());
     out.refused = refused;
     kept.reset();
@@ -384,11 +434,11 @@ struct Scene::Impl {
       for (ScenePair& pair : pairs) pair.event = SceneEvent::stays;
       ended.clear();
     }
-    for (const std::uint32_t i : moved) {
-      filtered[i].moved = false;
-      if (bodies[i].place == Place::free) free_bodies.push_back(i);
-    }
+    for (const std::uint32_t block : moved) lanes[block].moved = 0;
     moved.clear();
+    moved_bodies = 0;
+    free_bodies.insert(free_bodies.end(), removed.begin(), removed.end());
+    removed.clear();
     out.pairs = pairs;
     out.ended = ended;
     return out;
@@ -441,9 +491,13 @@ struct Scene::Impl {
   BoxWidths widths = {.by_spheres = true};  ///< as the rules need
   BoxTree still, moving;
   std::vector<Body> bodies;
-  std::vector<Filtered> filtered;  ///< by index, as `bodies`
+  std::vector<Filtered> filtered;  ///< by index, as `bodies`, and to the end of their block
+  std::vector<BodyBlock> blocks;   ///< of eight bodies each, as `lanes`
+  std::vector<Lanes> lanes;
+  std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
+  std::size_t moved_bodies = 0;
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
-  std::vector<std::uint32_t> free_bodies, moved, endless, refused_bodies, refused;
+  std::vector<std::uint32_t> free_bodies, removed, endless, refused_bodies, refused;
   std::vector<std::uint64_t> excluded;
   bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept = nullptr;
   const void* context = nullptr;

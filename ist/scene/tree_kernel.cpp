@@ -11,49 +11,94 @@ namespace ist::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, BoxNode::kLanes>;
 
+HWY_INLINE std::uint32_t bits_of(hn::Mask<D> mask) {
+  std::uint8_t bits[8];
+  hn::StoreMaskBits(D(), mask, bits);
+  return bits[0];
+}
+
 /// A bit for each lane whose box meets that of a lane of another node.
 HWY_INLINE std::uint32_t meeting(const BoxNode& node, const BoxNode& of, std::uint32_t k) {
   const D d;
   std::uint32_t out = 0;
   for (std::size_t i = 0; i < BoxNode::kLanes; i += hn::Lanes(d)) {
-    const auto meet = [&](int c) {
+    const auto meet = [&](int c) HWY_ATTR {
       return hn::And(hn::Load(d, node.low[c] + i) <= hn::Set(d, of.high[c][k]),
                      hn::Load(d, node.high[c] + i) >= hn::Set(d, of.low[c][k]));
     };
-    std::uint8_t bits[8];
-    hn::StoreMaskBits(d, hn::And(hn::And(meet(0), meet(1)), meet(2)), bits);
-    out |= static_cast<std::uint32_t>(bits[0]) << i;
+    out |= bits_of(hn::And(hn::And(meet(0), meet(1)), meet(2))) << i;
   }
   return out;
 }
 
+/// Bit 8 · r + i: lanes i and (i + r + 1) mod 8 of a node meet.
+HWY_INLINE std::uint32_t meeting_within(const BoxNode& node) {
+  const D d;
+  constexpr std::size_t kLanes = BoxNode::kLanes;
+  HWY_ALIGN float low[3][2 * kLanes], high[3][2 * kLanes];  // so that lanes turn by an offset
+  for (int c = 0; c < 3; ++c)
+    for (std::size_t i = 0; i < 2 * kLanes; i += hn::Lanes(d)) {
+      hn::Store(hn::Load(d, node.low[c] + i % kLanes), d, low[c] + i);
+      hn::Store(hn::Load(d, node.high[c] + i % kLanes), d, high[c] + i);
+    }
+  std::uint32_t out = 0;
+  for (std::size_t i = 0; i < kLanes; i += hn::Lanes(d))
+    for (std::size_t r = 0; r < kLanes / 2; ++r) {
+      const auto meet = [&](int c) HWY_ATTR {
+        return hn::And(hn::Load(d, node.low[c] + i) <= hn::LoadU(d, high[c] + i + r + 1),
+                       hn::Load(d, node.high[c] + i) >= hn::LoadU(d, low[c] + i + r + 1));
+      };
+      out |= bits_of(hn::And(hn::And(meet(0), meet(1)), meet(2))) << (kLanes * r + i);
+    }
+  return out & 0x0fffffff;  // (lanes 0 and 4 are 4 and 0)
+}
+
 HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
+  constexpr std::uint32_t kLanes = BoxNode::kLanes;
   std::size_t count = 0;
-  // Lanes of one node and of another; of these one lane alone, or all. At most 64 pairs.
-  const auto enter = [&](std::uint32_t at_a, std::uint32_t lanes, std::uint32_t at_b,
-                         std::uint32_t only) HWY_ATTR {
+  const auto leave = [&](std::uint32_t a, std::uint32_t b, std::uint64_t left) HWY_ATTR {
+    if (left != 0) search.stack[search.depth++] = {a, b, left};
+  };
+  const auto within = [&](std::uint32_t at) HWY_ATTR {
+    const BoxNode& node = search.a[at];
+    std::uint64_t left = 0;
+    for (std::uint32_t found = meeting_within(node); found != 0; found &= found - 1) {
+      const auto bit = static_cast<std::uint32_t>(std::countr_zero(found));
+      const std::uint32_t i = bit % kLanes, j = (bit + bit / kLanes + 1) % kLanes;
+      if (node.is_body(i) && node.is_body(j))
+        out[count++] = {node.child[i], node.child[j]};
+      else
+        left |= std::uint64_t{1} << (kLanes * i + j);
+    }
+    for (std::uint32_t nodes = node.used & ~node.bodies; nodes != 0; nodes &= nodes - 1)
+      left |= std::uint64_t{1} << (kLanes + 1) * static_cast<unsigned>(std::countr_zero(nodes));
+    leave(at, at, left);
+  };
+  // Lanes of one node and all of another; or, if that is known, this one.
+  const auto between = [&](std::uint32_t at_a, std::uint32_t lanes, std::uint32_t at_b,
+                           std::uint32_t only) HWY_ATTR {
     const BoxNode &a = search.a[at_a], &b = search.b[at_b];
-    const bool same = &a == &b;
     std::uint64_t left = 0;
     for (; lanes != 0; lanes &= lanes - 1) {
       const auto k = static_cast<std::uint32_t>(std::countr_zero(lanes));
       std::uint32_t row = only != 0 ? only : meeting(b, a, k);
-      if (same) row &= ~((2u << k) - 1);
       if (a.is_body(k)) {
         for (std::uint32_t bits = row & b.bodies; bits != 0; bits &= bits - 1)
           out[count++] = {a.child[k], b.child[std::countr_zero(bits)]};
         row &= ~b.bodies;
-      } else if (same) {
-        row |= 1u << k;
       }
-      left |= static_cast<std::uint64_t>(row) << BoxNode::kLanes * k;
+      left |= std::uint64_t{row} << kLanes * k;
     }
-    if (left != 0) search.stack[search.depth++] = {at_a, at_b, left};
+    leave(at_a, at_b, left);
   };
   if (!search.begun) {
     search.begun = true;
-    enter(search.root_a, search.a[search.root_a].used, search.root_b, 0);
+    if (search.a == search.b)
+      within(search.root_a);
+    else
+      between(search.root_a, search.a[search.root_a].used, search.root_b, 0);
   }
+  // (64 pairs are the most of two nodes)
   while (search.depth > 0 && count + 64 <= PairSearch::kMost) {
     NodePair& two = search.stack[search.depth - 1];
     if (two.left == 0) {
@@ -62,17 +107,17 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     }
     const auto bit = static_cast<std::uint32_t>(std::countr_zero(two.left));
     two.left &= two.left - 1;
-    const std::uint32_t i = bit / BoxNode::kLanes, j = bit % BoxNode::kLanes;
+    const std::uint32_t i = bit / kLanes, j = bit % kLanes;
     const BoxNode &a = search.a[two.a], &b = search.b[two.b];
-    if (a.is_body(i)) {
-      enter(two.a, 1u << i, b.child[j], 0);
-    } else if (b.is_body(j)) {
-      enter(a.child[i], meeting(search.a[a.child[i]], b, j), two.b, 1u << j);
-    } else {
-      const BoxNode& below = search.a[a.child[i]];
-      const bool same = &below == &search.b[b.child[j]];
-      enter(a.child[i], same ? below.used : meeting(below, b, j), b.child[j], 0);
-    }
+    const std::uint32_t child_a = a.child[i], child_b = b.child[j];
+    if (a.is_body(i))
+      between(two.a, 1u << i, child_b, 0);
+    else if (b.is_body(j))
+      between(child_a, meeting(search.a[child_a], b, j), two.b, 1u << j);
+    else if (search.a == search.b && child_a == child_b)
+      within(child_a);
+    else
+      between(child_a, meeting(search.a[child_a], b, j), child_b, 0);
   }
   return count;
 }

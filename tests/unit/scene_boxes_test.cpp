@@ -38,7 +38,7 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
         if (below(20) == 0) block.q[below(4)][k] = odd[below(3)];
         if (below(20) == 0) block.t[below(3)][k] = odd[below(4)];
       }
-      place_boxes(block);
+      place_boxes(block, 0xff);
       for (std::size_t k = 0; k < BodyBlock::kCount; ++k) {
         const auto of = [&](const double(&from)[3][BodyBlock::kCount]) {
           return Vec3{from[0][k], from[1][k], from[2][k]};
