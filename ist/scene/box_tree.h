@@ -133,10 +133,18 @@ class BoxTree {
     nodes_[lane / kLanes].set(lane % kLanes, box);
     fit_above(lane / kLanes);
   }
-  /// Sets the box of a body alone: until refit() nothing may be asked.
-  void put(std::uint32_t body, const SceneBox& box) noexcept {
-    const std::uint32_t lane = lane_of_[body];
-    nodes_[lane / kLanes].set(lane % kLanes, box);
+  /// Sets the boxes of some of the bodies from `first` on: until refit() nothing may be asked.
+  void put(std::uint32_t first, std::uint32_t of, const float (&low)[3][kLanes],
+           const float (&high)[3][kLanes]) noexcept {
+    for (; of != 0; of &= of - 1) {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(of));
+      const std::uint32_t lane = lane_of_[first + k];
+      BoxNode& node = nodes_[lane / kLanes];
+      for (std::size_t c = 0; c < 3; ++c) {
+        node.low[c][lane % kLanes] = low[c][k];
+        node.high[c][lane % kLanes] = high[c][k];
+      }
+    }
   }
   SceneBox box_of(std::uint32_t body) const noexcept {
     const std::uint32_t lane = lane_of_[body];

@@ -75,16 +75,18 @@ bool Scene::set_pose(std::uint32_t number, const Pose& pose) noexcept {
 
 std::size_t Scene::set_poses(std::span<const std::uint32_t> numbers,
                              std::span<const Pose> poses) noexcept {
-  return impl_->set_all(numbers, poses, [&](std::uint32_t i, const Pose& pose) {
-    impl_->blocks[i / kCount].set_pose(i % kCount, pose);
-  });
+  return impl_->set_all(numbers, poses,
+                        [&](std::uint32_t block, std::uint32_t k, const Pose& pose) {
+                          impl_->blocks[block].set_pose(k, pose);
+                        });
 }
 
 std::size_t Scene::set_motions(std::span<const std::uint32_t> numbers,
                                std::span<const Motion> motions) noexcept {
-  return impl_->set_all(numbers, motions, [&](std::uint32_t i, const Motion& motion) {
-    impl_->bodies[i].given.motion = motion;
-  });
+  return impl_->set_all(numbers, motions,
+                        [&](std::uint32_t block, std::uint32_t k, const Motion& motion) {
+                          impl_->bodies[kCount * block + k].given.motion = motion;
+                        });
 }
 
 std::size_t Scene::size() const noexcept { return impl_->index_of.size(); }

@@ -38,8 +38,10 @@ struct Scene::Impl {
   /// Of the bodies of a block, a bit each.
   struct Lanes {
     std::uint8_t in_vectors = 0;  ///< place_boxes() makes their boxes
-    std::uint8_t waiting = 0;     ///< for put_waiting()
-    std::uint8_t moved = 0;       ///< or added, since the last step
+    std::uint8_t moving = 0;      ///< their boxes are in that hierarchy, as in `still`
+    std::uint8_t still = 0;
+    std::uint8_t waiting = 0;  ///< for put_waiting()
+    std::uint8_t moved = 0;    ///< or added, since the last step
   };
 
   /// Two bodies of which one moved whose boxes meet.
@@ -136,7 +138,12 @@ struct Scene::Impl {
 
   void take_out(std::uint32_t i) noexcept {
     const Place place = std::exchange(filtered[i].place, Place::free);
-    if (place == Place::tree) tree_of(i).remove(i);
+    if (place == Place::tree) {
+      tree_of(i).remove(i);
+      Lanes& all = lanes[i / kCount];
+      (filtered[i].moves ? all.moving : all.still) &=
+          static_cast<std::uint8_t>(~(1u << i % kCount));
+    }
     if (auto* const list = list_of(place)) list->erase(std::find(list->begin(), list->end(), i));
   }
 
@@ -154,19 +161,23 @@ struct Scene::Impl {
       const std::uint32_t quick = left & lanes[b].in_vectors;
       note_moved(b, left);
       if (quick != 0) place_boxes(block, quick);
+      if (at_once) {  // those that stay where they are, of one kind
+        const std::uint32_t stay_moving = quick & block.placed & lanes[b].moving;
+        const std::uint32_t stay_still = quick & block.placed & lanes[b].still;
+        moving.put(kCount * b, stay_moving, block.low, block.high);
+        still.put(kCount * b, stay_still, block.low, block.high);
+        left &= ~(stay_moving | stay_still);
+      }
       for (; left != 0; left &= left - 1) {
         const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
-        const std::uint32_t i = kCount * b + k;
-        if ((quick & block.placed) >> k & 1) {
-          put_down(i, at_once, Place::tree, block.box(k));
-        } else {
-          SceneBox box;
-          const Place place =
-              (quick >> k & 1) != 0
-                  ? Place::refused
-                  : bodies[i].kept.place(block.pose(k), widths, bodies[i].given.motion, box);
-          put_down(i, at_once, place, box);
-        }
+        SceneBox box = block.box(k);
+        Place place = Place::tree;
+        if ((quick >> k & 1) == 0)
+          place = bodies[kCount * b + k].kept.place(block.pose(k), widths,
+                                                    bodies[kCount * b + k].given.motion, box);
+        else if ((block.placed >> k & 1) == 0)
+          place = Place::refused;
+        put_down(kCount * b + k, place, box);
       }
     }
     waiting.clear();
@@ -174,20 +185,20 @@ struct Scene::Impl {
     still.refit();
     moving.refit();
   }
-  void put_down(std::uint32_t i, bool at_once, Place place, const SceneBox& box) noexcept {
+  void put_down(std::uint32_t i, Place place, const SceneBox& box) noexcept {
     if (place == Place::tree && filtered[i].place == Place::tree) {
-      if (at_once)
-        tree_of(i).put(i, box);
-      else
-        tree_of(i).move(i, box);
+      tree_of(i).move(i, box);
       return;
     }
     take_out(i);
     filtered[i].place = place;
-    if (place == Place::tree)
+    if (place == Place::tree) {
       tree_of(i).add(i, box);
-    else
+      Lanes& all = lanes[i / kCount];
+      (filtered[i].moves ? all.moving : all.still) |= static_cast<std::uint8_t>(1u << i % kCount);
+    } else {
       list_of(place)->push_back(i);
+    }
   }
   /// What of its box does not change with its pose.
   void prepare(std::uint32_t i) noexcept {
@@ -203,7 +214,7 @@ struct Scene::Impl {
     put_waiting(true);
   }
 
-  /// set(index, values[i]) of each that there is. Returns how many.
+  /// set(block, lane, values[i]) of each that there is. Returns how many.
   template <class Values, class Set>
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
@@ -217,11 +228,15 @@ struct Scene::Impl {
         continue;
       }
       // In a row, as far as its block goes.
-      const std::uint32_t first = at;
-      do set(at++, values[i++]);
-      while (at % kCount != 0 && i < count && is_at(at, numbers[i]));
-      wait(first / kCount, ((1u << (at - first)) - 1) << first % kCount);
-      done += at - first;
+      const std::uint32_t k = at % kCount;
+      const std::size_t most = std::min<std::size_t>(kCount - k, count - i);
+      std::uint32_t row = 1;
+      while (row < most && is_at(at + row, numbers[i + row])) ++row;
+      for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
+      wait(at / kCount, ((1u << row) - 1) << k);
+      at += row;
+      i += row;
+      done += row;
     }
     put_waiting(8 * count > index_of.size());
     return done;
@@ -370,18 +385,19 @@ struct Scene::Impl {
     std::uint64_t differ = 0;
     for (const Found& two : found) differ |= two.key ^ found[0].key;
     sorted.resize(found.size());
-    constexpr int kDigit = 11;
-    for (int shift = 0; differ >> shift != 0; shift += kDigit) {
+    const int bits = found.size() < 4096 ? 8 : 11;
+    std::uint32_t ends[(1u << 11) + 1];
+    for (int shift = 0; differ >> shift != 0; shift += bits) {
       shift += std::countr_zero(differ >> shift);
       const auto digit = [&](const Found& two) {
-        return static_cast<std::size_t>(two.key >> shift & ((1u << kDigit) - 1));
+        return static_cast<std::size_t>(two.key >> shift & ((1u << bits) - 1));
       };
-      std::uint32_t ends[(1u << kDigit) + 1] = {};
+      std::fill(ends, ends + (1u << bits) + 1, 0);
       for (const Found& two : found) ++ends[digit(two) + 1];
-      for (std::size_t i = 1; i < 1u << kDigit; ++i) ends[i] += ends[i - 1];
+      for (std::size_t i = 1; i < 1u << bits; ++i) ends[i] += ends[i - 1];
       for (const Found& two : found) sorted[ends[digit(two)]++] = two;
       std::swap(found, sorted);
-      if (shift + kDigit >= 64) break;
+      if (shift + bits >= 64) break;
     }
   }
 
