@@ -24,16 +24,12 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-/// Eight bodies, a lane each.
+/// Eight bodies, a lane each: what of their boxes does not change [u], and their poses.
 struct alignas(64) BodyBlock {
   static constexpr std::size_t kCount = 8;
 
-  // What of a body's box does not change [u], and its pose.
   double middle[3][kCount] = {}, half[3][kCount] = {}, wider[kCount] = {};
   double q[4][kCount] = {}, t[3][kCount] = {};
-  // What place_boxes() writes: the same bits as SolidBox::placed() and WorldBox::write().
-  float low[3][kCount], high[3][kCount];
-  std::uint32_t placed = 0;  ///< bit k: the k-th pose is usable and floats hold its box
 
   void set_pose(std::size_t k, const Pose& pose) noexcept {
     for (std::size_t c = 0; c < 4; ++c) q[c][k] = pose.q[c];
@@ -42,13 +38,20 @@ struct alignas(64) BodyBlock {
   Pose pose(std::size_t k) const noexcept {
     return {{q[0][k], q[1][k], q[2][k], q[3][k]}, {t[0][k], t[1][k], t[2][k]}};
   }
+};
+
+/// Their boxes: the same bits as SolidBox::placed() and WorldBox::write().
+struct alignas(64) BlockBoxes {
+  float low[3][BodyBlock::kCount], high[3][BodyBlock::kCount];
+  std::uint32_t placed = 0;  ///< bit k: the k-th pose is usable and floats hold its box
+
   SceneBox box(std::size_t k) const noexcept {
     return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
   }
 };
 
 /// Of these lanes at least.
-void place_boxes(BodyBlock& block, std::uint32_t lanes) noexcept;
+void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) noexcept;
 
 /// What of a body's box does not change with its pose.
 class BodyBox {

@@ -26,10 +26,10 @@ HWY_INLINE hn::Vec<hn::Rebind<float, D>> float_below(V x) {
   return nearest - hn::Abs(nearest) * hn::Set(df, 1.2e-7f) - hn::Set(df, 1e-37f);
 }
 
-HWY_ATTR void place_all(BodyBlock& block, std::uint32_t lanes) {
+HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) {
   const D d;
   const hn::Rebind<float, D> df;
-  block.placed = 0;
+  boxes.placed = 0;
   for (std::size_t i = 0; i < BodyBlock::kCount; i += hn::Lanes(d)) {
     if ((lanes >> i & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
     const V q0 = hn::LoadU(d, block.q[0] + i), q1 = hn::LoadU(d, block.q[1] + i),
@@ -48,11 +48,11 @@ HWY_ATTR void place_all(BodyBlock& block, std::uint32_t lanes) {
     for (const V x : {high.x, high.y, high.z}) placed = hn::And(placed, x <= most);
     const V lows[3] = {low.x, low.y, low.z}, highs[3] = {high.x, high.y, high.z};
     for (int k = 0; k < 3; ++k) {
-      hn::StoreU(float_below(hn::IfThenElseZero(placed, lows[k])), df, block.low[k] + i);
+      hn::StoreU(float_below(hn::IfThenElseZero(placed, lows[k])), df, boxes.low[k] + i);
       hn::StoreU(hn::Neg(float_below(hn::Neg(hn::IfThenElseZero(placed, highs[k])))), df,
-                 block.high[k] + i);
+                 boxes.high[k] + i);
     }
-    block.placed |= mask_bits(d, placed) << i;
+    boxes.placed |= mask_bits(d, placed) << i;
   }
 }
 
@@ -64,8 +64,8 @@ namespace ist {
 
 HWY_EXPORT(place_all);
 
-void place_boxes(BodyBlock& block, std::uint32_t lanes) noexcept {
-  HWY_DYNAMIC_DISPATCH(place_all)(block, lanes);
+void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) noexcept {
+  HWY_DYNAMIC_DISPATCH(place_all)(block, lanes, boxes);
 }
 
 }  // namespace ist

@@ -153,37 +153,39 @@ struct Scene::Impl {
     if (all.waiting == 0) waiting.push_back(block);
     all.waiting = static_cast<std::uint8_t>(all.waiting | of);
   }
-  /// `at_once`: many, so that hierarchies are refitted as a whole.
   void put_waiting(bool at_once) noexcept {
-    for (const std::uint32_t b : waiting) {
-      BodyBlock& block = blocks[b];
-      std::uint32_t left = std::exchange(lanes[b].waiting, std::uint8_t{0});
-      const std::uint32_t quick = left & lanes[b].in_vectors;
-      note_moved(b, left);
-      if (quick != 0) place_boxes(block, quick);
-      if (at_once) {  // those that stay where they are, of one kind
-        const std::uint32_t stay_moving = quick & block.placed & lanes[b].moving;
-        const std::uint32_t stay_still = quick & block.placed & lanes[b].still;
-        moving.put(kCount * b, stay_moving, block.low, block.high);
-        still.put(kCount * b, stay_still, block.low, block.high);
-        left &= ~(stay_moving | stay_still);
-      }
-      for (; left != 0; left &= left - 1) {
-        const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
-        SceneBox box = block.box(k);
-        Place place = Place::tree;
-        if ((quick >> k & 1) == 0)
-          place = bodies[kCount * b + k].kept.place(block.pose(k), widths,
-                                                    bodies[kCount * b + k].given.motion, box);
-        else if ((block.placed >> k & 1) == 0)
-          place = Place::refused;
-        put_down(kCount * b + k, place, box);
-      }
-    }
+    for (const std::uint32_t block : waiting)
+      put(block, std::exchange(lanes[block].waiting, std::uint8_t{0}), at_once);
     waiting.clear();
     if (!at_once) return;
     still.refit();
     moving.refit();
+  }
+  /// `at_once`: hierarchies are refitted afterwards.
+  void put(std::uint32_t b, std::uint32_t left, bool at_once) noexcept {
+    const BodyBlock& block = blocks[b];
+    const Lanes& all = lanes[b];
+    const std::uint32_t quick = left & all.in_vectors;
+    note_moved(b, left);
+    BlockBoxes boxes;
+    if (quick != 0) place_boxes(block, quick, boxes);
+    if (at_once) {
+      const std::uint32_t stay = quick & boxes.placed;
+      moving.put(kCount * b, stay & all.moving, boxes.low, boxes.high);
+      still.put(kCount * b, stay & all.still, boxes.low, boxes.high);
+      left &= ~(stay & (all.moving | all.still));
+    }
+    for (; left != 0; left &= left - 1) {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+      const Body& body = bodies[kCount * b + k];
+      SceneBox box;
+      Place place = (boxes.placed >> k & 1) != 0 ? Place::tree : Place::refused;
+      if ((quick >> k & 1) != 0)
+        box = boxes.box(k);
+      else
+        place = body.kept.place(block.pose(k), widths, body.given.motion, box);
+      put_down(kCount * b + k, place, box);
+    }
   }
   void put_down(std::uint32_t i, Place place, const SceneBox& box) noexcept {
     if (place == Place::tree && filtered[i].place == Place::tree) {
@@ -219,6 +221,7 @@ struct Scene::Impl {
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
+    const bool at_once = 8 * count > index_of.size();
     std::size_t done = 0;
     std::uint32_t at = 0;
     for (std::size_t i = 0; i < count;) {
@@ -233,12 +236,15 @@ struct Scene::Impl {
       std::uint32_t row = 1;
       while (row < most && is_at(at + row, numbers[i + row])) ++row;
       for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
-      wait(at / kCount, ((1u << row) - 1) << k);
+      if (row == kCount)
+        put(at / kCount, (1u << kCount) - 1, at_once);
+      else
+        wait(at / kCount, ((1u << row) - 1) << k);
       at += row;
       i += row;
       done += row;
     }
-    put_waiting(8 * count > index_of.size());
+    put_waiting(at_once);
     return done;
   }
 
