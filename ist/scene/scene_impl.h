@@ -222,6 +222,13 @@ struct Scene::Impl {
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
     const bool at_once = 8 * count > index_of.size();
+    // Full blocks, while they are in the cache, but some later: a vector that is read as soon as
+    // its numbers are written one by one waits for them.
+    std::uint32_t full[16], ready = 0;
+    const auto put_full = [&] {
+      for (std::uint32_t b = 0; b < ready; ++b) put(full[b], (1u << kCount) - 1, at_once);
+      ready = 0;
+    };
     std::size_t done = 0;
     std::uint32_t at = 0;
     for (std::size_t i = 0; i < count;) {
@@ -237,13 +244,15 @@ struct Scene::Impl {
       while (row < most && is_at(at + row, numbers[i + row])) ++row;
       for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
       if (row == kCount)
-        put(at / kCount, (1u << kCount) - 1, at_once);
+        full[ready++] = at / kCount;
       else
         wait(at / kCount, ((1u << row) - 1) << k);
+      if (ready == std::size(full)) put_full();
       at += row;
       i += row;
       done += row;
     }
+    put_full();
     put_waiting(at_once);
     return done;
   }

@@ -31,28 +31,6 @@ HWY_INLINE std::uint32_t meeting(const BoxNode& node, const BoxNode& of, std::ui
   return out;
 }
 
-/// Bit 8 · r + i: lanes i and (i + r + 1) mod 8 of a node meet.
-HWY_INLINE std::uint32_t meeting_within(const BoxNode& node) {
-  const D d;
-  constexpr std::size_t kLanes = BoxNode::kLanes;
-  HWY_ALIGN float low[3][2 * kLanes], high[3][2 * kLanes];  // so that lanes turn by an offset
-  for (int c = 0; c < 3; ++c)
-    for (std::size_t i = 0; i < 2 * kLanes; i += hn::Lanes(d)) {
-      hn::Store(hn::Load(d, node.low[c] + i % kLanes), d, low[c] + i);
-      hn::Store(hn::Load(d, node.high[c] + i % kLanes), d, high[c] + i);
-    }
-  std::uint32_t out = 0;
-  for (std::size_t i = 0; i < kLanes; i += hn::Lanes(d))
-    for (std::size_t r = 0; r < kLanes / 2; ++r) {
-      const auto meet = [&](int c) HWY_ATTR {
-        return hn::And(hn::Load(d, node.low[c] + i) <= hn::LoadU(d, high[c] + i + r + 1),
-                       hn::Load(d, node.high[c] + i) >= hn::LoadU(d, low[c] + i + r + 1));
-      };
-      out |= bits_of(hn::And(hn::And(meet(0), meet(1)), meet(2))) << (kLanes * r + i);
-    }
-  return out & 0x0fffffff;  // (lanes 0 and 4 are 4 and 0)
-}
-
 HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
   constexpr std::uint32_t kLanes = BoxNode::kLanes;
   std::size_t count = 0;
@@ -61,14 +39,15 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
   };
   const auto within = [&](std::uint32_t at) HWY_ATTR {
     const BoxNode& node = search.a[at];
-    std::uint64_t left = 0;
-    for (std::uint32_t found = meeting_within(node); found != 0; found &= found - 1) {
+    std::uint64_t found = 0, left = 0;
+    for (std::uint32_t k = 0; k < kLanes - 1; ++k)
+      found |= std::uint64_t{meeting(node, node, k) & (0xfeu << k)} << kLanes * k;
+    for (; found != 0; found &= found - 1) {
       const auto bit = static_cast<std::uint32_t>(std::countr_zero(found));
-      const std::uint32_t i = bit % kLanes, j = (bit + bit / kLanes + 1) % kLanes;
-      if (node.is_body(i) && node.is_body(j))
-        out[count++] = {node.child[i], node.child[j]};
+      if (node.is_body(bit / kLanes) && node.is_body(bit % kLanes))
+        out[count++] = {node.child[bit / kLanes], node.child[bit % kLanes]};
       else
-        left |= std::uint64_t{1} << (kLanes * i + j);
+        left |= std::uint64_t{1} << bit;
     }
     for (std::uint32_t nodes = node.used & ~node.bodies; nodes != 0; nodes &= nodes - 1)
       left |= std::uint64_t{1} << (kLanes + 1) * static_cast<unsigned>(std::countr_zero(nodes));
