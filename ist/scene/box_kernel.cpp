@@ -37,12 +37,18 @@ HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes&
     const V norm = hn::Sqrt((q0 * q0 + q1 * q1) + (q2 * q2 + q3 * q3));
     Mask placed =
         hn::And(norm >= constant(kShortestDirection), norm <= constant(kLongestDirection));
-    // (no lane divides by zero, or overflows)
-    const V by = hn::IfThenElse(placed, norm, constant(1));
-    const auto unit = [&](V q) { return hn::IfThenElseZero(placed, q) / by; };
+    V w = q0;
+    Vec3 v = {q1, q2, q3};
+    if (!hn::AllTrue(d, norm == constant(1))) {  // of bodies that are not turned it is
+      // (no lane divides by zero, or overflows)
+      const V by = hn::IfThenElse(placed, norm, constant(1));
+      const auto unit = [&](V q) { return hn::IfThenElseZero(placed, q) / by; };
+      w = unit(q0);
+      v = {unit(q1), unit(q2), unit(q3)};
+    }
     Vec3 low, high;
-    box_around(unit(q0), {unit(q1), unit(q2), unit(q3)}, load(block.t, i), load(block.middle, i),
-               load(block.half, i), hn::LoadU(d, block.wider + i), low, high);
+    box_around(w, v, load(block.t, i), load(block.middle, i), load(block.half, i),
+               hn::LoadU(d, block.wider + i), low, high);
     const V most = constant(WorldBox::kMost);
     for (const V x : {low.x, low.y, low.z}) placed = hn::And(placed, x >= hn::Neg(most));
     for (const V x : {high.x, high.y, high.z}) placed = hn::And(placed, x <= most);

@@ -95,15 +95,17 @@ struct NodePair {
 struct BodyPair {
   std::uint32_t a, b;
 };
-/// A search for pairs in two hierarchies, or in one: of its nodes, the first is the root.
+/// A search for pairs in two hierarchies, or in one: then within each of its nodes, and below the
+/// pairs found there.
 struct PairSearch {
   static constexpr std::size_t kMost = 256;
 
   const BoxNode *a, *b;
   std::uint32_t root_a, root_b;
-  NodePair* stack;  ///< as long as both are deep
+  NodePair* stack;    ///< as long as both are deep
+  std::uint32_t end;  ///< nodes of one hierarchy; 1 for two
+  std::uint32_t next = 0;
   std::size_t depth = 0;
-  bool begun = false;
 };
 /// Pairs of bodies whose boxes meet, once each: at most kMost of those that no call returned
 /// before. Returns their number: 0 at the end.
@@ -213,7 +215,8 @@ class BoxTree {
   template <class Visit>
   void pairs_with(const BoxTree& other, const Visit& visit) noexcept {
     if (root_ == kNone || other.root_ == kNone) return;
-    PairSearch search{nodes_.data(), other.nodes_.data(), root_, other.root_, stack_.data()};
+    const auto end = this == &other ? static_cast<std::uint32_t>(nodes_.size()) : 1;
+    PairSearch search{nodes_.data(), other.nodes_.data(), root_, other.root_, stack_.data(), end};
     BodyPair some[PairSearch::kMost];
     while (const std::size_t count = next_pairs(search, some))
       for (std::size_t i = 0; i < count; ++i) visit(some[i].a, some[i].b);

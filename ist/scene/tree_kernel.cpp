@@ -49,8 +49,6 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
       else
         left |= std::uint64_t{1} << bit;
     }
-    for (std::uint32_t nodes = node.used & ~node.bodies; nodes != 0; nodes &= nodes - 1)
-      left |= std::uint64_t{1} << (kLanes + 1) * static_cast<unsigned>(std::countr_zero(nodes));
     leave(at, at, left);
   };
   // Lanes of one node and all of another; or, if that is known, this one.
@@ -70,15 +68,17 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     }
     leave(at_a, at_b, left);
   };
-  if (!search.begun) {
-    search.begun = true;
-    if (search.a == search.b)
-      within(search.root_a);
-    else
-      between(search.root_a, search.a[search.root_a].used, search.root_b, 0);
-  }
   // (64 pairs are the most of two nodes)
-  while (search.depth > 0 && count + 64 <= PairSearch::kMost) {
+  while (count + 64 <= PairSearch::kMost) {
+    if (search.depth == 0) {
+      if (search.next == search.end) break;
+      const std::uint32_t at = search.next++;
+      if (search.a == search.b)
+        within(at);
+      else
+        between(search.root_a, search.a[search.root_a].used, search.root_b, 0);
+      continue;
+    }
     NodePair& two = search.stack[search.depth - 1];
     if (two.left == 0) {
       --search.depth;
@@ -93,8 +93,6 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
       between(two.a, 1u << i, child_b, 0);
     else if (b.is_body(j))
       between(child_a, meeting(search.a[child_a], b, j), two.b, 1u << j);
-    else if (search.a == search.b && child_a == child_b)
-      within(child_a);
     else
       between(child_a, meeting(search.a[child_a], b, j), child_b, 0);
   }

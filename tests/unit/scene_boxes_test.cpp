@@ -32,7 +32,10 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
           block.t[c][k] = below(3) == 0 ? 0 : 1e3 * size * uniform(random);
         }
         block.wider[k] = below(2) == 0 ? 0 : 0.125 * size;
-        for (int c = 0; c < 4; ++c) block.q[c][k] = below(4) == 0 ? 0 : uniform(random);
+        for (int c = 0; c < 4; ++c) {
+          block.q[c][k] = below(4) == 0 ? 0 : uniform(random);
+          if (round % 3 == 0) block.q[c][k] = c == round % 4 ? 1 : 0;
+        }
         const double odd[] = {std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity(), 1e-160, 1e308};
         if (below(20) == 0) block.q[below(4)][k] = odd[below(3)];
