@@ -115,12 +115,19 @@ struct Scene::Impl {
   void note_moved(std::uint32_t block, std::uint32_t of) noexcept {
     Lanes& all = lanes[block];
     if (all.moved == 0) moved.push_back(block);
-    moved_bodies += static_cast<std::size_t>(std::popcount(of & ~std::uint32_t{all.moved}));
     all.moved = static_cast<std::uint8_t>(all.moved | of);
   }
   void note_moved(std::uint32_t i) noexcept { note_moved(i / kCount, 1u << i % kCount); }
   bool has_moved(std::uint32_t i) const noexcept {
     return (lanes[i / kCount].moved >> i % kCount & 1) != 0;
+  }
+  /// True if they are more than an eighth.
+  bool many_moved() const noexcept {
+    const std::size_t most = still.size() + moving.size();
+    std::size_t count = 0;
+    for (auto block = moved.begin(); block != moved.end() && 8 * count <= most; ++block)
+      count += static_cast<std::size_t>(std::popcount(lanes[*block].moved));
+    return 8 * count > most;
   }
   /// visit(index) of bodies that moved and have a box.
   template <class Visit>
@@ -240,8 +247,10 @@ struct Scene::Impl {
       // In a row, as far as its block goes.
       const std::uint32_t k = at % kCount;
       const std::size_t most = std::min<std::size_t>(kCount - k, count - i);
+      const Filtered* const own = filtered.data() + at;
       std::uint32_t row = 1;
-      while (row < most && is_at(at + row, numbers[i + row])) ++row;
+      while (row < most && own[row].number == numbers[i + row] && own[row].place != Place::free)
+        ++row;
       for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
       if (row == kCount)
         full[ready++] = at / kCount;
@@ -283,7 +292,7 @@ struct Scene::Impl {
   /// Pairs of which a body moved whose boxes meet.
   void find_candidates() noexcept {
     const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
-    if (8 * moved_bodies > still.size() + moving.size()) {
+    if (many_moved()) {
       moving.pairs_with(moving, both);
       moving.pairs_with(still, both);
     } else {
@@ -467,7 +476,6 @@ struct Scene::Impl {
     }
     for (const std::uint32_t block : moved) lanes[block].moved = 0;
     moved.clear();
-    moved_bodies = 0;
     free_bodies.insert(free_bodies.end(), removed.begin(), removed.end());
     removed.clear();
     out.pairs = pairs;
@@ -526,7 +534,6 @@ struct Scene::Impl {
   std::vector<BodyBlock> blocks;   ///< of eight bodies each, as `lanes`
   std::vector<Lanes> lanes;
   std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
-  std::size_t moved_bodies = 0;
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
   std::vector<std::uint32_t> free_bodies, removed, endless, refused_bodies, refused;
   std::vector<std::uint64_t> excluded;
