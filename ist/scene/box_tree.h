@@ -88,7 +88,7 @@ static_assert(sizeof(BoxNode) == 256);
 
 /// Two nodes, of which some pairs of lanes are still to be looked at; at most one of a pair is a
 /// body's.
-struct NodePair {
+struct LanePairs {
   std::uint32_t a, b;
   std::uint64_t left;  ///< bit 8 · (A's lane) + (B's lane)
 };
@@ -102,7 +102,7 @@ struct PairSearch {
 
   const BoxNode *a, *b;
   std::uint32_t root_a, root_b;
-  NodePair* stack;    ///< as long as both are deep
+  LanePairs* stack;   ///< as long as both are deep
   std::uint32_t end;  ///< nodes of one hierarchy; 1 for two
   std::uint32_t next = 0;
   std::size_t depth = 0;
@@ -267,7 +267,7 @@ class BoxTree {
   std::vector<std::uint32_t> lane_of_;  ///< of a body: 8 · node + lane
   std::vector<std::uint32_t> free_;
   std::vector<Leaf> order_;
-  std::vector<NodePair> stack_;
+  std::vector<LanePairs> stack_;
   std::uint32_t root_ = kNone, leaves_ = 0;
   double built_area_ = 0;  ///< of all nodes, when they were built
   std::size_t added_ = 0;  ///< since

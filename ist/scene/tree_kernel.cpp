@@ -79,7 +79,7 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
         between(search.root_a, search.a[search.root_a].used, search.root_b, 0);
       continue;
     }
-    NodePair& two = search.stack[search.depth - 1];
+    LanePairs& two = search.stack[search.depth - 1];
     if (two.left == 0) {
       --search.depth;
       continue;
