@@ -2,9 +2,10 @@
 // Bullet's btDbvtBroadphase: bodies that move a little in every step, and what their boxes meet.
 // One thread, thread CPU time, the median of the steps.
 //
-// Floor of a step of 10,000 moving bodies, one in ten of which meets another: 560 kB of boxes are
-// written and read, and a descent of the hierarchy with itself compares some 30 boxes a body, 3 ns
-// each: 1 ms. Of the boxes themselves (a rotation of a half-extent) 40 ns each are 0.4 ms.
+// Floor of a step of 10,000 moving bodies, one in ten of which meets another: a body's pose (56
+// bytes) is copied in 14 instructions, its box takes 170 vector instructions for four or eight
+// bodies, 12 put it into the hierarchy; in a node of eight it is compared with seven, and a node
+// with two others, in 50. That is 150 instructions with AVX2, and 300 bytes.
 
 #include <btBulletDynamicsCommon.h>
 #ifdef IST_HAVE_COAL

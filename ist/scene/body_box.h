@@ -24,18 +24,34 @@ struct BoxWidths {
   bool by_size = false;     ///< by the tolerance of impacts for which none is asked
 };
 
-struct BodyBlock {
+/// Eight bodies, a lane each: what of their boxes does not change [u], and their poses.
+struct alignas(64) BodyBlock {
   static constexpr std::size_t kCount = 8;
 
-  // What of a body does not change [u], and its pose.
-  double middle[3][kCount], half[3][kCount], wider[kCount];
-  double q[4][kCount], t[3][kCount];
-  // What place_boxes() writes: the same bits as SolidBox::placed() and WorldBox::write().
-  float low[3][kCount], high[3][kCount];
-  std::uint32_t placed;  ///< bit k: the k-th pose is usable and floats hold its box
+  double middle[3][kCount] = {}, half[3][kCount] = {}, wider[kCount] = {};
+  double q[4][kCount] = {}, t[3][kCount] = {};
+
+  void set_pose(std::size_t k, const Pose& pose) noexcept {
+    for (std::size_t c = 0; c < 4; ++c) q[c][k] = pose.q[c];
+    for (std::size_t c = 0; c < 3; ++c) t[c][k] = pose.t[c];
+  }
+  Pose pose(std::size_t k) const noexcept {
+    return {{q[0][k], q[1][k], q[2][k], q[3][k]}, {t[0][k], t[1][k], t[2][k]}};
+  }
 };
 
-void place_boxes(BodyBlock& block) noexcept;
+/// Their boxes: the same bits as SolidBox::placed() and WorldBox::write().
+struct alignas(64) BlockBoxes {
+  float low[3][BodyBlock::kCount], high[3][BodyBlock::kCount];
+  std::uint32_t placed = 0;  ///< bit k: the k-th pose is usable and floats hold its box
+
+  SceneBox box(std::size_t k) const noexcept {
+    return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
+  }
+};
+
+/// Of these lanes at least.
+void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) noexcept;
 
 /// What of a body's box does not change with its pose.
 class BodyBox {
@@ -56,20 +72,15 @@ class BodyBox {
     return Place::tree;
   }
 
-  /// Puts this body in a block; false if it cannot be in one.
-  bool put(BodyBlock& block, std::size_t k, const Pose& pose,
-           const BoxWidths& widths) const noexcept {
-    if (box_.empty || box_.endless || widths.duration > 0 || !(scale_ > 0) ||
-        !std::isfinite(scale_))
-      return false;
+  /// Writes what place_boxes() needs but the pose; false if that cannot make its box.
+  bool put(BodyBlock& block, std::size_t k, const BoxWidths& widths) const noexcept {
     for (int c = 0; c < 3; ++c) {
       block.middle[c][k] = box_.middle[c];
       block.half[c][k] = box_.half[c];
-      block.t[c][k] = pose.t[c];
     }
-    for (int c = 0; c < 4; ++c) block.q[c][k] = pose.q[c];
     block.wider[k] = wider(widths);
-    return true;
+    return !box_.empty && !box_.endless && !(widths.duration > 0) && scale_ > 0 &&
+           std::isfinite(scale_);
   }
 
  private:

@@ -17,7 +17,7 @@ void BoxTree::take_room(std::size_t most) {
   order_.reserve(most);
   if (lane_of_.size() < most) lane_of_.resize(most, kNone);
   // A pair waits for each level of both; in the worst case a hierarchy is a chain.
-  stack_.reserve(2 * most + 64);
+  if (stack_.size() < 2 * most + 64) stack_.resize(2 * most + 64);
 }
 
 std::uint32_t BoxTree::take_node() noexcept {
@@ -42,12 +42,15 @@ void BoxTree::fit_above(std::uint32_t at) noexcept {
   }
 }
 
-void BoxTree::hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child,
+void BoxTree::hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child, bool is_body,
                    const SceneBox& box) noexcept {
-  nodes_[node].set(lane, box);
-  nodes_[node].child[lane] = child;
-  if (is_leaf(child)) {
-    lane_of_[child & ~kLeaf] = kLanes * node + lane;
+  BoxNode& above = nodes_[node];
+  above.set(lane, box);
+  above.child[lane] = child;
+  above.used |= 1u << lane;
+  above.bodies = (above.bodies & ~(1u << lane)) | (is_body ? 1u << lane : 0);
+  if (is_body) {
+    lane_of_[child] = kLanes * node + lane;
   } else {
     nodes_[child].parent = node;
     nodes_[child].place = lane;
@@ -61,7 +64,7 @@ void BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
   // Down to where the least area is added.
   std::uint32_t at = root_;
   for (;;) {
-    const std::uint32_t used = nodes_[at].used();
+    const std::uint32_t used = nodes_[at].used;
     const auto free = static_cast<std::uint32_t>(std::countr_one(used));
     std::uint32_t best = kNone;
     double least = 0;
@@ -73,19 +76,18 @@ void BoxTree::add(std::uint32_t body, const SceneBox& box) noexcept {
       best = k;
       least = grown;
     }
-    const std::uint32_t child = best == kNone ? kNone : nodes_[at].child[best];
-    if (child != kNone && !is_leaf(child)) {
-      at = child;
+    if (best != kNone && !nodes_[at].is_body(best)) {
+      at = nodes_[at].child[best];
       continue;
     }
     if (free < kLanes) {
-      hang(at, free, body | kLeaf, box);
+      hang(at, free, body, true, box);
     } else {
       const SceneBox own = nodes_[at].box(best);
       const std::uint32_t made = take_node();
-      hang(made, 0, child, own);
-      hang(made, 1, body | kLeaf, box);
-      hang(at, best, made, own.united(box));
+      hang(made, 0, nodes_[at].child[best], true, own);
+      hang(made, 1, body, true, box);
+      hang(at, best, made, false, own.united(box));
     }
     fit_above(at);
     return;
@@ -97,7 +99,7 @@ void BoxTree::remove(std::uint32_t body) noexcept {
   std::uint32_t at = lane / kLanes;
   --leaves_;
   nodes_[at].clear(lane % kLanes);
-  const std::uint32_t used = nodes_[at].used();
+  const std::uint32_t used = nodes_[at].used;
   if (at == root_) {
     if (used != 0) return;
     in_order_ = false;
@@ -108,7 +110,8 @@ void BoxTree::remove(std::uint32_t body) noexcept {
     in_order_ = false;
     const auto last = static_cast<std::uint32_t>(std::countr_zero(used));
     const std::uint32_t parent = nodes_[at].parent;
-    hang(parent, nodes_[at].place, nodes_[at].child[last], nodes_[at].box(last));
+    hang(parent, nodes_[at].place, nodes_[at].child[last], nodes_[at].is_body(last),
+         nodes_[at].box(last));
     free_.push_back(at);
     at = parent;
   }
@@ -119,14 +122,7 @@ void BoxTree::refit() noexcept {
   if (root_ == kNone) return;
   // As dear as to build it: an order that is broken.
   if (!in_order_) return build();
-  double area = 0;
-  for (std::size_t i = nodes_.size(); i-- > 0;) {
-    const Node& node = nodes_[i];
-    const SceneBox box = node.whole();
-    area += box.area();
-    if (node.parent != kNone) nodes_[node.parent].set(node.place, box);
-  }
-  if (area > kWorn * built_area_) build();
+  if (refit_nodes(nodes_) > kWorn * built_area_) build();
 }
 
 void BoxTree::build() noexcept {
@@ -142,6 +138,27 @@ void BoxTree::build() noexcept {
   root_ = order_.empty() ? kNone : build(order_.data(), order_.data() + order_.size());
 }
 
+/// Those of the lower middles along the longest axis first.
+void BoxTree::part(Leaf* first, Leaf* at, Leaf* last) noexcept {
+  const auto middle_of = [](const Leaf& leaf, std::size_t k) {
+    return leaf.box.low[k] + leaf.box.high[k];
+  };
+  float low[3], high[3];
+  for (std::size_t k = 0; k < 3; ++k) low[k] = high[k] = middle_of(*first, k);
+  for (const Leaf* leaf = first; leaf != last; ++leaf)
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], middle_of(*leaf, k));
+      high[k] = std::max(high[k], middle_of(*leaf, k));
+    }
+  std::size_t axis = 0;
+  for (std::size_t k = 1; k < 3; ++k)
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  std::nth_element(first, at, last, [&](const Leaf& x, const Leaf& y) {
+    const float mx = middle_of(x, axis), my = middle_of(y, axis);
+    return mx != my ? mx < my : x.body < y.body;
+  });
+}
+
 /// A node over bodies.
 std::uint32_t BoxTree::build(Leaf* first, Leaf* last) noexcept {
   const auto node = static_cast<std::uint32_t>(nodes_.size());
@@ -149,42 +166,24 @@ std::uint32_t BoxTree::build(Leaf* first, Leaf* last) noexcept {
   // Full ones below, as far as they go.
   std::ptrdiff_t full = 1;
   while (full * kLanes < last - first) full *= kLanes;
-  const auto divide = [&](Leaf* from, Leaf* to) {
-    const std::ptrdiff_t parts = (to - from + full - 1) / full;
-    if (parts < 2) return to;
-    Leaf* const at = from + (parts + 1) / 2 * full;
-    const auto middle_of = [](const Leaf& leaf, std::size_t k) {
-      return leaf.box.low[k] + leaf.box.high[k];
-    };
-    float low[3], high[3];
-    for (std::size_t k = 0; k < 3; ++k) low[k] = high[k] = middle_of(*from, k);
-    for (const Leaf* leaf = from; leaf != to; ++leaf)
-      for (std::size_t k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], middle_of(*leaf, k));
-        high[k] = std::max(high[k], middle_of(*leaf, k));
-      }
-    std::size_t axis = 0;
-    for (std::size_t k = 1; k < 3; ++k)
-      if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
-    std::nth_element(from, at, to, [&](const Leaf& x, const Leaf& y) {
-      const float mx = middle_of(x, axis), my = middle_of(y, axis);
-      return mx != my ? mx < my : x.body < y.body;
-    });
-    return at;
-  };
-  Leaf* const half = divide(first, last);
-  Leaf* const ends[5] = {first, divide(first, half), half, divide(half, last), last};
   std::uint32_t lane = 0;
-  for (int k = 0; k < 4; ++k) {
-    Leaf *const from = ends[k], *const to = ends[k + 1];
-    if (from == to) continue;
-    if (to - from == 1) {
-      hang(node, lane++, from->body | kLeaf, from->box);
+  const auto divide = [&](const auto& again, Leaf* from, Leaf* to) -> void {
+    const std::ptrdiff_t parts = (to - from + full - 1) / full;
+    if (full == 1) {
+      for (; from != to; ++from) hang(node, lane++, from->body, true, from->box);
+    } else if (parts > 1) {
+      Leaf* const at = from + (parts + 1) / 2 * full;
+      part(from, at, to);
+      again(again, from, at);
+      again(again, at, to);
+    } else if (to - from == 1) {
+      hang(node, lane++, from->body, true, from->box);
     } else {
       const std::uint32_t child = build(from, to);
-      hang(node, lane++, child, nodes_[child].whole());
+      hang(node, lane++, child, false, nodes_[child].whole());
     }
-  }
+  };
+  divide(divide, first, last);
   built_area_ += nodes_[node].whole().area();
   return node;
 }

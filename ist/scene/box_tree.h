@@ -31,11 +31,95 @@ struct SceneBox {
   }
 };
 
-/// A hierarchy of boxes, four a node. Its shape changes no answer.
+/// Eight boxes of a hierarchy, each of a body or of a node below.
+struct alignas(64) BoxNode {
+  static constexpr std::uint32_t kLanes = 8;
+  static constexpr std::uint32_t kNone = ~0u;
+
+  float low[3][kLanes], high[3][kLanes];    ///< of none: nothing meets it
+  std::uint32_t child[kLanes];              ///< a body's number, or a node's
+  std::uint32_t used = 0, bodies = 0;       ///< a bit a lane
+  std::uint32_t parent = kNone, place = 0;  ///< the lane there
+
+  BoxNode() noexcept {
+    for (std::uint32_t k = 0; k < kLanes; ++k) clear(k);
+  }
+  void clear(std::uint32_t k) noexcept {
+    constexpr float kFar = std::numeric_limits<float>::infinity();
+    set(k, {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}});
+    child[k] = kNone;
+    used &= ~(1u << k);
+    bodies &= ~(1u << k);
+  }
+  void set(std::uint32_t k, const SceneBox& box) noexcept {
+    for (std::size_t c = 0; c < 3; ++c) {
+      low[c][k] = box.low[c];
+      high[c][k] = box.high[c];
+    }
+  }
+  bool is_body(std::uint32_t k) const noexcept { return (bodies >> k & 1) != 0; }
+  SceneBox box(std::uint32_t k) const noexcept {
+    return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
+  }
+  SceneBox whole() const noexcept {
+    SceneBox all = box(0);
+    for (std::uint32_t k = 1; k < kLanes; ++k) all = all.united(box(k));
+    return all;
+  }
+  /// A bit a lane.
+  std::uint32_t meeting(const SceneBox& box) const noexcept {
+    const auto four = [](const float* from) { return *reinterpret_cast<const Four*>(from); };
+    const auto meet = [&](std::uint32_t k) {
+      const Four zero{};
+      return (four(low[0] + k) <= box.high[0] + zero) & (four(high[0] + k) >= box.low[0] + zero) &
+             (four(low[1] + k) <= box.high[1] + zero) & (four(high[1] + k) >= box.low[1] + zero) &
+             (four(low[2] + k) <= box.high[2] + zero) & (four(high[2] + k) >= box.low[2] + zero);
+    };
+    using Bits = decltype(meet(0));
+    const Bits bits = (meet(0) & Bits{1, 2, 4, 8}) | (meet(4) & Bits{16, 32, 64, 128});
+    return static_cast<std::uint32_t>(bits[0] | bits[1] | bits[2] | bits[3]);
+  }
+
+ private:
+  /// A vector of g++ and clang++, on every machine.
+  using Four [[gnu::vector_size(4 * sizeof(float)), gnu::may_alias]] = float;
+};
+static_assert(sizeof(BoxNode) == 256);
+
+/// Two nodes, of which some pairs of lanes are still to be looked at; at most one of a pair is a
+/// body's.
+struct LanePairs {
+  std::uint32_t a, b;
+  std::uint64_t left;  ///< bit 8 · (A's lane) + (B's lane)
+};
+struct BodyPair {
+  std::uint32_t a, b;
+};
+/// A search for pairs in two hierarchies, or in one: then within each of its nodes, and below the
+/// pairs found there.
+struct PairSearch {
+  static constexpr std::size_t kMost = 256;
+
+  const BoxNode *a, *b;
+  std::uint32_t root_a, root_b;
+  LanePairs* stack;   ///< as long as both are deep
+  std::uint32_t end;  ///< nodes of one hierarchy; 1 for two
+  std::uint32_t next = 0;
+  std::size_t depth = 0;
+};
+/// Pairs of bodies whose boxes meet, once each: at most kMost of those that no call returned
+/// before. Returns their number: 0 at the end.
+std::size_t next_pairs(PairSearch& search, BodyPair* out) noexcept;
+
+/// Sets the boxes of nodes in those of their parents, which stand before them. Returns the sum of
+/// the nodes' areas.
+double refit_nodes(std::span<BoxNode> nodes) noexcept;
+
+/// A hierarchy of boxes, eight a node. Its shape changes no answer.
 class BoxTree {
  public:
-  static constexpr std::uint32_t kNone = ~0u;
-  static constexpr std::uint32_t kLanes = 4;
+  static constexpr std::uint32_t kNone = BoxNode::kNone;
+  static constexpr std::uint32_t kLanes = BoxNode::kLanes;
 
   /// Memory for `most` bodies, whose numbers are lower.
   explicit BoxTree(std::size_t most) { take_room(most); }
@@ -51,10 +135,18 @@ class BoxTree {
     nodes_[lane / kLanes].set(lane % kLanes, box);
     fit_above(lane / kLanes);
   }
-  /// Sets the box of a body alone: until refit() nothing may be asked.
-  void put(std::uint32_t body, const SceneBox& box) noexcept {
-    const std::uint32_t lane = lane_of_[body];
-    nodes_[lane / kLanes].set(lane % kLanes, box);
+  /// Sets the boxes of some of the bodies from `first` on: until refit() nothing may be asked.
+  void put(std::uint32_t first, std::uint32_t of, const float (&low)[3][kLanes],
+           const float (&high)[3][kLanes]) noexcept {
+    for (; of != 0; of &= of - 1) {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(of));
+      const std::uint32_t lane = lane_of_[first + k];
+      BoxNode& node = nodes_[lane / kLanes];
+      for (std::size_t c = 0; c < 3; ++c) {
+        node.low[c][lane % kLanes] = low[c][k];
+        node.high[c][lane % kLanes] = high[c][k];
+      }
+    }
   }
   SceneBox box_of(std::uint32_t body) const noexcept {
     const std::uint32_t lane = lane_of_[body];
@@ -72,10 +164,10 @@ class BoxTree {
   template <class Enter, class Visit>
   void each(const Enter& enter, const Visit& visit) const noexcept {
     visit_lanes(
-        [&](const Node& node) {
+        [&](const BoxNode& node) {
           std::uint32_t lanes = 0;
           for (std::uint32_t k = 0; k < kLanes; ++k)
-            if (node.child[k] != kNone && enter(node.box(k))) lanes |= 1u << k;
+            if ((node.used >> k & 1) != 0 && enter(node.box(k))) lanes |= 1u << k;
           return lanes;
         },
         visit);
@@ -83,7 +175,7 @@ class BoxTree {
   /// visit(body) of the leaves whose boxes meet this one.
   template <class Visit>
   void each_meeting(const SceneBox& box, const Visit& visit) const noexcept {
-    visit_lanes([&](const Node& node) { return node.meeting(box); }, visit);
+    visit_lanes([&](const BoxNode& node) { return node.meeting(box); }, visit);
   }
   /// visit(k, body) of the leaves whose boxes meet the k-th. Nodes of one box are fetched while
   /// those of others are looked at: a large hierarchy is not in the cache.
@@ -102,85 +194,35 @@ class BoxTree {
       ++first;
       const SceneBox& box = boxes[k];
       for (std::uint32_t lanes = nodes_[at].meeting(box); lanes != 0; lanes &= lanes - 1) {
-        const std::uint32_t child = nodes_[at].child[std::countr_zero(lanes)];
-        if (is_leaf(child)) {
-          visit(k, child & ~kLeaf);
+        const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+        const std::uint32_t child = nodes_[at].child[lane];
+        if (nodes_[at].is_body(lane)) {
+          visit(k, child);
         } else if (end - first < kRoom) {
-          __builtin_prefetch(&nodes_[child]);
-          __builtin_prefetch(reinterpret_cast<const char*>(&nodes_[child]) + 64);
+          for (std::size_t line = 0; line < sizeof(BoxNode); line += 64)
+            __builtin_prefetch(reinterpret_cast<const char*>(&nodes_[child]) + line);
           waiting[end++ % kRoom] = {child, k};
         } else {
-          visit_lanes([&](const Node& node) { return node.meeting(box); },
+          visit_lanes([&](const BoxNode& node) { return node.meeting(box); },
                       [&](std::uint32_t body) { visit(k, body); }, child);
         }
       }
     }
   }
 
-  /// visit(body, body) of all pairs of leaves whose boxes meet, once each.
-  template <class Visit>
-  void pairs_within(const Visit& visit) noexcept {
-    if (root_ != kNone) go_on(*this, visit);
-  }
-  /// The same of one leaf of this and one of another tree.
+  /// visit(body, body) of all pairs of bodies whose boxes meet, once each: of this hierarchy, or
+  /// one of each.
   template <class Visit>
   void pairs_with(const BoxTree& other, const Visit& visit) noexcept {
-    if (root_ != kNone && other.root_ != kNone) go_on(other, visit);
+    if (root_ == kNone || other.root_ == kNone) return;
+    const auto end = this == &other ? static_cast<std::uint32_t>(nodes_.size()) : 1;
+    PairSearch search{nodes_.data(), other.nodes_.data(), root_, other.root_, stack_.data(), end};
+    BodyPair some[PairSearch::kMost];
+    while (const std::size_t count = next_pairs(search, some))
+      for (std::size_t i = 0; i < count; ++i) visit(some[i].a, some[i].b);
   }
 
  private:
-  /// A child is a node's number, or a body's with this bit.
-  static constexpr std::uint32_t kLeaf = 1u << 31;
-  static bool is_leaf(std::uint32_t child) noexcept { return (child & kLeaf) != 0; }
-
-  /// A vector of g++ and clang++, on every machine.
-  using Four [[gnu::vector_size(4 * sizeof(float))]] = float;
-
-  struct alignas(64) Node {
-    Four low[3], high[3];  ///< of none: nothing meets it
-    std::uint32_t child[kLanes];
-    std::uint32_t parent, place;  ///< the lane there
-
-    Node() noexcept : parent(kNone), place(0) {
-      for (std::uint32_t k = 0; k < kLanes; ++k) clear(k);
-    }
-    void clear(std::uint32_t k) noexcept {
-      constexpr float kFar = std::numeric_limits<float>::infinity();
-      set(k, {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}});
-      child[k] = kNone;
-    }
-    void set(std::uint32_t k, const SceneBox& box) noexcept {
-      for (std::size_t c = 0; c < 3; ++c) {
-        low[c][k] = box.low[c];
-        high[c][k] = box.high[c];
-      }
-    }
-    SceneBox box(std::uint32_t k) const noexcept {
-      return {{low[0][k], low[1][k], low[2][k]}, {high[0][k], high[1][k], high[2][k]}};
-    }
-    SceneBox whole() const noexcept { return box(0).united(box(1)).united(box(2).united(box(3))); }
-    std::uint32_t used() const noexcept {
-      return (child[0] != kNone ? 1u : 0u) | (child[1] != kNone ? 2u : 0u) |
-             (child[2] != kNone ? 4u : 0u) | (child[3] != kNone ? 8u : 0u);
-    }
-    /// A bit a lane.
-    std::uint32_t meeting(const SceneBox& box) const noexcept {
-      const Four l0 = box.low[0] - Four{}, l1 = box.low[1] - Four{}, l2 = box.low[2] - Four{};
-      const auto meet = (low[0] <= box.high[0] + Four{}) & (high[0] >= l0) &
-                        (low[1] <= box.high[1] + Four{}) & (high[1] >= l1) &
-                        (low[2] <= box.high[2] + Four{}) & (high[2] >= l2);
-      const auto bits = meet & decltype(meet){1, 2, 4, 8};
-      return static_cast<std::uint32_t>(bits[0] | bits[1] | bits[2] | bits[3]);
-    }
-  };
-  /// Two nodes, or a node with itself, or a node and a leaf's lane; and of their lanes the pairs
-  /// that are still to be looked at.
-  struct Two {
-    std::uint32_t a, b;
-    bool leaf_a, leaf_b;
-    std::uint16_t left;  ///< bit 4 · (A's lane) + (B's lane); of a leaf lane 0 alone
-  };
-
   template <class LanesOf, class Visit>
   void visit_lanes(const LanesOf& lanes_of, const Visit& visit) const noexcept {
     if (root_ != kNone) visit_lanes(lanes_of, visit, root_);
@@ -192,15 +234,16 @@ class BoxTree {
     for (;;) {
       if (lanes == 0) {
         if (at == from) return;
-        const Node& done = nodes_[at];
+        const BoxNode& done = nodes_[at];
         at = done.parent;
         lanes = lanes_of(nodes_[at]) & ~((2u << done.place) - 1);
         continue;
       }
-      const std::uint32_t child = nodes_[at].child[std::countr_zero(lanes)];
+      const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+      const std::uint32_t child = nodes_[at].child[lane];
       lanes &= lanes - 1;
-      if (is_leaf(child)) {
-        visit(child & ~kLeaf);
+      if (nodes_[at].is_body(lane)) {
+        visit(child);
       } else {
         at = child;
         lanes = lanes_of(nodes_[at]);
@@ -208,79 +251,23 @@ class BoxTree {
     }
   }
 
-  /// All pairs of lanes of two nodes that meet.
-  static std::uint16_t meeting(const Node& a, const Node& b) noexcept {
-    std::uint32_t out = 0;
-    for (std::uint32_t i = 0; i < kLanes; ++i)
-      if (a.child[i] != kNone) out |= b.meeting(a.box(i)) << kLanes * i;
-    return static_cast<std::uint16_t>(out);
-  }
-  /// Of a node with itself: each pair once, and nodes with themselves.
-  static std::uint16_t meeting(const Node& node) noexcept {
-    std::uint32_t out = 0;
-    for (std::uint32_t i = 0; i < kLanes; ++i) {
-      if (node.child[i] == kNone) continue;
-      out |= (node.meeting(node.box(i)) & ~((2u << i) - 1)) << kLanes * i;
-      if (!is_leaf(node.child[i])) out |= 1u << (kLanes + 1) * i;
-    }
-    return static_cast<std::uint16_t>(out);
-  }
-
-  template <class Visit>
-  void go_on(const BoxTree& other, const Visit& visit) noexcept {
-    const bool same = this == &other;
-    const std::vector<Node>&of_a = nodes_, &of_b = other.nodes_;
-    stack_.clear();
-    stack_.push_back({root_, other.root_, false, false,
-                      same ? meeting(of_a[root_]) : meeting(of_a[root_], of_b[other.root_])});
-    while (!stack_.empty()) {
-      Two& two = stack_.back();
-      if (two.left == 0) {
-        stack_.pop_back();
-        continue;
-      }
-      const auto bit = static_cast<std::uint32_t>(std::countr_zero(two.left));
-      two.left = static_cast<std::uint16_t>(two.left & (two.left - 1));
-      // Lanes of nodes; a leaf's is its own.
-      const std::uint32_t a = two.leaf_a ? two.a : kLanes * two.a + bit / kLanes;
-      const std::uint32_t b = two.leaf_b ? two.b : kLanes * two.b + bit % kLanes;
-      const std::uint32_t child_a = of_a[a / kLanes].child[a % kLanes];
-      const std::uint32_t child_b = of_b[b / kLanes].child[b % kLanes];
-      if (is_leaf(child_a) && is_leaf(child_b)) {
-        visit(child_a & ~kLeaf, child_b & ~kLeaf);
-      } else if (is_leaf(child_a)) {
-        const std::uint32_t lanes = of_b[child_b].meeting(of_a[a / kLanes].box(a % kLanes));
-        stack_.push_back({a, child_b, true, false, static_cast<std::uint16_t>(lanes)});
-      } else if (is_leaf(child_b)) {
-        const std::uint32_t lanes = of_a[child_a].meeting(of_b[b / kLanes].box(b % kLanes));
-        std::uint32_t spread = 0;
-        for (std::uint32_t i = 0; i < kLanes; ++i) spread |= (lanes >> i & 1) << kLanes * i;
-        stack_.push_back({child_a, b, false, true, static_cast<std::uint16_t>(spread)});
-      } else {
-        stack_.push_back({child_a, child_b, false, false,
-                          same && child_a == child_b ? meeting(of_a[child_a])
-                                                     : meeting(of_a[child_a], of_b[child_b])});
-      }
-    }
-  }
-
-  /// A body, or a node that is built.
   struct Leaf {
     SceneBox box;
     std::uint32_t body;
   };
   std::uint32_t take_node() noexcept;
   void fit_above(std::uint32_t node) noexcept;
-  void hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child,
+  void hang(std::uint32_t node, std::uint32_t lane, std::uint32_t child, bool is_body,
             const SceneBox& box) noexcept;
   void build() noexcept;
+  static void part(Leaf* first, Leaf* at, Leaf* last) noexcept;
   std::uint32_t build(Leaf* first, Leaf* last) noexcept;
 
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> lane_of_;  ///< of a body: 4 · node + lane
+  std::vector<BoxNode> nodes_;
+  std::vector<std::uint32_t> lane_of_;  ///< of a body: 8 · node + lane
   std::vector<std::uint32_t> free_;
   std::vector<Leaf> order_;
-  std::vector<Two> stack_;
+  std::vector<LanePairs> stack_;
   std::uint32_t root_ = kNone, leaves_ = 0;
   double built_area_ = 0;  ///< of all nodes, when they were built
   std::size_t added_ = 0;  ///< since

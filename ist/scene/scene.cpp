@@ -26,7 +26,7 @@ Scene& Scene::operator=(Scene&&) noexcept = default;
 void Scene::add(const SceneBody& body) {
   Impl& all = *impl_;
   const std::string name = "body " + std::to_string(body.number);
-  if (all.find(body.number) != nullptr) throw Error(name + " is in the scene already");
+  if (all.find(body.number) != kNone) throw Error(name + " is in the scene already");
   if (body.group >= kSceneGroups)
     throw Error(name + ": group " + std::to_string(body.group) + " is not below " +
                 std::to_string(kSceneGroups));
@@ -40,9 +40,11 @@ void Scene::add(const SceneBody& body) {
   } else {
     // Those of bodies that were removed since the last step are not free yet.
     at = static_cast<std::uint32_t>(all.bodies.size());
+    all.take_room(at + std::size_t{1});
     all.bodies.emplace_back();
-    all.filtered.emplace_back();
-    all.take_room(all.bodies.size());
+    all.blocks.resize(at / kCount + 1);
+    all.lanes.resize(all.blocks.size());
+    all.filtered.resize(kCount * all.blocks.size());
   }
   all.index_of.emplace(body.number, at);
   all.bodies[at] = {};
@@ -51,15 +53,19 @@ void Scene::add(const SceneBody& body) {
   all.filtered[at] = {body.number, body.group,
                       body.layers, body.meets,
                       body.moves,  std::holds_alternative<PlacedShape>(body.solid.placed)};
-  all.place(all.bodies[at], false);
+  all.blocks[at / kCount].set_pose(
+      at % kCount, std::visit([](const auto& placed) { return placed.pose; }, body.solid.placed));
+  all.prepare(at);
+  all.put_waiting(false);
 }
 
 bool Scene::remove(std::uint32_t number) noexcept {
-  auto* const body = impl_->find(number);
-  if (body == nullptr) return false;
+  const std::uint32_t at = impl_->find(number);
+  if (at == kNone) return false;
   impl_->index_of.erase(number);
-  impl_->take_out(*body);
-  impl_->note_moved(*body);
+  impl_->take_out(at);
+  impl_->note_moved(at);
+  impl_->removed.push_back(at);
   return true;
 }
 
@@ -69,15 +75,18 @@ bool Scene::set_pose(std::uint32_t number, const Pose& pose) noexcept {
 
 std::size_t Scene::set_poses(std::span<const std::uint32_t> numbers,
                              std::span<const Pose> poses) noexcept {
-  return impl_->set_all(numbers, poses, [](SceneBody& body, const Pose& pose) {
-    std::visit([&](auto& placed) { placed.pose = pose; }, body.solid.placed);
-  });
+  return impl_->set_all(numbers, poses,
+                        [&](std::uint32_t block, std::uint32_t k, const Pose& pose) {
+                          impl_->blocks[block].set_pose(k, pose);
+                        });
 }
 
 std::size_t Scene::set_motions(std::span<const std::uint32_t> numbers,
                                std::span<const Motion> motions) noexcept {
   return impl_->set_all(numbers, motions,
-                        [](SceneBody& body, const Motion& motion) { body.motion = motion; });
+                        [&](std::uint32_t block, std::uint32_t k, const Motion& motion) {
+                          impl_->bodies[kCount * block + k].given.motion = motion;
+                        });
 }
 
 std::size_t Scene::size() const noexcept { return impl_->index_of.size(); }
@@ -92,8 +101,11 @@ std::vector<std::uint32_t> Scene::numbers() const {
 }
 
 std::optional<SceneBody> Scene::body(std::uint32_t number) const {
-  auto* const body = impl_->find(number);
-  return body == nullptr ? std::nullopt : std::optional(body->given);
+  const std::uint32_t at = impl_->find(number);
+  if (at == kNone) return std::nullopt;
+  SceneBody out = impl_->bodies[at].given;
+  out.solid = impl_->solid_of(at);
+  return out;
 }
 
 void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule) {
@@ -127,7 +139,7 @@ void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRu
       all.widths.by_spheres |= one.penetration.measure == Measure::matched;
     }
   }
-  all.place_all();
+  all.prepare_all();
 }
 
 void Scene::exclude(std::uint32_t a, std::uint32_t b) {
@@ -136,7 +148,7 @@ void Scene::exclude(std::uint32_t a, std::uint32_t b) {
   if (at != list.end() && *at == key_of(a, b)) return;
   list.insert(at, key_of(a, b));
   for (const std::uint32_t number : {a, b})
-    if (auto* const body = impl_->find(number)) impl_->note_moved(*body);
+    if (const std::uint32_t at = impl_->find(number); at != kNone) impl_->note_moved(at);
 }
 
 void Scene::include(std::uint32_t a, std::uint32_t b) noexcept {
@@ -145,14 +157,14 @@ void Scene::include(std::uint32_t a, std::uint32_t b) noexcept {
   if (at == list.end() || *at != key_of(a, b)) return;
   list.erase(at);
   for (const std::uint32_t number : {a, b})
-    if (auto* const body = impl_->find(number)) impl_->note_moved(*body);
+    if (const std::uint32_t at = impl_->find(number); at != kNone) impl_->note_moved(at);
 }
 
 void Scene::set_filter(bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept,
                        const void* context) noexcept {
   impl_->filter = filter;
   impl_->context = context;
-  impl_->place_all();
+  impl_->prepare_all();
 }
 
 SceneStep Scene::step(const ParallelFor& parallel) noexcept { return impl_->step(parallel); }

@@ -15,6 +15,7 @@
 namespace ist {
 
 constexpr std::uint32_t kNone = BoxTree::kNone;
+constexpr std::uint32_t kCount = BodyBlock::kCount;
 
 inline std::uint64_t key_of(std::uint32_t a, std::uint32_t b) noexcept {
   return std::uint64_t{std::min(a, b)} << 32 | std::max(a, b);
@@ -25,15 +26,22 @@ inline ScenePairName name_of(std::uint64_t key) noexcept {
 
 struct Scene::Impl {
   struct Body {
-    SceneBody given;
+    SceneBody given;  ///< but its pose, which is in its block
     BodyBox kept;
-    Place place = Place::free;
   };
   /// What is asked of a body for every box that its own meets.
   struct Filtered {
     std::uint32_t number = 0, group = 0, layers = 0, meets = 0;
     bool moves = false, is_field = false;
-    bool moved = false;  ///< or added, since the last step
+    Place place = Place::free;
+  };
+  /// Of the bodies of a block, a bit each.
+  struct Lanes {
+    std::uint8_t in_vectors = 0;  ///< place_boxes() makes their boxes
+    std::uint8_t moving = 0;      ///< their boxes are in that hierarchy, as in `still`
+    std::uint8_t still = 0;
+    std::uint8_t waiting = 0;  ///< for put_waiting()
+    std::uint8_t moved = 0;    ///< or added, since the last step
   };
 
   /// Two bodies of which one moved whose boxes meet.
@@ -55,8 +63,6 @@ struct Scene::Impl {
 
   explicit Impl(const SceneSettings& given)
       : settings(given), still(given.max_bodies), moving(given.max_bodies) {
-    bodies.reserve(given.max_bodies);
-    filtered.reserve(given.max_bodies);
     index_of.reserve(given.max_bodies);
     take_room(given.max_bodies);
     for (auto* const list : {&now, &before, &fresh}) list->reserve(given.max_pairs);
@@ -73,8 +79,14 @@ struct Scene::Impl {
 
   /// For as many bodies, also those that were removed since the last step.
   void take_room(std::size_t most) {
-    for (auto* const list : {&free_bodies, &moved, &endless, &refused, &refused_bodies})
+    bodies.reserve(most);
+    const std::size_t of_eight = (most + kCount - 1) / kCount;
+    filtered.reserve(kCount * of_eight);
+    blocks.reserve(of_eight);
+    lanes.reserve(of_eight);
+    for (auto* const list : {&free_bodies, &removed, &endless, &refused, &refused_bodies})
       list->reserve(most);
+    for (auto* const list : {&waiting, &moved}) list->reserve(of_eight);
     still.take_room(most);
     moving.take_room(most);
   }
@@ -82,96 +94,175 @@ struct Scene::Impl {
   SceneRule& rule_of(std::uint32_t i, std::uint32_t j) noexcept {
     return rules[filtered[i].group * kSceneGroups + filtered[j].group];
   }
-  Body* find(std::uint32_t number) noexcept {
+  bool is_at(std::uint32_t i, std::uint32_t number) const noexcept {
+    return filtered[i].number == number && filtered[i].place != Place::free;
+  }
+  /// The index of a body, kNone if there is none; quick if it is `guess`.
+  std::uint32_t find(std::uint32_t number, std::uint32_t guess = kNone) const noexcept {
+    if (guess < bodies.size() && is_at(guess, number)) return guess;
     const auto found = index_of.find(number);
-    return found == index_of.end() ? nullptr : &bodies[found->second];
+    return found == index_of.end() ? kNone : found->second;
   }
-  std::uint32_t index(const Body& body) const noexcept {
-    return static_cast<std::uint32_t>(&body - bodies.data());
+  BoxTree& tree_of(std::uint32_t i) noexcept { return filtered[i].moves ? moving : still; }
+  Pose pose_of(std::uint32_t i) const noexcept { return blocks[i / kCount].pose(i % kCount); }
+  PlacedSolid solid_of(std::uint32_t i) const noexcept {
+    PlacedSolid out = bodies[i].given.solid;
+    std::visit([&](auto& placed) { placed.pose = pose_of(i); }, out.placed);
+    return out;
   }
-  BoxTree& tree_of(const Body& body) noexcept { return body.given.moves ? moving : still; }
 
-  void note_moved(Body& body) noexcept {
-    const std::uint32_t i = index(body);
-    if (!std::exchange(filtered[i].moved, true)) moved.push_back(i);
+  /// Some of a block's.
+  void note_moved(std::uint32_t block, std::uint32_t of) noexcept {
+    Lanes& all = lanes[block];
+    if (all.moved == 0) moved.push_back(block);
+    all.moved = static_cast<std::uint8_t>(all.moved | of);
+  }
+  void note_moved(std::uint32_t i) noexcept { note_moved(i / kCount, 1u << i % kCount); }
+  bool has_moved(std::uint32_t i) const noexcept {
+    return (lanes[i / kCount].moved >> i % kCount & 1) != 0;
+  }
+  /// True if they are more than an eighth.
+  bool many_moved() const noexcept {
+    const std::size_t most = still.size() + moving.size();
+    std::size_t count = 0;
+    for (auto block = moved.begin(); block != moved.end() && 8 * count <= most; ++block)
+      count += static_cast<std::size_t>(std::popcount(lanes[*block].moved));
+    return 8 * count > most;
+  }
+  /// visit(index) of bodies that moved and have a box.
+  template <class Visit>
+  void each_moved(const Visit& visit) noexcept {
+    for (const std::uint32_t block : moved)
+      for (std::uint32_t of = lanes[block].moved; of != 0; of &= of - 1) {
+        const auto i = kCount * block + static_cast<std::uint32_t>(std::countr_zero(of));
+        if (filtered[i].place == Place::tree) visit(i);
+      }
   }
 
   std::vector<std::uint32_t>* list_of(Place place) noexcept {
     return place == Place::endless ? &endless : place == Place::refused ? &refused_bodies : nullptr;
   }
 
-  void take_out(Body& body) noexcept {
-    if (body.place == Place::tree) tree_of(body).remove(index(body));
-    if (auto* const list = list_of(body.place))
-      list->erase(std::find(list->begin(), list->end(), index(body)));
-    body.place = Place::free;
-  }
-
-  static const Pose& pose_of(const Body& body) noexcept {
-    return std::visit([](const auto& placed) -> const Pose& { return placed.pose; },
-                      body.given.solid.placed);
-  }
-
-  /// Puts a body where it stands. `at_once`: its hierarchy is refitted afterwards.
-  void place(Body& body, bool at_once) noexcept {
-    SceneBox box;
-    const Place place = body.kept.place(pose_of(body), widths, body.given.motion, box);
-    put_down(body, at_once, place, box);
-  }
-  void put_down(Body& body, bool at_once, Place place, const SceneBox& box) noexcept {
-    note_moved(body);
-    if (place == Place::tree && body.place == Place::tree) {
-      if (at_once)
-        tree_of(body).put(index(body), box);
-      else
-        tree_of(body).move(index(body), box);
-      return;
+  void take_out(std::uint32_t i) noexcept {
+    const Place place = std::exchange(filtered[i].place, Place::free);
+    if (place == Place::tree) {
+      tree_of(i).remove(i);
+      Lanes& all = lanes[i / kCount];
+      (filtered[i].moves ? all.moving : all.still) &=
+          static_cast<std::uint8_t>(~(1u << i % kCount));
     }
-    take_out(body);
-    body.place = place;
-    if (place == Place::tree)
-      tree_of(body).add(index(body), box);
-    else
-      list_of(place)->push_back(index(body));
+    if (auto* const list = list_of(place)) list->erase(std::find(list->begin(), list->end(), i));
   }
-  void place_all() noexcept {
-    for (const auto& [number, at] : index_of) place(bodies[at], true);
+
+  /// put_waiting() must follow, which puts bodies where they stand.
+  void wait(std::uint32_t block, std::uint32_t of) noexcept {
+    Lanes& all = lanes[block];
+    if (all.waiting == 0) waiting.push_back(block);
+    all.waiting = static_cast<std::uint8_t>(all.waiting | of);
+  }
+  void put_waiting(bool at_once) noexcept {
+    for (const std::uint32_t block : waiting)
+      put(block, std::exchange(lanes[block].waiting, std::uint8_t{0}), at_once);
+    waiting.clear();
+    if (!at_once) return;
     still.refit();
     moving.refit();
   }
+  /// `at_once`: hierarchies are refitted afterwards.
+  void put(std::uint32_t b, std::uint32_t left, bool at_once) noexcept {
+    const BodyBlock& block = blocks[b];
+    const Lanes& all = lanes[b];
+    const std::uint32_t quick = left & all.in_vectors;
+    note_moved(b, left);
+    BlockBoxes boxes;
+    if (quick != 0) place_boxes(block, quick, boxes);
+    if (at_once) {
+      const std::uint32_t stay = quick & boxes.placed;
+      moving.put(kCount * b, stay & all.moving, boxes.low, boxes.high);
+      still.put(kCount * b, stay & all.still, boxes.low, boxes.high);
+      left &= ~(stay & (all.moving | all.still));
+    }
+    for (; left != 0; left &= left - 1) {
+      const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+      const Body& body = bodies[kCount * b + k];
+      SceneBox box;
+      Place place = (boxes.placed >> k & 1) != 0 ? Place::tree : Place::refused;
+      if ((quick >> k & 1) != 0)
+        box = boxes.box(k);
+      else
+        place = body.kept.place(block.pose(k), widths, body.given.motion, box);
+      put_down(kCount * b + k, place, box);
+    }
+  }
+  void put_down(std::uint32_t i, Place place, const SceneBox& box) noexcept {
+    if (place == Place::tree && filtered[i].place == Place::tree) {
+      tree_of(i).move(i, box);
+      return;
+    }
+    take_out(i);
+    filtered[i].place = place;
+    if (place == Place::tree) {
+      tree_of(i).add(i, box);
+      Lanes& all = lanes[i / kCount];
+      (filtered[i].moves ? all.moving : all.still) |= static_cast<std::uint8_t>(1u << i % kCount);
+    } else {
+      list_of(place)->push_back(i);
+    }
+  }
+  /// What of its box does not change with its pose.
+  void prepare(std::uint32_t i) noexcept {
+    const std::uint32_t k = i % kCount;
+    Lanes& all = lanes[i / kCount];
+    const bool quick = bodies[i].kept.put(blocks[i / kCount], k, widths);
+    all.in_vectors =
+        static_cast<std::uint8_t>((all.in_vectors & ~(1u << k)) | unsigned{quick} << k);
+    wait(i / kCount, 1u << k);
+  }
+  void prepare_all() noexcept {
+    for (const auto& [number, i] : index_of) prepare(i);
+    put_waiting(true);
+  }
 
-  /// set(body, values[i]) of each that there is. Returns how many.
+  /// set(block, lane, values[i]) of each that there is. Returns how many.
   template <class Values, class Set>
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
     const std::size_t count = std::min(numbers.size(), values.size());
     const bool at_once = 8 * count > index_of.size();
-    std::size_t done = 0, waiting = 0;
-    Body* of[BodyBlock::kCount];
-    BodyBlock block;
-    for (std::size_t i = 0; i < count; ++i) {
-      Body* const body = find(numbers[i]);
-      if (body == nullptr) continue;
-      set(body->given, values[i]);
-      ++done;
-      if (!body->kept.put(block, waiting, pose_of(*body), widths)) {
-        place(*body, at_once);
+    // Full blocks, while they are in the cache, but some later: a vector that is read as soon as
+    // its numbers are written one by one waits for them.
+    std::uint32_t full[16], ready = 0;
+    const auto put_full = [&] {
+      for (std::uint32_t b = 0; b < ready; ++b) put(full[b], (1u << kCount) - 1, at_once);
+      ready = 0;
+    };
+    std::size_t done = 0;
+    std::uint32_t at = 0;
+    for (std::size_t i = 0; i < count;) {
+      at = find(numbers[i], at);
+      if (at == kNone) {
+        ++i;
         continue;
       }
-      of[waiting++] = body;
-      if (waiting < BodyBlock::kCount) continue;
-      place_boxes(block);
-      for (std::size_t k = 0; k < waiting; ++k)
-        put_down(*of[k], at_once, block.placed >> k & 1 ? Place::tree : Place::refused,
-                 {{block.low[0][k], block.low[1][k], block.low[2][k]},
-                  {block.high[0][k], block.high[1][k], block.high[2][k]}});
-      waiting = 0;
+      // In a row, as far as its block goes.
+      const std::uint32_t k = at % kCount;
+      const std::size_t most = std::min<std::size_t>(kCount - k, count - i);
+      const Filtered* const own = filtered.data() + at;
+      std::uint32_t row = 1;
+      while (row < most && own[row].number == numbers[i + row] && own[row].place != Place::free)
+        ++row;
+      for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
+      if (row == kCount)
+        full[ready++] = at / kCount;
+      else
+        wait(at / kCount, ((1u << row) - 1) << k);
+      if (ready == std::size(full)) put_full();
+      at += row;
+      i += row;
+      done += row;
     }
-    for (std::size_t k = 0; k < waiting; ++k) place(*of[k], at_once);
-    if (at_once) {
-      still.refit();
-      moving.refit();
-    }
+    put_full();
+    put_waiting(at_once);
     return done;
   }
 
@@ -188,7 +279,7 @@ struct Scene::Impl {
   }
 
   void note(std::uint32_t i, std::uint32_t j) noexcept {
-    if ((!filtered[i].moved && !filtered[j].moved) || !may_meet(i, j)) return;
+    if ((!has_moved(i) && !has_moved(j)) || !may_meet(i, j)) return;
     if (found.size() + now.size() >= settings.max_pairs &&
         found.size() + count_kept() == settings.max_pairs) {
       exceeded = true;
@@ -201,8 +292,8 @@ struct Scene::Impl {
   /// Pairs of which a body moved whose boxes meet.
   void find_candidates() noexcept {
     const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
-    if (8 * moved.size() > still.size() + moving.size()) {
-      moving.pairs_within(both);
+    if (many_moved()) {
+      moving.pairs_with(moving, both);
       moving.pairs_with(still, both);
     } else {
       constexpr std::size_t kTogether = 64;
@@ -212,38 +303,36 @@ struct Scene::Impl {
       const auto ask = [&] {
         const auto visit = [&](std::uint32_t k, std::uint32_t j) {
           // Two that moved find each other; two that cannot move are no pair.
-          if (j != of[k] && (!filtered[j].moved || of[k] < j)) note(of[k], j);
+          if (j != of[k] && (!has_moved(j) || of[k] < j)) note(of[k], j);
         };
         moving.each_meeting(std::span(boxes, count), visit);
         still.each_meeting(std::span(boxes, count), visit);
         count = 0;
       };
-      for (const std::uint32_t i : moved) {
-        if (bodies[i].place != Place::tree) continue;
+      each_moved([&](std::uint32_t i) {
         of[count] = i;
-        boxes[count++] = tree_of(bodies[i]).box_of(i);
+        boxes[count++] = tree_of(i).box_of(i);
         if (count == kTogether) ask();
-      }
+      });
       ask();
     }
     for (const std::uint32_t i : endless) {
-      if (filtered[i].moved) {
-        for (std::uint32_t j = 0; j < bodies.size(); ++j) {
-          const Body& other = bodies[j];
+      if (has_moved(i)) {
+        for (std::uint32_t j = 0; j < filtered.size(); ++j) {
+          const Place other = filtered[j].place;
           // Two that moved find each other.
-          if (other.place == Place::tree ||
-              (other.place == Place::endless && j != i && (!filtered[j].moved || i < j)))
+          if (other == Place::tree ||
+              (other == Place::endless && j != i && (!has_moved(j) || i < j)))
             note(i, j);
         }
         continue;
       }
-      for (const std::uint32_t j : moved)
-        if (bodies[j].place == Place::tree) note(i, j);
+      each_moved([&](std::uint32_t j) { note(i, j); });
     }
   }
 
   bool is_kept(const Candidate& two) const noexcept {
-    return !filtered[two.body[0]].moved && !filtered[two.body[1]].moved;
+    return !has_moved(two.body[0]) && !has_moved(two.body[1]);
   }
 
   /// Pairs of the step before of which no body moved: their answers stay.
@@ -271,7 +360,7 @@ struct Scene::Impl {
 
   void answer(Candidate& two, Workspace& workspace) noexcept {
     const Body &a = bodies[two.body[0]], &b = bodies[two.body[1]];
-    const PlacedSolid &solid_a = a.given.solid, &solid_b = b.given.solid;
+    const PlacedSolid solid_a = solid_of(two.body[0]), solid_b = solid_of(two.body[1]);
     const SceneRule& rule = rule_of(two.body[0], two.body[1]);
     if (rule.answer == SceneAnswer::overlap) {
       const YesNoAnswer found = rule.margin > 0 ? overlap(solid_a, solid_b, rule.margin, workspace)
@@ -320,18 +409,19 @@ struct Scene::Impl {
     std::uint64_t differ = 0;
     for (const Found& two : found) differ |= two.key ^ found[0].key;
     sorted.resize(found.size());
-    constexpr int kDigit = 11;
-    for (int shift = 0; differ >> shift != 0; shift += kDigit) {
+    const int bits = found.size() < 4096 ? 8 : 11;
+    std::uint32_t ends[(1u << 11) + 1];
+    for (int shift = 0; differ >> shift != 0; shift += bits) {
       shift += std::countr_zero(differ >> shift);
       const auto digit = [&](const Found& two) {
-        return static_cast<std::size_t>(two.key >> shift & ((1u << kDigit) - 1));
+        return static_cast<std::size_t>(two.key >> shift & ((1u << bits) - 1));
       };
-      std::uint32_t ends[(1u << kDigit) + 1] = {};
+      std::fill(ends, ends + (1u << bits) + 1, 0);
       for (const Found& two : found) ++ends[digit(two) + 1];
-      for (std::size_t i = 1; i < 1u << kDigit; ++i) ends[i] += ends[i - 1];
+      for (std::size_t i = 1; i < 1u << bits; ++i) ends[i] += ends[i - 1];
       for (const Found& two : found) sorted[ends[digit(two)]++] = two;
       std::swap(found, sorted);
-      if (shift + kDigit >= 64) break;
+      if (shift + bits >= 64) break;
     }
   }
 
@@ -357,7 +447,7 @@ struct Scene::Impl {
     moving.settle();
     SceneStep out;
     refused.clear();
-    for (const std::uint32_t i : refused_bodies) refused.push_back(bodies[i].given.number);
+    for (const std::uint32_t i : refused_bodies) refused.push_back(filtered[i].number);
     std::sort(refused.begin(), refused.end());
     out.refused = refused;
     kept.reset();
@@ -384,11 +474,10 @@ struct Scene::Impl {
       for (ScenePair& pair : pairs) pair.event = SceneEvent::stays;
       ended.clear();
     }
-    for (const std::uint32_t i : moved) {
-      filtered[i].moved = false;
-      if (bodies[i].place == Place::free) free_bodies.push_back(i);
-    }
+    for (const std::uint32_t block : moved) lanes[block].moved = 0;
     moved.clear();
+    free_bodies.insert(free_bodies.end(), removed.begin(), removed.end());
+    removed.clear();
     out.pairs = pairs;
     out.ended = ended;
     return out;
@@ -441,9 +530,12 @@ struct Scene::Impl {
   BoxWidths widths = {.by_spheres = true};  ///< as the rules need
   BoxTree still, moving;
   std::vector<Body> bodies;
-  std::vector<Filtered> filtered;  ///< by index, as `bodies`
+  std::vector<Filtered> filtered;  ///< by index, as `bodies`, and to the end of their block
+  std::vector<BodyBlock> blocks;   ///< of eight bodies each, as `lanes`
+  std::vector<Lanes> lanes;
+  std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
-  std::vector<std::uint32_t> free_bodies, moved, endless, refused_bodies, refused;
+  std::vector<std::uint32_t> free_bodies, removed, endless, refused_bodies, refused;
   std::vector<std::uint64_t> excluded;
   bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept = nullptr;
   const void* context = nullptr;

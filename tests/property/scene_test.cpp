@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "scene/body_box.h"
 #include "support/answer_bits.h"
 #include "support/baked.h"
 #include "support/surface_queries.h"
@@ -342,6 +343,62 @@ SceneRule exact_rule(double margin = 0) {
   rule.penetration.measure = Measure::exact;
   rule.margin = margin;
   return rule;
+}
+
+TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
+  std::size_t met = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Pile pile(seed);
+    const std::uint32_t count = 100 * (1u << 2 * (seed % 3));
+    Scene scene({.max_bodies = count, .max_pairs = 400'000});
+    SceneRule rule;
+    rule.answer = SceneAnswer::boxes;
+    scene.set_rule(0, 0, rule);
+    std::map<std::uint32_t, SceneBody> bodies;
+    const auto body = [&](std::uint32_t number) {
+      SceneBody out = block_at(number, 0, pile.below(3) != 0);
+      // A floor, and what is 1e4 times as small; in a corner, or on a lattice.
+      const double size = number == 0 ? 10 : std::exp2(pile.uniform(-10, seed % 2 == 0 ? 0 : -3));
+      out.solid = PlacedSolid(block().view(), pile.pose(), size);
+      return out;
+    };
+    for (std::uint32_t i = 0; i < count; ++i) scene.add(bodies[i] = body(i));
+    for (int step = 0; step < 4; ++step) {
+      SCOPED_TRACE(std::to_string(seed) + " step " + std::to_string(step));
+      std::vector<Numbers> found, wanted;
+      for (const ScenePair& pair : scene.step().pairs) found.emplace_back(pair.a, pair.b);
+      std::vector<SceneBox> boxes(count);
+      std::vector<bool> has(count);
+      for (const auto& [i, one] : bodies)
+        has[i] = BodyBox(one.solid).place(std::get<PlacedAsset>(one.solid.placed).pose,
+                                          {.by_spheres = true}, {}, boxes[i]) == Place::tree;
+      for (std::uint32_t i = 0; i < count; ++i)
+        for (std::uint32_t j = i + 1; j < count; ++j) {
+          bool meet = has[i] && has[j] && (bodies[i].moves || bodies[j].moves);
+          for (std::size_t c = 0; c < 3; ++c)
+            meet =
+                meet && boxes[i].low[c] <= boxes[j].high[c] && boxes[j].low[c] <= boxes[i].high[c];
+          if (meet) wanted.emplace_back(i, j);
+        }
+      EXPECT_EQ(found, wanted);
+      met += wanted.size();
+      // All move in a row, or some one by one, some of which are other bodies then.
+      std::vector<std::uint32_t> numbers;
+      std::vector<Pose> poses;
+      for (std::uint32_t i = 0; i < count; ++i) {
+        if (step % 2 == 1 && pile.below(5) != 0) continue;
+        if (step % 2 == 1 && pile.below(2) == 0) {
+          EXPECT_TRUE(scene.remove(i));
+          scene.add(bodies[i] = body(i));
+        }
+        numbers.push_back(i);
+        poses.push_back(pile.pose());
+        std::get<PlacedAsset>(bodies[i].solid.placed).pose = poses.back();
+      }
+      EXPECT_EQ(scene.set_poses(numbers, poses), numbers.size());
+    }
+  }
+  EXPECT_GT(met, 10'000u);
 }
 
 TEST(Scene, TouchingBlocksMeetAndApartOnesComeWithinTheMargin) {

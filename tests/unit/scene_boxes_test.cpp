@@ -32,13 +32,17 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
           block.t[c][k] = below(3) == 0 ? 0 : 1e3 * size * uniform(random);
         }
         block.wider[k] = below(2) == 0 ? 0 : 0.125 * size;
-        for (int c = 0; c < 4; ++c) block.q[c][k] = below(4) == 0 ? 0 : uniform(random);
+        for (int c = 0; c < 4; ++c) {
+          block.q[c][k] = below(4) == 0 ? 0 : uniform(random);
+          if (round % 3 == 0) block.q[c][k] = c == round % 4 ? 1 : 0;
+        }
         const double odd[] = {std::numeric_limits<double>::quiet_NaN(),
                               std::numeric_limits<double>::infinity(), 1e-160, 1e308};
         if (below(20) == 0) block.q[below(4)][k] = odd[below(3)];
         if (below(20) == 0) block.t[below(3)][k] = odd[below(4)];
       }
-      place_boxes(block);
+      BlockBoxes boxes;
+      place_boxes(block, 0xff, boxes);
       for (std::size_t k = 0; k < BodyBlock::kCount; ++k) {
         const auto of = [&](const double(&from)[3][BodyBlock::kCount]) {
           return Vec3{from[0][k], from[1][k], from[2][k]};
@@ -51,14 +55,14 @@ TEST(SceneBoxes, OfEightAreThoseOfEach) {
         solid.half = of(block.half);
         const WorldBox box = solid.placed(rotation, t, block.wider[k]);
         const bool fits = usable(rotation, t, 1) && box.fits();
-        ASSERT_EQ(block.placed >> k & 1, fits ? 1u : 0u) << round << " " << k;
+        ASSERT_EQ(boxes.placed >> k & 1, fits ? 1u : 0u) << round << " " << k;
         ++(fits ? placed : refused);
         if (!fits) continue;
         float low[3], high[3];
         box.write(low, high);
         for (int c = 0; c < 3; ++c) {
-          ASSERT_EQ(std::memcmp(&block.low[c][k], &low[c], sizeof(float)), 0) << round << " " << k;
-          ASSERT_EQ(std::memcmp(&block.high[c][k], &high[c], sizeof(float)), 0);
+          ASSERT_EQ(std::memcmp(&boxes.low[c][k], &low[c], sizeof(float)), 0) << round << " " << k;
+          ASSERT_EQ(std::memcmp(&boxes.high[c][k], &high[c], sizeof(float)), 0);
         }
       }
     }
