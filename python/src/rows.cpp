@@ -98,7 +98,7 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
     return side.step == 0 && std::holds_alternative<ist::Shape>(side.among[0]);
   };
   if (is_field(rows.a_) && is_field(rows.b_))
-    throw type_error("a, b: two Fields; one of them must be an Asset");
+    throw type_error("a, b: two shapes; one of them must be an Asset");
   std::optional<std::size_t> count;  // as many rows as the arguments of many have
   const auto agree = [&](const auto& array, const char* name) {
     if (count && array.shape(0) != *count)
