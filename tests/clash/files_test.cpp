@@ -413,6 +413,9 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   error("elbow=9", 1, "limits are");
   error("elbow=0:1", 2, "is not JOINT=NUMBER");
   error("elbow", 2, "is not JOINT=NUMBER");
+  const Outcome twice = clash("arm.urdf", {"--pose", "elbow=0:1:3", "--pose", "elbow=1"});
+  EXPECT_EQ(twice.exit_code, 2);
+  EXPECT_NE(twice.err.find("'elbow=1': the same was given before"), std::string::npos) << twice.err;
   write("joints.csv", "wrist\n0\n");
   EXPECT_EQ(clash("arm.urdf", {"--poses", "joints.csv"}).exit_code, 1);
 
