@@ -206,12 +206,15 @@ class PairQuery {
       return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);
+    // Of rounding's depth flush sides have no say.
+    const bool deep = out.depth > 1e-3 * std::min(a_.diameter, b_.diameter);
+    if (deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {
       measure_contact(out, touch_);
       return true;
     }
     out.kind = ClashKind::overlapping;
-    if (whole.has_way_out() && may_be_flush()) way_out(out, whole);
+    if (!deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     const double most = std::max(a_.volume, b_.volume);
     const double noise = 1e-9 + 20 * (a_.rounded + b_.rounded) / std::cbrt(most);
     out.duplicate = most - out.volume <= std::min(noise, 0.01) * most;

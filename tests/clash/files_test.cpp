@@ -116,6 +116,8 @@ TEST_F(ClashFiles, WhatTouchesWithinATolerance) {
   const Json report = json("row.toml", {"--touch-within", "0.3"}, 3);
   EXPECT_EQ(pairs(report), (Words{"a b touching", "b c touching", "c d overlapping"}));
   EXPECT_NEAR(report["pairs"][0]["centroid"][0].get<double>(), 0.375, 1e-6);
+  EXPECT_NEAR(report["pairs"][0]["direction"][0].get<double>(), 1, 1e-6);
+  EXPECT_NEAR(report["pairs"][0]["contact_area"].get<double>(), 1, 1e-6);
   EXPECT_NEAR(report["pairs"][1]["centroid"][0].get<double>(), 1.375, 1e-6);
   EXPECT_NEAR(report["pairs"][1]["contact_area"].get<double>(), 1, 1e-6);
   EXPECT_EQ(report["pairs"][2]["duplicate"], false);  // however much counts as touching
