@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <system_error>
 #include <tuple>
 
@@ -34,9 +35,15 @@ CLI::Option* add_repeated(CLI::App* command, const std::string& name, const std:
       ->add_option_function<std::vector<std::string>>(
           name,
           [name, meaning, take](const std::vector<std::string>& given) {
-            for (const std::string& one : given)
+            std::set<std::string> names;
+            for (const std::string& one : given) {
               if (!take(one))
                 throw CLI::ValidationError(name, fmt::format("'{}' is not {}", one, meaning));
+              const std::size_t equals = one.rfind('=');
+              if (!names.insert(equals == std::string::npos ? "" : one.substr(0, equals)).second)
+                throw CLI::ValidationError(name,
+                                           fmt::format("'{}': the same was given before", one));
+            }
           },
           help)
       ->type_name(type)

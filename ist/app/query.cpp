@@ -112,7 +112,7 @@ bool is_field_spec(const std::string& text) { return kind_of(text) != nullptr; }
 /// Throws Error that says what of the description is wrong and what is expected.
 Shape parse_field(const std::string& text) {
   const FieldKind* const kind = kind_of(text);
-  if (kind == nullptr) throw Error("'" + text + "' does not describe a field");
+  if (kind == nullptr) throw Error("'" + text + "' does not describe a shape");
   const Spec spec(text, *kind);
   const std::string_view name = kind->name;
   if (name == "plane") return spec.plane();
@@ -157,8 +157,8 @@ std::string field_fault(const std::string& text) {
 std::string not_an_asset(const std::string& text) {
   if (!is_field_spec(text)) return "";
   return fmt::format(
-      "'{0}' is a field, and only A can be a field. Pass it first and the .ist file second, with "
-      "the pose of that asset in the field's frame. For a file of this name write ./{0}",
+      "'{0}' is a shape, and only A can be a shape. Pass it first and the .ist file second, with "
+      "the pose of that asset in the shape's frame. For a file of this name write ./{0}",
       text);
 }
 
@@ -230,12 +230,12 @@ void check_settings(const QueryOptions& options) {
   if (!is_field_spec(options.a)) return;
   if (exact)
     throw CLI::ValidationError(
-        "--measure", "exact needs the meshes of two assets, and A is a field: " + options.a +
+        "--measure", "exact needs the meshes of two assets, and A is a shape: " + options.a +
                          "; omit the option, or pass an .ist file of the same shape");
   for (const auto& [option, given] : {std::pair("--spheres-only", settings.spheres_only),
                                       std::pair("--pair-budget", settings.pair_budget != 0),
                                       std::pair("--error", settings.relative_error != 0)})
-    if (given) throw CLI::ValidationError(option, "has no effect where A is a field: " + options.a);
+    if (given) throw CLI::ValidationError(option, "has no effect where A is a shape: " + options.a);
 }
 
 /// Throws Error if an asset does not hold what the measure asks.
@@ -320,7 +320,7 @@ void add_query(CLI::App& app) {
   CLI::App* const command =
       app.add_subcommand("query", "Overlap and distance of two solids, B placed in A's frame");
   add_input(command, "A", options->a,
-            "An .ist file, or a field: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz (half "
+            "An .ist file, or a shape: plane:nx,ny,nz,d (the solid n·x ≤ d), box:hx,hy,hz (half "
             "extents), ball:r, capsule:r,h or cylinder:r,h (h = half the height along z). Lengths "
             "are in [u]")
       ->check(field_fault);
@@ -382,7 +382,7 @@ void add_query(CLI::App& app) {
   command->footer(
       "Gradients are with respect to a motion of B, in A's frame. A pressure k [force/u²]\n"
       "exerts k times the force and, about B's origin, the torque on B.\n"
-      "A field defines A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
+      "A shape defines A's frame. For a file named box:1,1,1 write ./box:1,1,1.\n"
       "Example: ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --measure exact\n"
       "         ist query bolt.ist nut.ist --pose 1,0,0,0,0,0,9 --error 0.5%\n"

@@ -188,6 +188,15 @@ SphereCoverSettings cover_settings(const SphereRobot& input, const SpheresOption
     cover.total = 0;
   } else if (cover.total == 0) {
     for (const std::size_t own : cover.counts) cover.total += own > 0 ? own : kOfALink;
+  } else {
+    std::size_t given = 0;
+    for (const SphereLink& link : input.links) given += link.given.size();
+    if (cover.total <= given)
+      throw Error(
+          fmt::format("{}: has {} spheres of its own, so a total of {} leaves none for the "
+                      "other links. Increase it",
+                      input.input, given, cover.total));
+    cover.total -= given;
   }
   return cover;
 }

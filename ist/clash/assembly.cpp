@@ -56,6 +56,7 @@ std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource
   CsvReader file(text, path);
   std::vector<std::string> header, fields;
   std::vector<Assembly::Row> rows;
+  std::set<std::string> ids, placed;  // of all rows; parts of the last
   static const std::vector<std::string> kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
   while (file.next(fields)) {
     if (std::all_of(fields.begin(), fields.end(), [](const auto& one) { return one.empty(); }))
@@ -98,9 +99,19 @@ std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource
     const auto named = std::find_if(source.parts.begin(), source.parts.end(),
                                     [&](const auto& one) { return one.name == part; });
     if (named == source.parts.end()) file.fail(fmt::format("no part is called '{}'", part));
-    if (rows.empty() || rows.back().name != id) rows.push_back({id, still});
+    if (rows.empty() || rows.back().name != id) {
+      if (!ids.insert(id).second)
+        file.fail(
+            fmt::format("the id '{}' was given before: put the lines of one id together", id));
+      rows.push_back({id, still});
+      placed.clear();
+    }
+    if (!placed.insert(part).second)
+      file.fail(fmt::format("'{}' is placed twice by the id '{}'", part, id));
     Pose& pose = rows.back().poses[static_cast<std::size_t>(named - source.parts.begin())];
     for (std::size_t k = 0; k < 7; ++k) (k < 4 ? pose.q[k] : pose.t[k - 4]) = values[kPose[k]];
+    if (const double size = Eigen::Vector4d(pose.q).norm(); !(size >= 1e-100 && size <= 1e100))
+      file.fail("qw, qx, qy, qz are no quaternion: not all of them may be 0");
   }
   if (rows.empty()) throw Error(path + ": holds no poses");
   return rows;

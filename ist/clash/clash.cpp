@@ -112,7 +112,9 @@ struct Placed {
                   ": its pose or scale is invalid: numbers must be finite, the quaternion not 0, "
                   "the scale above 0");
     const double largest = std::max(reach(world), solid.scale * reach(own));
-    touch = settings.touch_within >= 0 ? settings.touch_within / 2 : uncertainty_of(part);
+    const double uncertain = uncertainty_of(part);
+    rounded = uncertain - part.slack;
+    touch = settings.touch_within >= 0 ? settings.touch_within / 2 : uncertain;
     margin = touch + settings.clearance / 2 + 4 * kFloat64 * largest;
     box = {world.lower.array() - margin, world.upper.array() + margin};
     volume = solid.asset.volume() * solid.scale * solid.scale * solid.scale;
@@ -126,8 +128,9 @@ struct Placed {
 
   const ClashPart& part;
   Eigen::AlignedBox3d box;
-  double margin = 0;  ///< [u] by which the box is wider
-  double touch = 0;   ///< [u] its share of what counts as touching
+  double margin = 0;   ///< [u] by which the box is wider
+  double touch = 0;    ///< [u] its share of what counts as touching
+  double rounded = 0;  ///< [u] how far rounding alone may move its surface
   double volume = 0, diameter = 0;
 
  private:
@@ -203,14 +206,18 @@ class PairQuery {
       return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);
+    // Of rounding's depth flush sides have no say.
+    const bool deep = out.depth > 1e-3 * std::min(a_.diameter, b_.diameter);
+    if (deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {
       measure_contact(out, touch_);
       return true;
     }
     out.kind = ClashKind::overlapping;
-    if (whole.has_way_out() && may_be_flush()) way_out(out, whole);
+    if (!deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     const double most = std::max(a_.volume, b_.volume);
-    out.duplicate = most - out.volume <= (1e-9 + 20 * touch_ / std::cbrt(most)) * most;
+    const double noise = 1e-9 + 20 * (a_.rounded + b_.rounded) / std::cbrt(most);
+    out.duplicate = most - out.volume <= std::min(noise, 0.01) * most;
     return true;
   }
 
@@ -320,7 +327,8 @@ class PairQuery {
     } else if (out.volume > 0) {
       out.contact_area = patches(b_.part.solid, found).area;
     }
-    if (found.volume > 0) out.centroid = found.centroid;
+    // What it moved by lies half on either side of the contact.
+    if (found.volume > 0) out.centroid = found.centroid + by / 2 * out.direction;
   }
 
   const Placed &a_, &b_;

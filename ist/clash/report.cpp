@@ -49,6 +49,10 @@ std::vector<ClashReport::Names> ClashReport::resolved() const {
   std::set<Names> left = earlier;
   for (const Clash& clash : pairs)
     if (is_clash(clash)) left.erase(names_of(clash));
+  for (const auto& fault : faults)  // nothing is known of its pairs
+    std::erase_if(left, [&](const Names& pair) {
+      return pair.first == fault.first || pair.second == fault.first;
+    });
   return {left.begin(), left.end()};
 }
 
@@ -138,7 +142,7 @@ std::string clashes_text(const ClashReport& report) {
     if (c.duplicate) out += ", one part twice in one place";
     if (report.swept) out += ", pose " + c.pose;
     if (report.tolerance >= 0 && c.kind == ClashKind::overlapping)
-      out += fmt::format(", {} the tolerance", report.verdict(c));
+      out += fmt::format(", tolerance: {}", report.verdict(c));
     if (report.compared && report.is_clash(c))
       out += report.earlier.count(report.names_of(c)) != 0 ? ", persistent" : ", added";
     out += "\n";

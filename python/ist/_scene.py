@@ -48,7 +48,7 @@ class Scene:
             elif first == second:
                 why = "a solid cannot be paired with itself"
             elif is_shape[first] and is_shape[second]:
-                why = "two Fields; one of them must be an Asset"
+                why = "two shapes; one of them must be an Asset"
             else:
                 continue
             raise ValueError(f"pairs[{i}]: ({first}, {second}): {why}")

@@ -86,7 +86,11 @@ class _Object:
         if not np.isfinite(transform).all():
             raise ValueError(f"transform of {self.name}: must be finite")
         if not _is_rigid(*transform.tolist()):
-            ist.poses(transform)  # says why
+            try:
+                ist.poses(transform)
+            except ValueError as error:
+                why = str(error).partition(": ")[2].replace("matrix 0", "it", 1)
+                raise ValueError(f"transform of {self.name}: {why}; scale or mirror the mesh") from None
         self.transform = transform
 
     def face(self, point):

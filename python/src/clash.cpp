@@ -2,6 +2,7 @@
 #include <nanobind/stl/vector.h>
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -57,15 +58,19 @@ py::object clash(const py::object& given, const py::object& poses, const py::obj
   report.parts = count;
   if (tolerance) report.tolerance = take_limit(*tolerance, "tolerance");
   std::vector<ClashPart> parts;
+  std::set<std::string> known;
   std::vector<std::shared_ptr<const Asset>> baked;
   for (std::size_t i = 0; i < count; ++i) {
     const py::object mesh = meshes[i];
     ClashPart part;
     part.name = names.is_none() ? std::to_string(i) : text_of(names[i]);
+    if (!known.insert(part.name).second)
+      throw value_error("names[" + std::to_string(i) + "]: '" + part.name + "' is given twice");
     part.rounding = rounding_of(mesh);
     part.placing = rounding_of_array(poses);
     part.solid.scale = scales.is_none() ? 1 : py::cast<double>(scales[i]);
-    part.solid.pose = take_pose(poses.is_none() ? poses : py::object(poses[i]), part.solid.scale);
+    part.solid.pose = take_pose(poses.is_none() ? poses : py::object(poses[i]), part.solid.scale,
+                                "poses[" + std::to_string(i) + "]");
     try {
       if (type_name_of(mesh) == "Asset") {
         part.solid.asset = tree_of(mesh, "meshes");

@@ -98,7 +98,7 @@ Rows Rows::of_pair(const py::object& a, const py::object& b, const py::object& p
     return side.step == 0 && std::holds_alternative<ist::Shape>(side.among[0]);
   };
   if (is_field(rows.a_) && is_field(rows.b_))
-    throw type_error("a, b: two Fields; one of them must be an Asset");
+    throw type_error("a, b: two shapes; one of them must be an Asset");
   std::optional<std::size_t> count;  // as many rows as the arguments of many have
   const auto agree = [&](const auto& array, const char* name) {
     if (count && array.shape(0) != *count)
@@ -256,15 +256,15 @@ Doubles take_poses(const py::handle& value, const char* name, const std::string&
   return take_doubles(rows, name, wanted);
 }
 
-Pose take_pose(const py::object& pose, double scale) {
+Pose take_pose(const py::object& pose, double scale, const std::string& name) {
   Pose taken;
   if (!pose.is_none()) {
     const char* const wanted = "(7,): qw, qx, qy, qz, tx, ty, tz; or (4, 4)";
-    const Doubles values = take_poses(pose, "pose", wanted);
-    if (values.ndim() != 1 || values.shape(0) != 7) refuse_shape(values, "pose", wanted);
+    const Doubles values = take_poses(pose, name.c_str(), wanted);
+    if (values.ndim() != 1 || values.shape(0) != 7) refuse_shape(values, name, wanted);
     taken = pose_from(values.data());
   }
-  const std::string fault = fault_of(taken, scale, "pose", "scale");
+  const std::string fault = fault_of(taken, scale, name.c_str(), "scale");
   if (!fault.empty()) throw value_error(fault);
   return taken;
 }

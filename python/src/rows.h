@@ -107,7 +107,7 @@ std::string fault_of(const Row& row, const char* name = "poses");
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted);
 
 /// Of (7,) or (4, 4); None: at the origin. Refuses what no query takes, the scale too.
-Pose take_pose(const py::object& pose, double scale);
+Pose take_pose(const py::object& pose, double scale, const std::string& name = "pose");
 
 /// answer(i, workspace) for each row, on `threads` threads (0: all cores), the GIL released.
 /// Ctrl-C ends it: KeyboardInterrupt.

@@ -105,6 +105,22 @@ TEST_F(ClashFiles, ToleranceDecidesWhatIsAClash) {
   EXPECT_EQ(verdict("0.3", 0), "certainly below");
   EXPECT_EQ(verdict("0.25", 3), "undecided");
   EXPECT_EQ(pairs(json("two.toml", {"--touch-within", "0.3"}, 0)), Words{"a b touching"});
+  for (const auto& [tolerance, text] :
+       {std::pair("0.2", "tolerance: certainly above"), {"0.25", "tolerance: undecided"}})
+    EXPECT_NE(clash("two.toml", {"--tolerance", tolerance}).out.find(text), std::string::npos);
+}
+
+TEST_F(ClashFiles, WhatTouchesWithinATolerance) {
+  // a reaches 0.25 into b, and c is 0.25 away from b: the contacts are halfway.
+  write("row.toml", part("a", 0) + part("b", 0.75) + part("c", 2) + part("d", 2.1));
+  const Json report = json("row.toml", {"--touch-within", "0.3"}, 3);
+  EXPECT_EQ(pairs(report), (Words{"a b touching", "b c touching", "c d overlapping"}));
+  EXPECT_NEAR(report["pairs"][0]["centroid"][0].get<double>(), 0.375, 1e-6);
+  EXPECT_NEAR(report["pairs"][0]["direction"][0].get<double>(), 1, 1e-6);
+  EXPECT_NEAR(report["pairs"][0]["contact_area"].get<double>(), 1, 1e-6);
+  EXPECT_NEAR(report["pairs"][1]["centroid"][0].get<double>(), 1.375, 1e-6);
+  EXPECT_NEAR(report["pairs"][1]["contact_area"].get<double>(), 1, 1e-6);
+  EXPECT_EQ(report["pairs"][2]["duplicate"], false);  // however much counts as touching
 }
 
 TEST_F(ClashFiles, RulesLeavePairsOut) {
@@ -216,6 +232,14 @@ TEST_F(ClashFiles, BaselineTellsWhatIsNew) {
     }
   }
   EXPECT_EQ(report["resolved"], Json::parse(R"([{"a": "c", "b": "d"}])"));
+  // Of a part that cannot be answered nothing is known: its clashes are not resolved.
+  std::string text = read("cube.obj");
+  write("open.obj", text.erase(text.find("\nf ") + 1));
+  text = part("b", 0.75);
+  text.replace(text.find("cube.obj"), 8, "open.obj");
+  write("unknown.toml", part("a", 0) + text + part("c", 5) + part("d", 7));
+  EXPECT_EQ(json("unknown.toml", {"--baseline", "old.json"}, 1)["resolved"],
+            Json::parse(R"([{"a": "c", "b": "d"}])"));
   write("not.json", "{\"schema\": \"other/1\"}");
   for (const char* const wrong : {"not.json", "none.json", "cube.obj"})
     EXPECT_EQ(clash("old.toml", {"--baseline", wrong}).exit_code, 1) << wrong;
@@ -239,7 +263,12 @@ TEST_F(ClashFiles, PosesAreSweptForTheWorst) {
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,1\n", ":2: 3 fields"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,\"still,1,0,0,0,0,0,0\n", ":2: a closing quote"},
            {"id,part,qw,qx,qy,qz,tx,ty,tz\n", "holds no poses"},
-           {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,0,0,0,0,0,0,0\n", "still: its pose"}}) {
+           {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,0,0,0,0,0,0,0\n", ":2: qw, qx, qy, qz are no"},
+           {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,1,0,0,0,0,0,0\n1,still,1,0,0,0,0,0,0\n"
+            "0,moving,1,0,0,0,0,0,0\n",
+            ":4: the id '0' was given before"},
+           {"id,part,qw,qx,qy,qz,tx,ty,tz\n0,still,1,0,0,0,0,0,0\n0,still,1,0,0,0,1,0,0\n",
+            ":3: 'still' is placed twice"}}) {
     write("poses.csv", text);
     const Outcome outcome = clash("two.toml", {"--poses", "poses.csv"});
     EXPECT_EQ(outcome.exit_code, 1);
@@ -386,6 +415,9 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   error("elbow=9", 1, "limits are");
   error("elbow=0:1", 2, "is not JOINT=NUMBER");
   error("elbow", 2, "is not JOINT=NUMBER");
+  const Outcome twice = clash("arm.urdf", {"--pose", "elbow=0:1:3", "--pose", "elbow=1"});
+  EXPECT_EQ(twice.exit_code, 2);
+  EXPECT_NE(twice.err.find("'elbow=1': the same was given before"), std::string::npos) << twice.err;
   write("joints.csv", "wrist\n0\n");
   EXPECT_EQ(clash("arm.urdf", {"--poses", "joints.csv"}).exit_code, 1);
 

@@ -139,7 +139,7 @@ TEST_F(FieldQuery, WrongDescriptionsAreUsageErrors) {
 TEST_F(FieldQuery, OnlyTheFirstMayBeAField) {
   for (const char* const a : {"cube.ist", "ball:1"})
     expect_exit(2, {a, "plane:0,0,1,0", "--pose", kAtOrigin},
-                "B: 'plane:0,0,1,0' is a field, and only A can be a field. Pass it first");
+                "B: 'plane:0,0,1,0' is a shape, and only A can be a shape. Pass it first");
   write("ball:1", read("cube.ist"));
   EXPECT_EQ(asked("cube.ist", "./ball:1", "1,0,0,0,0.5,0,0")["volume"],
             asked("cube.ist", "cube.ist", "1,0,0,0,0.5,0,0")["volume"]);
@@ -151,8 +151,8 @@ TEST_F(FieldQuery, SettingsThatHaveNoEffectAreRefused) {
     more.insert(more.begin(), {a, "cube.ist", "--pose", kAtOrigin});
     expect_exit(2, more, message);
   };
-  refused("ball:1", {"--spheres-only"}, "--spheres-only: has no effect where A is a field");
-  refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a field");
+  refused("ball:1", {"--spheres-only"}, "--spheres-only: has no effect where A is a shape");
+  refused("ball:1", {"--pair-budget", "10"}, "--pair-budget: has no effect where A is a shape");
   refused("cube.ist", {"--spheres-only", "--measure", "inner"}, "--spheres-only: has no effect");
 }
 

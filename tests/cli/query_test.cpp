@@ -193,7 +193,7 @@ TEST_F(QueryCommand, AnErrorIsAcceptedAsAShare) {
     expect_exit(2, {"cube.ist", "cube.ist", "--pose", pose, "--error", "1%", "--measure", measure},
                 std::string("--error: has no effect with --measure ") + measure);
   expect_exit(2, {"ball:1", "cube.ist", "--pose", pose, "--error", "1%"},
-              "--error: has no effect where A is a field: ball:1");
+              "--error: has no effect where A is a shape: ball:1");
 }
 
 TEST_F(QueryCommand, JsonHasTheColumnsOfTheCsv) {
@@ -352,7 +352,7 @@ TEST_F(ExactQueryCommand, RefusesWhatItDoesNotHeed) {
   refused({"--spheres-only"}, "--spheres-only: has no effect with --measure exact");
   refused({"--pair-budget", "9"}, "--pair-budget: has no effect with --measure exact");
   expect_exit(2, {"plane:0,0,1,0", "nut.ist", "--pose", kNutOnBolt, "--measure", "exact"},
-              "exact needs the meshes of two assets, and A is a field: plane:0,0,1,0");
+              "exact needs the meshes of two assets, and A is a shape: plane:0,0,1,0");
 }
 
 TEST_F(QueryCommand, WrongInputIsNamed) {

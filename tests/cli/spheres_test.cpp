@@ -339,6 +339,20 @@ TEST_F(RobotCommands, CountsOfTheRobotAndOfLinks) {
   EXPECT_EQ(links({"--count", "4", "--count", "hand=2"})["hand"]["spheres"].size(), 2u);
   EXPECT_EQ(links({"--count", "2", "--inner"})["upper"]["spheres"].size(), 2u);
   expect_error({"spheres", "arm.urdf", "-o", "o.json", "--total", "5"}, 1, "Increase it");
+  // Spheres of the robot's own description count too.
+  const auto link = [](const char* name, const char* shape) {
+    return std::string("<link name='") + name + "'><collision><geometry>" + shape +
+           "</geometry></collision></link>";
+  };
+  const std::string ball = "<sphere radius='.1'/>";
+  write("arm.urdf", "<robot name='r'>" + link("a", "<box size='1 1 1'/>") +
+                        link("b", ball.c_str()) + link("c", ball.c_str()) +
+                        "<joint name='j' type='fixed'><parent link='a'/><child link='b'/></joint>"
+                        "<joint name='k' type='fixed'><parent link='a'/><child link='c'/></joint>"
+                        "</robot>");
+  EXPECT_EQ(total(links({"--total", "6"})), 6u);
+  expect_error({"spheres", "arm.urdf", "-o", "o.json", "--total", "2"}, 1, "has 2 spheres of its");
+  write("arm.urdf", kArm);
   expect_error({"spheres", "arm.urdf", "-o", "o.json", "--total", "9", "--count", "1"}, 2,
                "excludes --total");
   expect_error({"spheres", "arm.urdf", "-o", "o.json", "--count", "uper=2"}, 1,

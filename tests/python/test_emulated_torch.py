@@ -108,7 +108,7 @@ def test_overlaps_are_those_of_the_cpu(overlap, solids, random_poses, pairs, sca
 def test_wrong_scenes_are_named(overlap, solids, random_poses):
     poses = torch.from_numpy(random_poses(6, 0.8))
     for wrong, error, text in [
-            (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two Fields; one of them must"),
+            (dict(pairs=[(1, 3)]), ValueError, r"pairs\[0\]: \(1, 3\): two shapes; one of them must"),
             (dict(pairs=[(0, 6)]), ValueError, r"pairs\[0\]: \(0, 6\): solids are numbered 0 to 5"),
             (dict(pairs=[(2, 2)]), ValueError, "a solid cannot be paired with itself"),
             (dict(max_visits=1), ValueError, "max_visits: not on a GPU"),

@@ -133,7 +133,7 @@ def test_an_invalid_row_spoils_only_itself(gear, knot, random_poses):
     (dict(measure="outer"), ValueError, "measure: 'outer'; one of 'matched', 'inner', 'exact'"),
     (dict(spheres_only="maybe"), TypeError, "spheres_only: a str; wanted True or False"),
     (dict(a=3), TypeError, "a: a int; wanted an Asset or a Shape"),
-    (dict(a=ist.BallShape(2), b=ist.BallShape(1)), TypeError, "a, b: two Fields"),
+    (dict(a=ist.BallShape(2), b=ist.BallShape(1)), TypeError, "a, b: two shapes"),
 ])
 def test_wrong_arguments_are_named(gear, knot, arguments, error, text):
     with pytest.raises(error, match=text):
@@ -615,7 +615,7 @@ def test_a_field_may_be_either_solid(gear):
     assert first.volume == second.volume > 0
     assert np.allclose(first.pose_gradient_a, second.pose_gradient, rtol=1e-12, atol=1e-15)
     assert np.allclose(first.force, -second.force, rtol=0, atol=0)
-    with pytest.raises(TypeError, match="two Fields"):
+    with pytest.raises(TypeError, match="two shapes"):
         ist.penetration(ball, ball, pose)
 
 

@@ -158,6 +158,8 @@ def test_mistakes_are_told():
         m.add_object("a", Box(), np.eye(3))
     with pytest.raises(ValueError, match="transform of a: must be finite"):
         m.add_object("a", Box(), np.full((4, 4), np.nan))
+    with pytest.raises(ValueError, match="transform of a: it is no rigid motion: .*; scale or mirror the mesh"):
+        m.add_object("a", Box(), np.diag([2, 2, 2, 1]))
 
 
 def test_the_face_of_a_contact():

@@ -117,7 +117,8 @@ TEST(Sdf, MistakesAreToldWithTheirLines) {
   expect(two + joint("<axis><xyz>0 0 0</xyz></axis>"), "length 0");
   expect(two + joint("<axis><xyz>0 0 z</xyz></axis>"), "\"z\" is not a finite number");
   expect(two + joint("<axis><xyz>0 1</xyz></axis>"), "has 2 numbers, not 3");
-  expect(two + joint("<axis><xyz>0 0 1</xyz><mimic joint='x'/></axis>"), "moves on its own");
+  expect(two + joint("<axis><xyz>0 0 1</xyz><mimic joint='x'/></axis>"),
+         "no joint is called \"x\"");
   expect("<link name='a'/>" + joint(""), "its child \"b\" is not a link");
   expect("<link name='a'><pose relative_to='f'>0 0 0 0 0 0</pose></link><link name='b'/>" +
              joint("<axis><xyz>0 0 1</xyz></axis>"),

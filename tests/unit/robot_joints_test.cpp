@@ -85,10 +85,12 @@ TEST(RobotJoints, SayWhatIsWrong) {
   expect(two + joint("j", "revolute", "a", "b", "<limit lower='1' upper='0'/>"),
          "lower is above upper");
   expect(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), "length 0");
-  expect(two + joint("j", "continuous", "a", "b", "<mimic joint='x'/>"), "\"x\" is not a joint");
+  expect(two + joint("j", "continuous", "a", "b", "<mimic joint='x'/>"),
+         "no joint is called \"x\"");
   expect(two + joint("j", "continuous", "a", "b", "<mimic joint='j'/>"), "moves on its own");
   expect(links({"a", "b", "c"}) + joint("j", "fixed", "a", "b") + joint("j", "fixed", "b", "c"),
          "duplicates the joint");
+  expect(two + std::string("\n\0", 2), ": line 2: a byte of 0");
   expect("<xacro:include filename='x'/><link name='a'/>", "xacro IN.xacro -o OUT.urdf");
 }
 

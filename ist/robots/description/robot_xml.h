@@ -191,7 +191,10 @@ class RobotXml {
   void read_mimic(std::uint32_t mimic, RobotJoint& joint, const Moves& moves) const {
     const std::string name = decoded(xml_.attribute(mimic, "joint"));
     const auto found = joint_.find(name);
-    if (found == joint_.end() || name == joint.name || !moves(found->second))
+    if (found == joint_.end())
+      xml_.fail(mimic,
+                "no joint is called " + in_quotes(name) + ". Name one that moves on its own");
+    if (name == joint.name || !moves(found->second))
       xml_.fail(mimic, in_quotes(name) + " is not a joint that moves on its own");
     joint.mimics = found->second;
     joint.multiplier = real(mimic, "multiplier", 1);

@@ -25,8 +25,8 @@ std::string xml_text(std::string_view text) {
 }
 
 XmlDocument::XmlDocument(const SourceFile& file) : file_(file), bytes_(file.bytes) {
-  if (bytes_.find('\0') != std::string_view::npos)
-    ist::fail(file_, "contains binary data or is not UTF-8, so it cannot be read as XML");
+  if (const std::size_t zero = bytes_.find('\0'); zero != std::string_view::npos)
+    fail_at(zero, "a byte of 0, which XML has not: binary data, or text that is not UTF-8");
   parse();
   if (!open_.empty()) fail(open_.back().element, "the file ends early: this element is not closed");
   if (elements_.empty()) ist::fail(file_, "contains no XML element");
