@@ -17,13 +17,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-const ClosedMesh& cube() {
+const ClosedMesh& a_cube() {
   static const ClosedMesh mesh = testing::closed(testing::cube_mesh(), "cube");
   return mesh;
 }
 
 const MeshSolid& solid_cube() {
-  static const MeshSolid solid(cube());
+  static const MeshSolid solid(a_cube());
   return solid;
 }
 
@@ -57,7 +57,7 @@ TEST(InnerPoints, AreSpreadEvenly) {
 
 TEST(PartnerTrials, HoldTheOverlapAskedFor) {
   constexpr double kOverlap = 0.003;
-  const Asset asset = bake(cube(), {.max_spheres = 2'000});
+  const Asset asset = bake(a_cube(), {.max_spheres = 2'000});
   const PartnerTrials trials(solid_cube(), asset.view());
   Workspace workspace;
   for (const TrialPartner partner : kOtherPartners) {
@@ -78,7 +78,7 @@ TEST(PartnerTrials, HoldTheOverlapAskedFor) {
 TEST(PartnerTrials, AreTheSameForAnyNumberOfThreads) {
   const auto trials_of = [](int threads) {
     return tbb::task_arena(threads).execute([] {
-      const Asset surface = bake_mesh_only(cube());
+      const Asset surface = bake_mesh_only(a_cube());
       return PartnerTrials(solid_cube(), surface.view()).find(TrialPartner::corner, 0.001, 4, 3);
     });
   };
@@ -92,7 +92,7 @@ TEST(PartnerTrials, AreTheSameForAnyNumberOfThreads) {
 }
 
 TEST(BakeToError, NamesTheWorstPartner) {
-  const TargetedAsset result = bake_to_error(cube(), {0.05, 0.003});
+  const TargetedAsset result = bake_to_error(a_cube(), {0.05, 0.003});
   EXPECT_TRUE(result.met);
   double worst = 0;
   TrialPartner partner = TrialPartner::copy;

@@ -10,12 +10,12 @@ namespace ist {
 namespace {
 
 /// A closed tetrahedron, and three more vertices on a line.
-const std::vector<Eigen::Vector3d> kVertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
-                                                {5, 0, 0}, {6, 0, 0}, {7, 0, 0}, {8, 0, 0}};
+const std::vector<Eigen::Vector3d> kPoints = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1},
+                                              {5, 0, 0}, {6, 0, 0}, {7, 0, 0}, {8, 0, 0}};
 const std::vector<Triangle> kTetrahedron = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
 
 std::vector<std::uint32_t> dropped_of(std::vector<Triangle>& triangles) {
-  return drop_degenerate(kVertices, triangles, EdgeTable(triangles));
+  return drop_degenerate(kPoints, triangles, EdgeTable(triangles));
 }
 
 TEST(SurfaceReduction, TrianglesOnALineThatHangLooseAreDropped) {

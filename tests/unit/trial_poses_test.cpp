@@ -22,7 +22,7 @@ struct Baked {
   TrialBody body() const { return {solid, asset.view()}; }
 };
 
-const Baked& torus() {
+const Baked& baked_torus() {
   static const Baked solid(testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus"));
   return solid;
 }
@@ -32,14 +32,14 @@ const Baked& baked_cube() {
 }
 
 TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
-  const auto poses = trial_poses(torus().body(), baked_cube().body(), 6, 7);
+  const auto poses = trial_poses(baked_torus().body(), baked_cube().body(), 6, 7);
   std::array<int, kOverlapClasses> found = {};
   Workspace workspace;
   for (const TrialPose& pose : poses) {
     const std::uint32_t k = pose.overlap_class;
     ++found[k];
     const double smaller =
-        std::min(torus().solid.volume(),
+        std::min(baked_torus().solid.volume(),
                  pose.scale_b * pose.scale_b * pose.scale_b * baked_cube().solid.volume());
     EXPECT_NEAR(pose.fraction, pose.volume / smaller, 1e-9);
     EXPECT_GE(pose.fraction, kOverlapClassFloor[k] * (k == 0 ? 1 - 1e-9 : 1));
@@ -48,7 +48,7 @@ TEST(TrialPoses, EveryClassHasItsPosesAndTheirTruth) {
     }
     // The spheres alone know the volume to some per cent, of shallow overlaps the order.
     const double matched =
-        penetration({torus().asset.view(), {}, 1},
+        penetration({baked_torus().asset.view(), {}, 1},
                     {baked_cube().asset.view(), pose.b_in_a, pose.scale_b}, {}, workspace)
             .volume;
     const double factor = k <= 1 ? 1.05 : k == 2 ? 1.3 : 4;
