@@ -66,6 +66,7 @@ struct WorldMesh {
         const double length = normal.norm();
         if (!(length > 0)) continue;
         normal /= length;
+        faces.push_back({{corner(0), corner(1), corner(2)}, normal});
         for (const double side : {1.0, -1.0}) {
           const Vector3d n = side * normal;
           const double offset = n.dot(corner(0) - origin);
@@ -81,7 +82,18 @@ struct WorldMesh {
     planes.erase(std::unique(planes.begin(), planes.end(), same), planes.end());
   }
 
+  /// A triangle, counter-clockwise from outside.
+  struct Face {
+    std::array<Vector3d, 3> corner;
+    Vector3d normal;
+
+    Eigen::AlignedBox3d box() const {
+      return Eigen::AlignedBox3d(corner[0]).extend(corner[1]).extend(corner[2]);
+    }
+  };
+
   std::vector<Vector3d> vertices;
+  std::vector<Face> faces;
   std::vector<Plane> planes;  ///< by key
 };
 
@@ -100,6 +112,81 @@ bool have_common_plane(const WorldMesh& a, const WorldMesh& b, double size, doub
   }
   return false;
 }
+
+/// The faces of two parts that face each other no farther apart than a tolerance.
+class FlushFaces {
+ public:
+  /// `within`: a box that contains the contact. `touch` [u].
+  FlushFaces(const WorldMesh& a, const WorldMesh& b, const Eigen::AlignedBox3d& within,
+             double touch)
+      : touch_(touch) {
+    // Faces in the order in which a plane across x comes to their boxes.
+    struct Item {
+      Eigen::AlignedBox3d box;
+      const WorldMesh::Face* face;
+      int side;
+    };
+    std::vector<Item> items, open[2];
+    for (const int side : {0, 1})
+      for (const WorldMesh::Face& face : (side == 0 ? a : b).faces) {
+        Eigen::AlignedBox3d box = face.box();
+        box.min().array() -= touch / 2;
+        box.max().array() += touch / 2;
+        if (box.intersects(within)) items.push_back({box, &face, side});
+      }
+    std::sort(items.begin(), items.end(),
+              [](const Item& x, const Item& y) { return x.box.min().x() < y.box.min().x(); });
+    for (const Item& item : items) {
+      std::vector<Item>& others = open[1 - item.side];
+      std::erase_if(others, [&](const Item& x) { return x.box.max().x() < item.box.min().x(); });
+      for (const Item& other : others) {
+        if (!item.box.intersects(other.box)) continue;
+        const bool first = item.side == 0;
+        add(first ? *item.face : *other.face, first ? *other.face : *item.face);
+      }
+      open[item.side].push_back(item);
+    }
+  }
+
+  double area = 0;                     ///< [u²] measured on the first part
+  Vector3d moment = Vector3d::Zero();  ///< [u³] area times place, half way between both
+
+ private:
+  /// The part of a convex polygon with from + along · x ≥ 0.
+  static std::vector<Vector3d> clipped(const std::vector<Vector3d>& polygon, double from,
+                                       const Vector3d& along) {
+    std::vector<Vector3d> out;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Vector3d &x = polygon[i], &y = polygon[(i + 1) % polygon.size()];
+      const double at_x = from + along.dot(x), at_y = from + along.dot(y);
+      if (at_x >= 0) out.push_back(x);
+      if ((at_x >= 0) != (at_y >= 0)) out.push_back(x + at_x / (at_x - at_y) * (y - x));
+    }
+    return out;
+  }
+
+  void add(const WorldMesh::Face& a, const WorldMesh::Face& b) {
+    if (!(a.normal.dot(b.normal) < -kFacing)) return;
+    const double height = b.normal.dot(b.corner[0]);
+    std::vector<Vector3d> shared(a.corner.begin(), a.corner.end());
+    for (const double side : {1.0, -1.0})
+      shared = clipped(shared, touch_ + side * height, -side * b.normal);
+    for (std::size_t k = 0; k < 3 && !shared.empty(); ++k) {
+      const Vector3d inward = (b.corner[(k + 1) % 3] - b.corner[k]).cross(a.normal);
+      shared = clipped(shared, -inward.dot(b.corner[k]), inward);
+    }
+    for (std::size_t i = 2; i < shared.size(); ++i) {
+      const Vector3d &x = shared[0], &y = shared[i - 1], &z = shared[i];
+      const double part = (y - x).cross(z - x).norm() / 2;
+      const Vector3d middle = (x + y + z) / 3;
+      area += part;
+      moment += part * (middle - (b.normal.dot(middle) - height) / 2 * b.normal);
+    }
+  }
+
+  static constexpr double kFacing = 0.5;  ///< the cosine of 60°
+  double touch_;
+};
 
 /// A part as pairs see it.
 struct Placed {
@@ -210,7 +297,7 @@ class PairQuery {
     const bool deep = out.depth > 1e-3 * std::min(a_.diameter, b_.diameter);
     if (deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {
-      measure_contact(out, touch_);
+      measure_contact(out);
       return true;
     }
     out.kind = ClashKind::overlapping;
@@ -313,22 +400,16 @@ class PairQuery {
     out.centroid = (found.point_a + found.point_b) / 2;
     if (found.status == QueryStatus::ok && !(found.distance < limit)) return false;
     if (found.distance > touch_) return true;
-    measure_contact(out, touch_ + found.distance);
+    measure_contact(out);
     return true;
   }
 
-  /// Area and centroid of a contact after moving B towards A, if there is one direction to do so.
-  void measure_contact(Clash& out, double by) {
+  /// Area and centroid of a contact of faces.
+  void measure_contact(Clash& out) {
     out.kind = ClashKind::touching;
-    Penetration found;
-    if (!out.direction.isZero(0)) {
-      found = aside(-by * out.direction);
-      out.contact_area = std::max(0.0, found.force.dot(out.direction));
-    } else if (out.volume > 0) {
-      out.contact_area = patches(b_.part.solid, found).area;
-    }
-    // What it moved by lies half on either side of the contact.
-    if (found.volume > 0) out.centroid = found.centroid + by / 2 * out.direction;
+    const FlushFaces found(a_.mesh(all_), b_.mesh(all_), a_.box.intersection(b_.box), touch_);
+    out.contact_area = found.area;
+    if (found.area > 0) out.centroid = found.moment / found.area;
   }
 
   const Placed &a_, &b_;
