@@ -76,12 +76,12 @@ def _quaternions(r, name):
         _refuse(-np.sign(np.linalg.det(r)), name, "it mirrors")
     x, y, z = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
     # 4 q_k q, for each k: the longest of the four has no cancellation.
-    w = [1 + x + y + z, r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0],
-         r[..., 1, 0] - r[..., 0, 1]]
-    xy, xz, yz = (r[..., i, k] + r[..., k, i] for i, k in ((0, 1), (0, 2), (1, 2)))
-    rows = np.stack([np.stack(row, axis=-1) for row in (
-        w, [w[1], 1 + x - y - z, xy, xz], [w[2], xy, 1 - x + y - z, yz],
-        [w[3], xz, yz, 1 - x - y + z])], axis=-2)
+    rows = np.empty((*r.shape[:-2], 4, 4))
+    rows[..., 0, 0], rows[..., 1, 1] = 1 + x + y + z, 1 + x - y - z
+    rows[..., 2, 2], rows[..., 3, 3] = 1 - x + y - z, 1 - x - y + z
+    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1)), 1):
+        rows[..., 0, k] = rows[..., k, 0] = r[..., j, i] - r[..., i, j]
+        rows[..., i + 1, j + 1] = rows[..., j + 1, i + 1] = r[..., i, j] + r[..., j, i]
     lengths = np.linalg.norm(rows, axis=-1)
     best = np.argmax(lengths, axis=-1)[..., None, None]
     q = np.take_along_axis(rows, best, axis=-2)[..., 0, :]

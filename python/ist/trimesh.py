@@ -185,7 +185,7 @@ class CollisionManager:
 
     def in_collision_single(self, mesh, transform=None, return_names=False, return_data=False):
         """Whether a mesh collides with any object; the set of their names; a list of ContactData."""
-        pairs = self._near([self._object("__external", mesh, transform)])
+        pairs = self._near(_Bodies([self._object("__external", mesh, transform)]))
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, {a for a, _ in names}, data, return_names, return_data)
 
@@ -196,15 +196,15 @@ class CollisionManager:
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = self._near(other_manager._objs.values())
+        pairs = self._near(_Bodies(other_manager._objs.values()))
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
         """The least distance of a mesh from any object [u], negative inside; inf without objects."""
-        single = self._object("__external", mesh, transform)
-        distance, names, data = _nearest(lambda margin: self._near([single], margin), len(self._objs),
-                                         single.size, return_data)
+        single = _Bodies([self._object("__external", mesh, transform)])
+        distance, names, data = _nearest(lambda margin: self._near(single, margin), len(self._objs),
+                                         single.sizes[0], return_data)
         return _told(distance, names and names[0], data, return_name, return_data)
 
     def min_distance_internal(self, name=None, return_names=False, return_data=False):
@@ -213,16 +213,16 @@ class CollisionManager:
         if name is None:
             distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size, return_data)
         else:
-            one = self._of(name)
-            distance, names, data = _nearest(lambda margin: self._near([one], margin), count - 1, one.size,
+            one = _Bodies([self._of(name)])
+            distance, names, data = _nearest(lambda margin: self._near(one, margin), count - 1, one.sizes[0],
                                              return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
         """The least distance of an object from one of another manager; names are (own, other's)."""
-        others = other_manager._objs.values()
+        others = _Bodies(other_manager._objs.values())
         distance, names, data = _nearest(lambda margin: self._near(others, margin),
-                                         len(self._objs) * len(others), self._size, return_data)
+                                         len(self._objs) * len(others.objects), self._size, return_data)
         return _told(distance, names, data, return_names, return_data)
 
     def _placed(self):
@@ -263,7 +263,7 @@ class CollisionManager:
         """As _within(), of objects of this manager and others."""
         if self._moved:
             self._within()
-        scene, others = self._placed(), _Bodies(others)
+        scene = self._placed()
         near = [self._row[scene.in_box(low - margin, high + margin)]
                 for low, high in zip(others.low, others.high)]
         first = np.concatenate([np.zeros(0, int), *near])
