@@ -56,7 +56,7 @@ std::vector<Assembly::Row> read_poses(const std::string& path, const ClashSource
   CsvReader file(text, path);
   std::vector<std::string> header, fields;
   std::vector<Assembly::Row> rows;
-  std::set<std::string> ids, placed;  // of all rows; parts of the last
+  std::set<std::string> ids, placed;  // names of all rows; parts of the last row
   static const std::vector<std::string> kPose = {"qw", "qx", "qy", "qz", "tx", "ty", "tz"};
   while (file.next(fields)) {
     if (std::all_of(fields.begin(), fields.end(), [](const auto& one) { return one.empty(); }))

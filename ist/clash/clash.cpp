@@ -293,7 +293,7 @@ class PairQuery {
       return found.touching ? touches(found, out) : is_near(out);
     }
     if (whole.has_way_out()) out.direction = unit(whole.force);
-    // Of rounding's depth flush sides have no say.
+    // Flush sides do not matter where the depth is rounding.
     const bool deep = out.depth > 1e-3 * std::min(a_.diameter, b_.diameter);
     if (deep && whole.has_way_out() && may_be_flush()) way_out(out, whole);
     if (out.depth <= touch_ && deepest_vertex() <= touch_) {

@@ -50,7 +50,7 @@ struct alignas(64) BlockBoxes {
   }
 };
 
-/// Of these lanes at least.
+/// Writes the boxes of these lanes, and may write others.
 void place_boxes(const BodyBlock& block, std::uint32_t lanes, BlockBoxes& boxes) noexcept;
 
 /// What of a body's box does not change with its pose.

@@ -39,7 +39,7 @@ HWY_ATTR void place_all(const BodyBlock& block, std::uint32_t lanes, BlockBoxes&
         hn::And(norm >= constant(kShortestDirection), norm <= constant(kLongestDirection));
     V w = q0;
     Vec3 v = {q1, q2, q3};
-    if (!hn::AllTrue(d, norm == constant(1))) {  // of bodies that are not turned it is
+    if (!hn::AllTrue(d, norm == constant(1))) {  // bodies that are not turned skip this
       // (no lane divides by zero, or overflows)
       const V by = hn::IfThenElse(placed, norm, constant(1));
       const auto unit = [&](V q) { return hn::IfThenElseZero(placed, q) / by; };

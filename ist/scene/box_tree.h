@@ -36,7 +36,7 @@ struct alignas(64) BoxNode {
   static constexpr std::uint32_t kLanes = 8;
   static constexpr std::uint32_t kNone = ~0u;
 
-  float low[3][kLanes], high[3][kLanes];    ///< of none: nothing meets it
+  float low[3][kLanes], high[3][kLanes];    ///< an unused lane meets nothing
   std::uint32_t child[kLanes];              ///< a body's number, or a node's
   std::uint32_t used = 0, bodies = 0;       ///< a bit a lane
   std::uint32_t parent = kNone, place = 0;  ///< the lane there
@@ -102,7 +102,7 @@ struct PairSearch {
 
   const BoxNode *a, *b;
   std::uint32_t root_a, root_b;
-  LanePairs* stack;   ///< as long as both are deep
+  LanePairs* stack;   ///< holds the depths of both hierarchies
   std::uint32_t end;  ///< nodes of one hierarchy; 1 for two
   std::uint32_t next = 0;
   std::size_t depth = 0;

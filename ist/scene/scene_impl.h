@@ -35,7 +35,7 @@ struct Scene::Impl {
     bool moves = false, is_field = false;
     Place place = Place::free;
   };
-  /// Of the bodies of a block, a bit each.
+  /// States of a block's bodies, a bit each.
   struct Lanes {
     std::uint8_t in_vectors = 0;  ///< place_boxes() makes their boxes
     std::uint8_t moving = 0;      ///< their boxes are in that hierarchy, as in `still`
@@ -209,7 +209,7 @@ struct Scene::Impl {
       list_of(place)->push_back(i);
     }
   }
-  /// What of its box does not change with its pose.
+  /// Writes the part of body i's box that does not change with its pose.
   void prepare(std::uint32_t i) noexcept {
     const std::uint32_t k = i % kCount;
     Lanes& all = lanes[i / kCount];
@@ -531,7 +531,7 @@ struct Scene::Impl {
   BoxTree still, moving;
   std::vector<Body> bodies;
   std::vector<Filtered> filtered;  ///< by index, as `bodies`, and to the end of their block
-  std::vector<BodyBlock> blocks;   ///< of eight bodies each, as `lanes`
+  std::vector<BodyBlock> blocks;   ///< eight bodies each, as in `lanes`
   std::vector<Lanes> lanes;
   std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
