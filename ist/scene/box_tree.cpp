@@ -138,7 +138,7 @@ void BoxTree::build() noexcept {
   root_ = order_.empty() ? kNone : build(order_.data(), order_.data() + order_.size());
 }
 
-/// Those of the lower middles along the longest axis first.
+/// Puts the bodies whose middles are lower along the longest axis in front of `at`.
 void BoxTree::part(Leaf* first, Leaf* at, Leaf* last) noexcept {
   const auto middle_of = [](const Leaf& leaf, std::size_t k) {
     return leaf.box.low[k] + leaf.box.high[k];
