@@ -15,11 +15,13 @@ namespace IST_API ist {
 
 /// Axis and unit that a file declares. Coordinates are not turned by it.
 struct DeclaredFrame {
-  char up_axis = 0;  ///< 'X', 'Y' or 'Z'; 0: not declared
-  double unit = 0;   ///< [m] length of the file's unit; 0: not declared
+  char up_axis = 0;        ///< 'X', 'Y' or 'Z'; 0: not declared
+  double unit = 0;         ///< [m] length of the file's unit; 0: not declared
+  bool converted = false;  ///< lengths were multiplied by unit: they are metres
 };
 
-/// Triangles over shared vertices, in the file's own unit [u] and frame, in double.
+/// Triangles over shared vertices, in the file's own unit [u] (metres if declared.converted) and
+/// frame, in double.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;                ///< [u]
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< counter-clockwise seen from outside

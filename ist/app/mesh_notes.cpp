@@ -141,7 +141,9 @@ std::string describe_declared(const DeclaredFrame& declared) {
   if (declared.up_axis != 0) text = fmt::format("{} up: axes are not converted", declared.up_axis);
   if (declared.unit != 0)
     text += fmt::format("{}1 unit = {:g} m{}", text.empty() ? "" : "; ", declared.unit,
-                        declared.unit == 1 ? "" : ": lengths are converted to metres");
+                        declared.converted   ? ": lengths are converted to metres"
+                        : declared.unit == 1 ? ""
+                                             : ": lengths are not converted");
   return text;
 }
 

@@ -109,12 +109,28 @@ TEST(ImportAxes, GltfDeclaresWhatItsSpecificationSays) {
   EXPECT_EQ(mesh.declared.unit, 1);
 }
 
-/// Vertices as they stand, and the axis as it is declared.
-TEST(ImportAxes, FbxSaysWhichAxisIsUp) {
+TEST(ImportAxes, AmfsUnitIsSaidToBeUnread) {
+  std::string amf = "<?xml version=\"1.0\"?><amf unit=\"inch\"><object id=\"0\"><mesh><vertices>";
+  for (const auto& [x, y, z] : kVertices)
+    amf += "<vertex><coordinates><x>" + std::to_string(x) + "</x><y>" + std::to_string(y) +
+           "</y><z>" + std::to_string(z) + "</z></coordinates></vertex>";
+  amf += "</vertices><volume>";
+  for (const auto& [a, b, c] : kCorners)
+    amf += "<triangle><v1>" + std::to_string(a) + "</v1><v2>" + std::to_string(b) + "</v2><v3>" +
+           std::to_string(c) + "</v3></triangle>";
+  const TriangleMesh mesh = load("a.amf", amf + "</volume></mesh></object></amf>");
+  ASSERT_EQ(mesh.notes.size(), 1u);
+  EXPECT_NE(mesh.notes[0].find("unit"), std::string::npos) << mesh.notes[0];
+  expect_own_axes(mesh);
+}
+
+/// Vertices as they stand; the axis and the unit as they are declared.
+TEST(ImportAxes, FbxSaysWhichAxisIsUpAndItsUnit) {
   std::string fbx =
       "; FBX 7.4.0 project file\nFBXHeaderExtension:  {\n\tFBXHeaderVersion: 1003\n"
       "\tFBXVersion: 7400\n}\nGlobalSettings:  {\n\tVersion: 1000\n\tProperties70:  {\n"
-      "\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\",2\n\t}\n}\nObjects:  {\n"
+      "\t\tP: \"UpAxis\", \"int\", \"Integer\", \"\",2\n"
+      "\t\tP: \"UnitScaleFactor\", \"double\", \"Number\", \"\",2.5\n\t}\n}\nObjects:  {\n"
       "\tGeometry: 1, \"Geometry::\", \"Mesh\" {\n\t\tVertices: *12 {\n\t\t\ta: ";
   for (const auto& vertex : kVertices)
     for (const float x : vertex) fbx += std::to_string(x) + ",";
@@ -128,6 +144,8 @@ TEST(ImportAxes, FbxSaysWhichAxisIsUp) {
       "Connections:  {\n\tC: \"OO\",2,0\n\tC: \"OO\",1,2\n}\n";
   const TriangleMesh mesh = load("a.fbx", fbx);
   EXPECT_EQ(mesh.declared.up_axis, 'Z');
+  EXPECT_EQ(mesh.declared.unit, 0.025);
+  EXPECT_FALSE(mesh.declared.converted);
   expect_own_axes(mesh);
 }
 

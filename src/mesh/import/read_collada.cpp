@@ -104,6 +104,7 @@ class SceneReader {
     const std::optional<double> scale = parse_real(meter);
     if (!scale || !(*scale > 0)) xml_.fail(unit, in_quotes(meter) + " is not a length in metres");
     frame.unit = *scale;
+    frame.converted = true;
     return frame;
   }
 

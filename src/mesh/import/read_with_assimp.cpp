@@ -54,12 +54,17 @@ AssimpTransform own_axes(const std::string& ending) {
   return back;
 }
 
-/// FBX files say which axis is up, and assimp leaves it at that.
+/// FBX files say which axis is up and how many centimetres a unit has. assimp reports both and
+/// converts neither.
 DeclaredFrame declared_frame(const aiScene& scene) {
-  std::int32_t up = 0;
-  if (scene.mMetaData == nullptr || !scene.mMetaData->Get("UpAxis", up) || up < 0 || up > 2)
-    return {};
-  return {.up_axis = "XYZ"[up], .unit = 0};
+  DeclaredFrame frame;
+  if (scene.mMetaData == nullptr) return frame;
+  std::int32_t up = -1;
+  if (scene.mMetaData->Get("UpAxis", up) && up >= 0 && up <= 2) frame.up_axis = "XYZ"[up];
+  float centimetres = 0;
+  if (scene.mMetaData->Get("UnitScaleFactor", centimetres) && centimetres > 0)
+    frame.unit = double(centimetres) / 100;
+  return frame;
 }
 
 }  // namespace
@@ -78,6 +83,8 @@ PolygonMesh read_with_assimp(const SourceFile& file) {
   mesh.declared = declared_frame(*scene);
   if ((scene->mFlags & AI_SCENE_FLAGS_INCOMPLETE) != 0)
     mesh.notes.emplace_back("assimp read only a part of the file");
+  if (ending == ".3mf" || ending == ".amf")
+    mesh.notes.emplace_back("the unit is not read: millimetres, unless the file names another");
   std::vector<std::pair<const aiNode*, AssimpTransform>> open{
       {scene->mRootNode, own_axes(ending) * to_double(scene->mRootNode->mTransformation)}};
   while (!open.empty()) {
