@@ -121,7 +121,7 @@ def test_what_a_scene_refuses_is_raised(monkeypatch):
         def __getattr__(self, name):
             return lambda *arguments, **settings: 0
 
-        def step(self, *arguments, **settings):
+        def _step_pairs(self, *arguments):
             raise ist.Error("no step")
 
     monkeypatch.setattr(ist, "Scene", Broken)
