@@ -461,9 +461,9 @@ def _deepest(pairs, bound):
     only touch, inf where they do not."""
     best, nearest = np.inf, None
     order, begin, size = np.argsort(bound, kind="stable"), 0, _FIRST
-    while begin < len(order) and bound[order[begin]] < min(best, 0):
+    while begin < len(order) and bound[order[begin]] <= 0 and bound[order[begin]] < best:
         chosen = order[begin:begin + size]
-        chosen = chosen[bound[chosen] < min(best, 0)]
+        chosen = chosen[(bound[chosen] <= 0) & (bound[chosen] < best)]
         answers = pairs.penetration(chosen)
         touch = np.flatnonzero(answers.touching)[:1]
         if best > 0 and len(touch) > 0:
@@ -471,10 +471,11 @@ def _deepest(pairs, bound):
             best, nearest = 0.0, (pairs, int(chosen[touch[0]]), (point, point))
         # The likely deepest first. None is deeper than the cube root of its volume.
         likely = np.argsort(-_depths(answers.volume, np.linalg.norm(answers.force, axis=1)), kind="stable")
-        most, few = -np.cbrt(answers.volume[likely]), 1
-        while len(left := np.flatnonzero(most < min(best, 0))[:few]) > 0:
-            most[left], few = 0, 4 * few
-            of = chosen[likely[left]]
+        most = -np.cbrt(answers.volume[likely])
+        for asked in slice(1), slice(1, None):
+            of = chosen[likely[asked]][most[asked] < min(best, 0)]
+            if len(of) == 0:
+                break
             volume, force, point = pairs.overlaps(of)
             area = np.linalg.norm(force, axis=1)
             depth = _depths(volume, area)

@@ -22,8 +22,9 @@ double lens(double apart, double r, double s) {
          (apart * apart + 2 * apart * (r + s) - 3 * (r - s) * (r - s)) / (12 * apart);
 }
 
-/// A lower bound of the distance of two placed assets [u], negative where they may overlap: minus
-/// the cube root of the volume that boxes and balls around them share.
+/// A lower bound of the distance of two placed assets [u]. Negative where they may overlap: minus
+/// the cube root of the volume that boxes and balls around them share. 0 where boxes share no more
+/// than rounding.
 double nearness(const Row& row) {
   Bounds around[2];
   for (const auto& [side, to] : {std::pair(&row.a, &around[0]), std::pair(&row.b, &around[1])})
@@ -36,6 +37,7 @@ double nearness(const Row& row) {
                                   a.radius + b.radius);
   const double apart = std::max(between.max(0).matrix().norm(), balls) - rounded;
   if (apart > 0) return apart;
+  if (between.maxCoeff() >= -rounded) return 0;
   const double volume =
       std::min((rounded - between).max(0).prod(),
                lens((a.centre - b.centre).norm(), a.radius + rounded, b.radius + rounded));
