@@ -227,8 +227,12 @@ struct Scene::Impl : SceneBodies {
     std::uint64_t differ = 0;
     for (const Found& two : found) differ |= two.key ^ found[0].key;
     sorted.resize(found.size());
-    const int bits = found.size() < 4096 ? 8 : 11;
-    std::uint32_t ends[(1u << 11) + 1];
+    // Of many, one number of a pair at once.
+    constexpr int kFewest = 8, kMost = 13;
+    const int bits = found.size() < 4096
+                         ? kFewest
+                         : std::clamp<int>(std::bit_width(name_of(differ).b), kFewest, kMost);
+    std::uint32_t ends[(1u << kMost) + 1];
     for (int shift = 0; differ >> shift != 0; shift += bits) {
       shift += std::countr_zero(differ >> shift);
       const auto digit = [&](const Found& two) {
