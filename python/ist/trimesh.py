@@ -329,7 +329,6 @@ class _Pairs:
     def __init__(self, of_a, of_b, first, second):
         self.of_a, self.of_b, self.first, self.second = of_a, of_b, first, second
         self.poses_a, self.poses_b = of_a.poses[first], of_b.poses[second]
-        self.objects_a, self.objects_b = of_a.objects, of_b.objects
 
     def __len__(self):
         return len(self.first)
@@ -344,8 +343,8 @@ class _Pairs:
         return query(self.of_a.solids(first), self.of_b.solids(self.second[chosen]), poses,
                      poses_a=self.poses_a[chosen], **settings)
 
-    def penetration(self, chosen):
-        answers = self.ask(ist.penetration, chosen, measure="exact")
+    def penetration(self, chosen, aside=0):
+        answers = self.ask(ist.penetration, chosen, aside, measure="exact")
         _refuse_unanswered(self, chosen, answers.status)
         return answers
 
@@ -355,7 +354,7 @@ class _Pairs:
         Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
         neither face.
         """
-        sides = [self.ask(ist.penetration, chosen, aside, measure="exact") for aside in (-_ASIDE, _ASIDE)]
+        sides = [self.penetration(chosen, aside) for aside in (-_ASIDE, _ASIDE)]
         return ((getattr(sides[0], what) + getattr(sides[1], what)) / 2
                 for what in ("volume", "force", "centroid"))
 
@@ -374,6 +373,8 @@ class _Pairs:
 
     def names(self, i):
         return tuple(one.name for one in self.objects(i))
+
+
 def _hits(pairs, only_first):
     """(those that collide, or the first of them; whether each only touches)"""
     if len(pairs) == 0:
@@ -440,8 +441,7 @@ def _nearest(near_by, count, margin, with_data):
     best, nearest = np.inf, None
     looked, pairs = -1.0, near_by(0)
     if len(pairs) > 0:
-        bound = pairs.ask(ist._core._nearness)
-        best, nearest = _deepest(pairs, bound)
+        best, nearest = _deepest(pairs)
     while count > 0 and looked < best and best > 0 and looked < 1e37:
         looked = best if best < np.inf else margin
         pairs, margin = near_by(looked), 4 * margin
@@ -456,10 +456,11 @@ def _nearest(near_by, count, margin, with_data):
     return float(best), pairs.names(i), data
 
 
-def _deepest(pairs, bound):
+def _deepest(pairs):
     """(minus the depth of the deepest overlap, (pairs, its number, points on both)); 0 where solids
     only touch, inf where they do not."""
     best, nearest = np.inf, None
+    bound = pairs.ask(ist._core._nearness)
     order, begin, size = np.argsort(bound, kind="stable"), 0, _FIRST
     while begin < len(order) and bound[order[begin]] <= 0 and bound[order[begin]] < best:
         chosen = order[begin:begin + size]
