@@ -94,6 +94,7 @@ def main():
         "is prepared once here; trimesh prepares the mesh of a `_single` call each time.",
         "Distances of what overlaps: FCL tells that of the first pair that it finds, here it is the deepest of all. "
         "Contacts have volumes here, one for each connected part of an overlap; FCL's are of triangles.",
+        "Alone, `in_collision_internal` asks two objects first that collided before.",
         "Of flush boxes FCL finds no collision at all where faces match (findings/fcl_flush_boxes.sh)."]
     out.write_text(json.dumps({
         "benchmark": "collision_manager", "page": "trimesh's CollisionManager",

@@ -210,8 +210,8 @@ class BoxTree {
     }
   }
 
-  /// visit(body, body) of all pairs of bodies whose boxes meet, once each: of this hierarchy, or
-  /// one of each.
+  /// visit(pairs) of all pairs of bodies whose boxes meet, once each and some at a time: of this
+  /// hierarchy, or one of each.
   template <class Visit>
   void pairs_with(const BoxTree& other, const Visit& visit) noexcept {
     if (root_ == kNone || other.root_ == kNone) return;
@@ -219,7 +219,7 @@ class BoxTree {
     PairSearch search{nodes_.data(), other.nodes_.data(), root_, other.root_, stack_.data(), end};
     BodyPair some[PairSearch::kMost];
     while (const std::size_t count = next_pairs(search, some))
-      for (std::size_t i = 0; i < count; ++i) visit(some[i].a, some[i].b);
+      visit(std::span<const BodyPair>(some, count));
   }
 
  private:

@@ -44,15 +44,16 @@ void Scene::add(const SceneBody& body) {
     all.bodies.emplace_back();
     all.blocks.resize(at / kCount + 1);
     all.lanes.resize(all.blocks.size());
-    all.filtered.resize(kCount * all.blocks.size());
+    all.number_of.resize(kCount * all.blocks.size());
+    all.filtered.resize(all.number_of.size());
   }
   all.index_of.emplace(body.number, at);
   all.bodies[at] = {};
   all.bodies[at].given = body;
   all.bodies[at].kept = BodyBox(body.solid);
-  all.filtered[at] = {body.number, body.group,
-                      body.layers, body.meets,
-                      body.moves,  std::holds_alternative<PlacedShape>(body.solid.placed)};
+  all.number_of[at] = body.number;
+  all.filtered[at] = {body.layers, body.meets, static_cast<std::uint8_t>(body.group), body.moves,
+                      std::holds_alternative<PlacedShape>(body.solid.placed)};
   all.blocks[at / kCount].set_pose(
       at % kCount, std::visit([](const auto& placed) { return placed.pose; }, body.solid.placed));
   all.prepare(at);
@@ -76,16 +77,21 @@ bool Scene::set_pose(std::uint32_t number, const Pose& pose) noexcept {
 std::size_t Scene::set_poses(std::span<const std::uint32_t> numbers,
                              std::span<const Pose> poses) noexcept {
   return impl_->set_all(numbers, poses,
-                        [&](std::uint32_t block, std::uint32_t k, const Pose& pose) {
-                          impl_->blocks[block].set_pose(k, pose);
+                        [&](std::uint32_t block, std::uint32_t k, std::span<const Pose> row) {
+                          BodyBlock& all = impl_->blocks[block];
+                          if (row.size() < kCount)
+                            for (const Pose& pose : row) all.set_pose(k++, pose);
+                          else  // (without a loop)
+                            for (std::uint32_t r = 0; r < kCount; ++r) all.set_pose(r, row[r]);
                         });
 }
 
 std::size_t Scene::set_motions(std::span<const std::uint32_t> numbers,
                                std::span<const Motion> motions) noexcept {
   return impl_->set_all(numbers, motions,
-                        [&](std::uint32_t block, std::uint32_t k, const Motion& motion) {
-                          impl_->bodies[kCount * block + k].given.motion = motion;
+                        [&](std::uint32_t block, std::uint32_t k, std::span<const Motion> row) {
+                          for (const Motion& motion : row)
+                            impl_->bodies[kCount * block + k++].given.motion = motion;
                         });
 }
 
@@ -126,6 +132,7 @@ void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRu
   if (rule.answer == SceneAnswer::patches && all.patches.empty())
     all.patches.resize(all.settings.max_pairs * all.settings.patches_per_pair);
   all.rules[group_a * kSceneGroups + group_b] = all.rules[group_b * kSceneGroups + group_a] = plain;
+  all.note_answers();
   all.widths = {};
   for (const SceneRule& one : all.rules) {
     all.widths.margin = std::max(all.widths.margin, one.margin / 2);

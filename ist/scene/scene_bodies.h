@@ -3,6 +3,7 @@
 #include <ist/scene.h>
 #include <algorithm>
 #include <bit>
+#include <cstring>
 #include <unordered_map>
 #include <utility>
 
@@ -22,7 +23,8 @@ struct SceneBodies {
   };
   /// What is asked of a body for every box that its own meets.
   struct Filtered {
-    std::uint32_t number = 0, group = 0, layers = 0, meets = 0;
+    std::uint32_t layers = 0, meets = 0;
+    std::uint8_t group = 0;
     bool moves = false, is_field = false;
     Place place = Place::free;
   };
@@ -44,6 +46,7 @@ struct SceneBodies {
   void take_room(std::size_t most) {
     bodies.reserve(most);
     const std::size_t of_eight = (most + kCount - 1) / kCount;
+    number_of.reserve(kCount * of_eight);
     filtered.reserve(kCount * of_eight);
     blocks.reserve(of_eight);
     lanes.reserve(of_eight);
@@ -55,11 +58,17 @@ struct SceneBodies {
   }
 
   bool is_at(std::uint32_t i, std::uint32_t number) const noexcept {
-    return filtered[i].number == number && filtered[i].place != Place::free;
+    return number_of[i] == number && filtered[i].place != Place::free;
+  }
+  /// True if a block's bodies have these numbers, in order.
+  bool is_full(std::uint32_t first, const std::uint32_t* numbers) const noexcept {
+    const Lanes& all = lanes[first / kCount];
+    return (all.moving | all.still) == (1u << kCount) - 1 &&
+           std::memcmp(numbers, number_of.data() + first, kCount * sizeof *numbers) == 0;
   }
   /// The index of a body, kNone if there is none; quick if it is `guess`.
   std::uint32_t find(std::uint32_t number, std::uint32_t guess = kNone) const noexcept {
-    if (guess < bodies.size() && is_at(guess, number)) return guess;
+    if (guess < number_of.size() && is_at(guess, number)) return guess;
     const auto found = index_of.find(number);
     return found == index_of.end() ? kNone : found->second;
   }
@@ -75,6 +84,7 @@ struct SceneBodies {
   void note_moved(std::uint32_t block, std::uint32_t of) noexcept {
     Lanes& all = lanes[block];
     if (all.moved == 0) moved.push_back(block);
+    moved_count += static_cast<std::size_t>(std::popcount(of & ~std::uint32_t{all.moved}));
     all.moved = static_cast<std::uint8_t>(all.moved | of);
   }
   void note_moved(std::uint32_t i) noexcept { note_moved(i / kCount, 1u << i % kCount); }
@@ -82,12 +92,12 @@ struct SceneBodies {
     return (lanes[i / kCount].moved >> i % kCount & 1) != 0;
   }
   /// True if they are more than an eighth.
-  bool many_moved() const noexcept {
-    const std::size_t most = still.size() + moving.size();
-    std::size_t count = 0;
-    for (auto block = moved.begin(); block != moved.end() && 8 * count <= most; ++block)
-      count += static_cast<std::size_t>(std::popcount(lanes[*block].moved));
-    return 8 * count > most;
+  bool many_moved() const noexcept { return 8 * moved_count > still.size() + moving.size(); }
+  bool all_moved() const noexcept { return removed.empty() && moved_count == index_of.size(); }
+  void forget_moved() noexcept {
+    for (const std::uint32_t block : moved) lanes[block].moved = 0;
+    moved.clear();
+    moved_count = 0;
   }
   /// visit(index) of bodies that moved and have a box.
   template <class Visit>
@@ -183,7 +193,7 @@ struct SceneBodies {
     put_waiting(true);
   }
 
-  /// set(block, lane, values[i]) of each that there is. Returns how many.
+  /// set(block, lane, values…) of rows of those that there are. Returns how many.
   template <class Values, class Set>
   std::size_t set_all(std::span<const std::uint32_t> numbers, const Values& values,
                       const Set& set) noexcept {
@@ -207,11 +217,12 @@ struct SceneBodies {
       // In a row, as far as its block goes.
       const std::uint32_t k = at % kCount;
       const std::size_t most = std::min<std::size_t>(kCount - k, count - i);
-      const Filtered* const own = filtered.data() + at;
       std::uint32_t row = 1;
-      while (row < most && own[row].number == numbers[i + row] && own[row].place != Place::free)
-        ++row;
-      for (std::uint32_t r = 0; r < row; ++r) set(at / kCount, k + r, values[i + r]);
+      if (most == kCount && is_full(at, numbers.data() + i))
+        row = kCount;
+      else
+        while (row < most && is_at(at + row, numbers[i + row])) ++row;
+      set(at / kCount, k, values.subspan(i, row));
       if (row == kCount)
         full[ready++] = at / kCount;
       else
@@ -229,10 +240,13 @@ struct SceneBodies {
   BoxWidths widths = {.by_spheres = true};  ///< as the rules need
   BoxTree still, moving;
   std::vector<Body> bodies;
-  std::vector<Filtered> filtered;  ///< by index, as `bodies`, and to the end of their block
-  std::vector<BodyBlock> blocks;   ///< eight bodies each, as in `lanes`
+  /// By index, as `bodies`, and to the end of their block.
+  std::vector<std::uint32_t> number_of;
+  std::vector<Filtered> filtered;
+  std::vector<BodyBlock> blocks;  ///< eight bodies each, as in `lanes`
   std::vector<Lanes> lanes;
   std::vector<std::uint32_t> waiting, moved;  ///< blocks that have such lanes
+  std::size_t moved_count = 0;                ///< bodies, of those that were removed too
   std::unordered_map<std::uint32_t, std::uint32_t> index_of;
   std::vector<std::uint32_t> free_bodies, removed, endless, refused_bodies;
   std::vector<std::uint32_t> refused;  ///< numbers of those, sorted in a step

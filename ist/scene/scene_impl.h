@@ -48,40 +48,71 @@ struct Scene::Impl : SceneBodies {
     workspaces.reserve(given.workers);
     for (std::size_t i = 0; i < given.workers; ++i)
       workspaces.emplace_back(given.workspace_capacity);
+    note_answers();
   }
 
   SceneRule& rule_of(std::uint32_t i, std::uint32_t j) noexcept {
     return rules[filtered[i].group * kSceneGroups + filtered[j].group];
   }
-  bool may_meet(std::uint32_t i, std::uint32_t j) noexcept {
+  SceneAnswer answer_of(std::uint32_t i, std::uint32_t j) const noexcept {
+    return answers[filtered[i].group * kSceneGroups + filtered[j].group];
+  }
+  /// After rules were set.
+  void note_answers() noexcept {
+    for (std::size_t k = 0; k < rules.size(); ++k) answers[k] = rules[k].answer;
+  }
+  bool may_meet(std::uint32_t i, std::uint32_t j) const noexcept {
     const Filtered &a = filtered[i], &b = filtered[j];
-    if (!(a.moves || b.moves) || (a.layers & b.meets) == 0 || (b.layers & a.meets) == 0 ||
-        (a.is_field && b.is_field) || rule_of(i, j).answer == SceneAnswer::nothing)
-      return false;
-    if (!excluded.empty() &&
-        std::binary_search(excluded.begin(), excluded.end(), key_of(a.number, b.number)))
-      return false;
-    return filter == nullptr ||
-           filter(context, std::min(a.number, b.number), std::max(a.number, b.number));
+    return (static_cast<unsigned>((a.layers & b.meets) != 0) &
+            static_cast<unsigned>((b.layers & a.meets) != 0) & (unsigned{a.moves} | b.moves) &
+            ~(unsigned{a.is_field} & b.is_field) &
+            static_cast<unsigned>(answer_of(i, j) != SceneAnswer::nothing)) != 0;
+  }
+  /// False of numbers, a the lower one, that are excluded or filtered out.
+  bool is_let(std::uint32_t a, std::uint32_t b) const noexcept {
+    return !std::binary_search(excluded.begin(), excluded.end(), key_of(a, b)) &&
+           (filter == nullptr || filter(context, a, b));
   }
 
   void note(std::uint32_t i, std::uint32_t j) noexcept {
-    if ((!has_moved(i) && !has_moved(j)) || !may_meet(i, j)) return;
-    if (found.size() + now.size() >= settings.max_pairs &&
-        found.size() + count_kept() == settings.max_pairs) {
+    if (number_of[j] < number_of[i]) std::swap(i, j);
+    if ((!every && !has_moved(i) && !has_moved(j)) || !may_meet(i, j) ||
+        (picks && !is_let(number_of[i], number_of[j])))
+      return;
+    if (found.size() >= most_found && found.size() + count_kept() == settings.max_pairs) {
       exceeded = true;
       return;
     }
-    const std::uint32_t a = filtered[i].number, b = filtered[j].number;
-    found.push_back({key_of(a, b), {a < b ? i : j, a < b ? j : i}});
+    found.push_back({key_of(number_of[i], number_of[j]), {i, j}});
+  }
+
+  /// note() of at most PairSearch::kMost pairs.
+  void note_all(std::span<const BodyPair> some) noexcept {
+    if (!every || picks || found.size() + some.size() > most_found) {
+      for (const BodyPair& two : some) note(two.a, two.b);
+      return;
+    }
+    Found kept[PairSearch::kMost];
+    std::size_t count = 0;
+    const std::uint32_t* const number = number_of.data();
+    for (const BodyPair& two : some) {
+      const bool in_order = number[two.a] < number[two.b];
+      const std::uint32_t i = in_order ? two.a : two.b, j = in_order ? two.b : two.a;
+      kept[count] = {std::uint64_t{number[i]} << 32 | number[j], {i, j}};
+      count += may_meet(i, j);
+    }
+    found.insert(found.end(), kept, kept + count);
   }
 
   /// Pairs of which a body moved whose boxes meet.
   void find_candidates() noexcept {
-    const auto both = [&](std::uint32_t i, std::uint32_t j) { note(i, j); };
+    every = all_moved();
+    picks = !excluded.empty() || filter != nullptr;
+    most_found = settings.max_pairs - (every ? 0 : now.size());
     if (many_moved()) {
-      moving.pairs_with(moving, both);
-      moving.pairs_with(still, both);
+      const auto visit = [&](std::span<const BodyPair> some) { note_all(some); };
+      moving.pairs_with(moving, visit);
+      moving.pairs_with(still, visit);
     } else {
       constexpr std::size_t kTogether = 64;
       std::uint32_t of[kTogether];
@@ -196,8 +227,12 @@ struct Scene::Impl : SceneBodies {
     std::uint64_t differ = 0;
     for (const Found& two : found) differ |= two.key ^ found[0].key;
     sorted.resize(found.size());
-    const int bits = found.size() < 4096 ? 8 : 11;
-    std::uint32_t ends[(1u << 11) + 1];
+    // Of many, one number of a pair at once.
+    constexpr int kFewest = 8, kMost = 13;
+    const int bits = found.size() < 4096
+                         ? kFewest
+                         : std::clamp<int>(std::bit_width(name_of(differ).b), kFewest, kMost);
+    std::uint32_t ends[(1u << kMost) + 1];
     for (int shift = 0; differ >> shift != 0; shift += bits) {
       shift += std::countr_zero(differ >> shift);
       const auto digit = [&](const Found& two) {
@@ -218,7 +253,7 @@ struct Scene::Impl : SceneBodies {
     fresh.clear();
     bool asks = false;
     for (const Found& two : found) {
-      const SceneAnswer asked = rule_of(two.body[0], two.body[1]).answer;
+      const SceneAnswer asked = answer_of(two.body[0], two.body[1]);
       Candidate& made = fresh.emplace_back(Candidate{two.key, {two.body[0], two.body[1]}});
       made.meet = asked == SceneAnswer::boxes;
       if (asked > SceneAnswer::overlap) made.slot = take_slot();
@@ -234,7 +269,7 @@ struct Scene::Impl : SceneBodies {
     moving.settle();
     SceneStep out;
     refused.clear();
-    for (const std::uint32_t i : refused_bodies) refused.push_back(filtered[i].number);
+    for (const std::uint32_t i : refused_bodies) refused.push_back(number_of[i]);
     std::sort(refused.begin(), refused.end());
     out.refused = refused;
     kept.reset();
@@ -248,21 +283,21 @@ struct Scene::Impl : SceneBodies {
       return out;
     }
     std::size_t gone = 0;
+    const bool none_stays = every;
     for (Candidate& two : now)
-      if (!(two.stays = is_kept(two))) {
+      if (!(two.stays = !none_stays && is_kept(two))) {
         give_back(two);
         ++gone;
       }
     out.boxes_met = now.size() - gone + found.size();
     if (gone > 0 || !found.empty()) {
       ask_found(parallel);
-      merge();
+      merge(gone < now.size());
     } else {
       for (ScenePair& pair : pairs) pair.event = SceneEvent::stays;
       ended.clear();
     }
-    for (const std::uint32_t block : moved) lanes[block].moved = 0;
-    moved.clear();
+    forget_moved();
     free_bodies.insert(free_bodies.end(), removed.begin(), removed.end());
     removed.clear();
     out.pairs = pairs;
@@ -270,14 +305,15 @@ struct Scene::Impl : SceneBodies {
     return out;
   }
 
-  /// Merges the pairs that stay with those that were asked: all, those that meet, those that ended.
-  void merge() noexcept {
+  /// Merges the pairs that stay, if there are any, with those that were asked: all, those that
+  /// meet, those that ended.
+  void merge(bool some_stay) noexcept {
     std::swap(now, before);
     now.clear();
     pairs.clear();
     ended.clear();
     const auto go_on = [&](const Candidate& two, bool met) {
-      now.push_back(two);
+      if (some_stay) now.push_back(two);
       if (two.meet)
         pairs.push_back({name_of(two.key).a, name_of(two.key).b,
                          met ? SceneEvent::stays : SceneEvent::begins, two.overlapping, two.slot,
@@ -302,6 +338,7 @@ struct Scene::Impl : SceneBodies {
       if (both) ++old;
     }
     pass(~std::uint64_t{0});
+    if (!some_stay) std::swap(now, fresh);
   }
 
   /// visit(index) of bodies without a box, and of those whose boxes enter(box) lets in.
@@ -314,6 +351,7 @@ struct Scene::Impl : SceneBodies {
 
   SceneSettings settings;
   std::array<SceneRule, kSceneGroups * kSceneGroups> rules;
+  std::array<SceneAnswer, kSceneGroups * kSceneGroups> answers;  ///< of the rules
   std::vector<std::uint64_t> excluded;
   bool (*filter)(const void*, std::uint32_t, std::uint32_t) noexcept = nullptr;
   const void* context = nullptr;
@@ -327,6 +365,10 @@ struct Scene::Impl : SceneBodies {
   std::vector<TimeOfImpact> impacts;
   std::vector<std::uint32_t> free_slots;
   std::vector<ScenePairName> ended;
+  // Of a search for pairs:
+  bool every = false;          ///< all bodies moved
+  bool picks = false;          ///< some pairs are excluded, or there is a filter
+  std::size_t most_found = 0;  ///< as long as there are fewer they are not too many
   bool exceeded = false;
   std::deque<std::vector<float>> recorded;  ///< what fields of a record point to
   std::vector<Workspace> workspaces;

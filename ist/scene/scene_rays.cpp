@@ -28,7 +28,7 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
     return from <= to * (1 + 1e-12) + 1e-300;
   };
   const auto visit = [&](std::uint32_t i) {
-    const std::uint32_t number = impl_->filtered[i].number;
+    const std::uint32_t number = impl_->number_of[i];
     const RayHit hit = ist::raycast(impl_->solid_of(i), ray);
     if (hit.status != QueryStatus::ok || !hit.hit() || !(hit.distance <= longest)) return;
     if (best.hit.hit() && hit.distance == best.hit.distance && number > best.number) return;
@@ -53,7 +53,7 @@ SceneNearest Scene::nearest(const Eigen::Vector3d& point, double max_distance) c
     return off.stableNorm() <= std::max(farthest, 0.0) * (1 + 1e-9);
   };
   const auto visit = [&](std::uint32_t i) {
-    const std::uint32_t number = impl_->filtered[i].number;
+    const std::uint32_t number = impl_->number_of[i];
     const SurfacePoint here = closest_point(impl_->solid_of(i), point);
     if (here.status != QueryStatus::ok || !(here.distance <= farthest)) return;
     if (here.distance == best.surface.distance && number > best.number) return;
@@ -70,7 +70,7 @@ std::size_t Scene::in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& u
   WorldBox{plain(lower), plain(upper)}.write(box.low, box.high);
   std::size_t count = 0;
   const auto visit = [&](std::uint32_t i) {
-    if (count < numbers.size()) numbers[count] = impl_->filtered[i].number;
+    if (count < numbers.size()) numbers[count] = impl_->number_of[i];
     ++count;
   };
   for (const std::uint32_t i : impl_->endless) visit(i);

@@ -1,7 +1,8 @@
 import numpy as np
 
+from . import _core
+
 _WANTED = "(4, 4) or (n, 4, 4), (3, 3) or (n, 3, 3), or quaternions (4,) or (n, 4) with `order`"
-_RIGID = 1e-6  # how far a matrix may be from a rotation, each entry of RᵀR
 
 
 def poses(rotations, translations=None, *, order=None):
@@ -22,7 +23,7 @@ def poses(rotations, translations=None, *, order=None):
     if order is None and tail == (4, 4):
         if translations is not None:
             raise ValueError("translations: (4, 4) matrices already hold them; leave it out")
-        return rows_of(given, "rotations")
+        return _core._poses(given, "rotations")
     moves = np.zeros(3) if translations is None else _doubles(translations, "translations")
     if moves.shape[-1:] != (3,):
         raise ValueError(f"translations: shape {moves.shape}; wanted (3,) or (n, 3)")
@@ -35,7 +36,9 @@ def poses(rotations, translations=None, *, order=None):
         with np.errstate(all="ignore"):
             quaternions = quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
     elif tail == (3, 3):
-        quaternions = _quaternions(given, "rotations")
+        matrices = np.zeros((*given.shape[:-2], 4, 4))
+        matrices[..., :3, :3], matrices[..., 3, 3] = given, 1
+        quaternions = _core._poses(matrices, "rotations")[..., :4]
     else:
         raise ValueError(f"rotations: shape {given.shape}; wanted {_WANTED}")
     try:
@@ -47,42 +50,8 @@ def poses(rotations, translations=None, *, order=None):
                            np.broadcast_to(moves, (*lead, 3))), axis=-1)
 
 
-def rows_of(matrices, name):
-    """(…, 7) of (…, 4, 4)."""
-    m = np.asarray(matrices, np.float64)
-    last = m[..., 3, :]
-    _refuse(np.abs(last - [0, 0, 0, 1]).max(axis=-1), name, "its last row is not 0, 0, 0, 1")
-    return np.concatenate((_quaternions(m[..., :3, :3], name), m[..., :3, 3]), axis=-1)
-
-
 def _doubles(value, name):
     given = np.asarray(value)
     if given.dtype.kind not in "fiu":
         raise TypeError(f"{name}: dtype {given.dtype}; wanted float64")
     return given.astype(np.float64)
-
-
-def _refuse(error, name, why):
-    bad = np.flatnonzero(error > _RIGID)  # NaN is none
-    if len(bad):
-        raise ValueError(f"{name}: matrix {bad[0]} is no rigid motion: {why}")
-
-
-def _quaternions(r, name):
-    """(…, 4), qw first, of rotation matrices."""
-    with np.errstate(invalid="ignore"):
-        off = np.abs(np.swapaxes(r, -1, -2) @ r - np.eye(3)).max(axis=(-1, -2))
-        _refuse(off, name, "its columns are not of length 1 and at right angles")
-        _refuse(-np.sign(np.linalg.det(r)), name, "it mirrors")
-    x, y, z = r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]
-    # 4 q_k q, for each k: the longest of the four has no cancellation.
-    rows = np.empty((*r.shape[:-2], 4, 4))
-    rows[..., 0, 0], rows[..., 1, 1] = 1 + x + y + z, 1 + x - y - z
-    rows[..., 2, 2], rows[..., 3, 3] = 1 - x + y - z, 1 - x - y + z
-    for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1)), 1):
-        rows[..., 0, k] = rows[..., k, 0] = r[..., j, i] - r[..., i, j]
-        rows[..., i + 1, j + 1] = rows[..., j + 1, i + 1] = r[..., i, j] + r[..., j, i]
-    lengths = np.linalg.norm(rows, axis=-1)
-    best = np.argmax(lengths, axis=-1)[..., None, None]
-    q = np.take_along_axis(rows, best, axis=-2)[..., 0, :]
-    return q / np.take_along_axis(lengths, best[..., 0], axis=-1)

@@ -23,26 +23,33 @@ _FIRST = 16  # distances that are asked first: the best of them bounds the other
 class _Data:
     """What both kinds of data have: names, and the face of a mesh that is nearest to a point."""
 
-    def __init__(self, names, objects):
-        self.names = set(names)
-        self._objects = dict(zip(names, objects))
+    def __init__(self, pairs, i):
+        self._objects = pairs.objects(i)
+        self._poses = pairs.poses_a[i], pairs.poses_b[i]
+
+    @property
+    def names(self):
+        return {one.name for one in self._objects}
+
+    def _of(self, name, values):
+        return dict(zip([one.name for one in self._objects], values))[name]
 
     def _face(self, name, point):
-        return self._objects[name].face(point)
+        one, pose = self._of(name, zip(self._objects, self._poses))
+        return one.face(pose, point)
 
 
 class ContactData(_Data):
     """A contact of two objects.
 
     normal: (3,) unit, from the first object to the second; zero where they touch in a point or edge.
-    point: (3,) [u] world. depth: [u] ≥ 0. volume: [u³] of the overlap there. touching: whether they
-    touch, and do not overlap.
+    point: (3,) [u] world; NaN where they touch in points or edges alone and none of them is found.
+    depth: [u] ≥ 0. volume: [u³] of the overlap there. touching: whether they touch, and do not overlap.
     """
 
-    def __init__(self, names, objects, normal, point, depth, volume):
-        super().__init__(names, objects)
-        self.normal, self.point = normal, point
-        self.depth, self.volume = float(depth), float(volume)
+    def __init__(self, pairs, i, normal, point, depth, volume):
+        super().__init__(pairs, i)
+        self.normal, self.point, self.depth, self.volume = normal, point, depth, volume
 
     @property
     def touching(self):
@@ -56,83 +63,71 @@ class ContactData(_Data):
 class DistanceData(_Data):
     """The distance of two objects [u]: negative where they overlap, by the depth of the deepest contact."""
 
-    def __init__(self, names, objects, distance, points):
-        super().__init__(names, objects)
-        self.distance = float(distance)
-        self._points = dict(zip(names, points))
+    def __init__(self, pairs, i, distance, points):
+        super().__init__(pairs, i)
+        self.distance, self._points = distance, points
 
     def point(self, name):
         """(3,) [u] on that object, world."""
-        return self._points[name]
+        return self._of(name, self._points)
 
     def index(self, name):
         """The face of that object's mesh which is nearest to its point."""
-        return self._face(name, self._points[name])
+        return self._face(name, self.point(name))
 
 
 class _Object:
-    """A mesh at a pose."""
+    """A mesh and its asset."""
 
-    def __init__(self, name, mesh, asset, transform):
-        self.name, self.mesh, self.asset = name, mesh, asset
-        self.box = np.array([asset.bounds().lower, asset.bounds().upper])
-        self.size = (self.box[1] - self.box[0]).max()
-        self.set_transform(transform)
+    def __init__(self, name, mesh, asset, size):
+        self.name, self.mesh, self.asset, self.size = name, mesh, asset, size
 
-    def set_transform(self, transform):
-        transform = np.eye(4) if transform is None else np.array(transform, dtype=np.float64)
-        if transform.shape != (4, 4):
-            raise ValueError("transform must be (4,4)!")
-        if not np.isfinite(transform).all():
-            raise ValueError(f"transform of {self.name}: must be finite")
-        if not _is_rigid(*transform.tolist()):
-            try:
-                ist.poses(transform)
-            except ValueError as error:
-                why = str(error).partition(": ")[2].replace("matrix 0", "it", 1)
-                raise ValueError(f"transform of {self.name}: {why}; scale or mirror the mesh") from None
-        self.transform = transform
-
-    def face(self, point):
+    def face(self, pose, point):
         import trimesh
 
-        inverse = np.linalg.inv(self.transform)
-        local = inverse[:3, :3] @ np.asarray(point) + inverse[:3, 3]
+        local = np.asarray(point) - pose[4:]
+        w, v = pose[0], -pose[1:4]  # turns back
+        turned = 2 * np.cross(v, local)
+        local = local + w * turned + np.cross(v, turned)
         triangles = np.asarray(self.mesh.triangles)
         near = trimesh.triangles.closest_point(triangles, np.broadcast_to(local, (len(triangles), 3)))
         return int(((near - local)**2).sum(axis=1).argmin())
 
 
-def _is_rigid(x, y, z, last):
-    """As ist.poses has it, of a matrix's rows."""
-    columns = list(zip(x[:3], y[:3], z[:3]))
-    off = max(abs(sum(map(operator.mul, u, v)) - (u is v)) for u in columns for v in columns)
-    (a, b, c), (d, e, f), (g, h, i) = columns
-    return off < 1e-6 and a * (e * i - f * h) + b * (f * g - d * i) + c * (d * h - e * g) > 0 and last == [0, 0, 0, 1]
+def _put(pose, name, transform):
+    """Writes a transform as a row of ist.poses."""
+    try:
+        ist._core._put_pose(pose, transform)
+    except ValueError as error:
+        raise ValueError(f"transform of {name}: {error}") from None
 
 
 class _Bodies:
-    """Objects as queries take them, a row each."""
+    """Objects as queries take them, a row each. A row that is free keeps what it had."""
 
-    def __init__(self, objects):
-        self.objects = list(objects)
-        self.solids = ist.Solids([one.asset for one in self.objects])
-        self.sizes = np.array([one.size for one in self.objects])
-        self.poses, self.low, self.high = (np.empty((len(self.objects), width)) for width in (7, 3, 3))
-        self.move(np.arange(len(self.objects)))
+    def __init__(self):
+        self.objects, self.free = [], []
+        self.poses = np.empty((16, 7))
+        self._solids = None
 
-    def move(self, rows):
-        """To where the objects are now."""
-        if len(rows) == 0:
-            return
-        at = np.array([self.objects[row].transform for row in rows])
-        box = np.array([self.objects[row].box for row in rows])
-        self.poses[rows] = ist.poses(at)
-        middle = np.einsum("nij,nj->ni", at[:, :3, :3], box.mean(axis=1)) + at[:, :3, 3]
-        half = np.einsum("nij,nj->ni", np.abs(at[:, :3, :3]), (box[:, 1] - box[:, 0]) / 2)
-        # (more than what placing a solid rounds)
-        half += 1e-12 * (np.abs(middle).max(axis=1) + half.max(axis=1))[:, None]
-        self.low[rows], self.high[rows] = middle - half, middle + half
+    def put(self, one, pose):
+        """The row that they get."""
+        if self.free:
+            row = self.free.pop()
+            self.objects[row] = one
+        else:
+            row = len(self.objects)
+            self.objects.append(one)
+            if row == len(self.poses):
+                self.poses = np.concatenate([self.poses, self.poses])
+        self.poses[row] = pose
+        self._solids = None
+        return row
+
+    def solids(self, rows):
+        if self._solids is None:
+            self._solids = ist.Solids([one.asset for one in self.objects])
+        return self._solids[rows]
 
 
 class CollisionManager:
@@ -143,149 +138,171 @@ class CollisionManager:
 
     def __init__(self, *, repair=False):
         self._repair = repair
-        self._objs = {}
-        self._assets = {}
+        self._objs = {}  # rows of bodies
+        self._bodies = _Bodies()
+        self._assets = {}  # and sizes, by content
         self._scene, self._room, self._pairs = None, 0, 16  # made where it is needed, for so many
-        self._moved = set()  # numbers of objects that the scene has elsewhere
-        self._bodies = self._row = None  # rows of all objects, and those of the scene's numbers
+        self._margin = 0  # of the scene
+        self._moved = set()  # rows that the scene has elsewhere
         self._found = None  # the pairs of a margin, until something moves
-        self._size = np.inf  # of the smallest object
+        self._hit = None  # rows of two objects that collided
 
     def add_object(self, name, mesh, transform=None):
         """Adds or replaces an object: anything with `vertices` and `faces`. transform: (4, 4), rigid.
 
         Returns its ist.Asset.
         """
-        added = self._object(name, mesh, transform)
+        added, pose = self._object(name, mesh, transform)
         if name in self._objs:
             self.remove_object(name)
-        self._objs[name] = added
-        self._bodies = self._row = self._found = None
-        self._size = min(self._size, added.size)
+        row = self._objs[name] = self._bodies.put(added, pose)
+        self._found = self._hit = None
         if self._scene is not None and len(self._objs) <= self._room:
-            added.number = self._scene.add(added.asset, ist.poses(added.transform))
+            self._scene.add(added.asset, pose, number=row)
         else:
             self._scene = None
         return added.asset
 
     def remove_object(self, name):
-        gone = self._of(name)
+        row = self._row(name)
         if self._scene is not None:
-            self._scene.remove(gone.number)
-            self._moved.discard(gone.number)
-        self._bodies = self._row = self._found = None
+            self._scene.remove(row)
+            self._moved.discard(row)
+        self._found = self._hit = None
+        self._bodies.free.append(row)
         del self._objs[name]
 
     def set_transform(self, name, transform):
-        moved = self._of(name)
-        moved.set_transform(transform)
+        row = self._row(name)
+        _put(self._bodies.poses[row], name, transform)
         self._found = None
-        if self._scene is not None:
-            self._moved.add(moved.number)
+        self._moved.add(row)
 
     def in_collision_single(self, mesh, transform=None, return_names=False, return_data=False):
         """Whether a mesh collides with any object; the set of their names; a list of ContactData."""
-        pairs = self._near(_Bodies([self._object("__external", mesh, transform)]))
+        pairs = self._near(*self._single(mesh, transform))
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, {a for a, _ in names}, data, return_names, return_data)
 
     def in_collision_internal(self, return_names=False, return_data=False):
         """Whether any two objects collide; the set of their names, sorted in each pair."""
+        if not (return_names or return_data):
+            return self._meet()
         found, names, data = _collide(self._within(), return_names, return_data)
         return _told(found, {tuple(sorted(pair)) for pair in names}, data, return_names, return_data)
 
     def in_collision_other(self, other_manager, return_names=False, return_data=False):
         """Whether an object collides with one of another manager; names are (own, other's)."""
-        pairs = self._near(_Bodies(other_manager._objs.values()))
+        pairs = self._near(other_manager._bodies, list(other_manager._objs.values()))
         found, names, data = _collide(pairs, return_names, return_data)
         return _told(found, set(names), data, return_names, return_data)
 
     def min_distance_single(self, mesh, transform=None, return_name=False, return_data=False):
         """The least distance of a mesh from any object [u], negative inside; inf without objects."""
-        single = _Bodies([self._object("__external", mesh, transform)])
-        distance, names, data = _nearest(lambda margin: self._near(single, margin), len(self._objs),
-                                         single.sizes[0], return_data)
+        single, rows = self._single(mesh, transform)
+        distance, names, data = _nearest(lambda margin: self._near(single, rows, margin), len(self._objs),
+                                         single.objects[0].size, return_data)
         return _told(distance, names and names[0], data, return_name, return_data)
 
     def min_distance_internal(self, name=None, return_names=False, return_data=False):
         """The least distance of two objects, or of object `name` from the others."""
         count = len(self._objs)
         if name is None:
-            distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size, return_data)
+            distance, names, data = _nearest(self._within, count * (count - 1) // 2, self._size(), return_data)
         else:
-            one = _Bodies([self._of(name)])
-            distance, names, data = _nearest(lambda margin: self._near(one, margin), count - 1, one.sizes[0],
-                                             return_data)
+            row = self._row(name)
+            distance, names, data = _nearest(lambda margin: self._near(self._bodies, [row], margin), count - 1,
+                                             self._bodies.objects[row].size, return_data)
         return _told(distance, names and tuple(sorted(names)), data, return_names, return_data)
 
     def min_distance_other(self, other_manager, return_names=False, return_data=False):
         """The least distance of an object from one of another manager; names are (own, other's)."""
-        others = _Bodies(other_manager._objs.values())
-        distance, names, data = _nearest(lambda margin: self._near(others, margin),
-                                         len(self._objs) * len(others.objects), self._size, return_data)
+        others, rows = other_manager._bodies, list(other_manager._objs.values())
+        distance, names, data = _nearest(lambda margin: self._near(others, rows, margin),
+                                         len(self._objs) * len(rows), self._size(), return_data)
         return _told(distance, names, data, return_names, return_data)
 
-    def _placed(self):
-        """The scene of all objects, where they were at its last step."""
-        if self._bodies is None:
-            self._bodies = _Bodies(self._objs.values())
-        if self._scene is None:
-            self._room = 2 * len(self._objs) + 2
-            self._scene = ist.Scene(max_bodies=self._room, max_pairs=self._pairs * self._room, threads=1)
-            self._moved, self._row = set(), None
-            for one, pose in zip(self._bodies.objects, self._bodies.poses):
-                one.number = self._scene.add(one.asset, pose)
-        if self._row is None:
-            numbers = [one.number for one in self._bodies.objects]
-            self._row = np.empty(max(numbers, default=0) + 1, int)
-            self._row[numbers] = np.arange(len(numbers))
-        return self._scene
+    def _meet(self):
+        """Whether any two objects collide. Those that did are asked first."""
+        if self._hit is not None and len(_hits(_Pairs(self._bodies, self._bodies, *self._hit), True)[0]) > 0:
+            return True
+        pairs = self._within()
+        hits = _hits(pairs, True)[0]
+        self._hit = (pairs.first[hits], pairs.second[hits]) if len(hits) > 0 else None
+        return len(hits) > 0
+
+    def _size(self):
+        """Of the smallest object."""
+        return min((self._bodies.objects[row].size for row in self._objs.values()), default=np.inf)
 
     def _within(self, margin=0):
         """The pairs whose boxes are no further apart than the margin."""
         while self._found is None or self._found[0] != margin:
-            self._placed().set_rule(answer="boxes", measure="exact", margin=margin)
-            numbers = np.array(list(self._moved), int)
-            rows = self._row[numbers]
-            self._bodies.move(rows)
-            self._moved = set()
+            scene = self._placed(margin)
+            rows = np.fromiter(self._moved, int, len(self._moved))
             try:
-                found = self._scene.step(self._bodies.poses[rows], numbers=numbers)
-                self._found = margin, _Pairs(self._bodies, self._bodies, *self._row[found.pairs].T)
+                found = scene._step_pairs(self._bodies.poses[rows], rows)
             except ist.Error:  # more pairs than there is room for, or, with room for all, something else
                 self._scene = None
                 if self._pairs >= self._room:
                     raise
                 self._pairs *= 8
+                continue
+            self._moved = set()
+            self._found = margin, _Pairs(self._bodies, self._bodies, *found)
         return self._found[1]
 
-    def _near(self, others, margin=0):
-        """As _within(), of objects of this manager and others."""
+    def _placed(self, margin):
+        """The scene of all objects, where they were at its last step."""
+        if self._scene is None:
+            self._room = 2 * len(self._objs) + 2
+            self._scene = ist.Scene(max_bodies=self._room, max_pairs=self._pairs * self._room, threads=1)
+            self._moved, self._margin = set(), None
+            for row in self._objs.values():
+                self._scene.add(self._bodies.objects[row].asset, self._bodies.poses[row], number=row)
+        if self._margin != margin:
+            self._scene.set_rule(answer="boxes", measure="exact", margin=margin)
+            self._margin = margin
+        return self._scene
+
+    def _near(self, others, rows, margin=0):
+        """As _within(), of objects of this manager and of others in these rows."""
         if self._moved:
             self._within()
-        scene = self._placed()
-        near = [self._row[scene.in_box(low - margin, high + margin)]
-                for low, high in zip(others.low, others.high)]
-        first = np.concatenate([np.zeros(0, int), *near])
-        second = np.repeat(np.arange(len(near)), [len(rows) for rows in near])
-        own = [self._bodies.objects[i] is others.objects[k] for i, k in zip(first.tolist(), second.tolist())]
-        return _Pairs(self._bodies, others, first[~np.array(own, bool)], second[~np.array(own, bool)])
+        scene = self._placed(0)
+        near = [scene._near(others.objects[row].asset, others.poses[row], margin).astype(int) for row in rows]
+        first = near[0] if len(near) == 1 else np.concatenate([np.zeros(0, int), *near])
+        second = np.repeat(rows, [len(found) for found in near])
+        if others is self._bodies:
+            first, second = first[first != second], second[first != second]
+        return _Pairs(self._bodies, others, first, second)
 
-    def _of(self, name):
+    def _row(self, name):
         if name not in self._objs:
             raise ValueError(f"{name} not in collision manager!")
         return self._objs[name]
 
     def _object(self, name, mesh, transform):
-        content = hashlib.blake2b()
+        """And its pose."""
+        content = hashlib.sha256()
         for array in (mesh.vertices, mesh.faces):
             content.update(np.ascontiguousarray(array).tobytes())
         key = content.digest()
-        asset = self._assets.get(key)
-        if asset is None:
+        if key not in self._assets:
             closed = ist.close_mesh(ist.from_trimesh(mesh), name=str(name), repair=self._repair)
-            asset = self._assets[key] = ist.bake_mesh_only(closed)
-        return _Object(name, mesh, asset, transform)
+            asset = ist.bake_mesh_only(closed)
+            box = asset.bounds()
+            self._assets[key] = asset, float((box.upper - box.lower).max())
+        pose = np.array([1., 0, 0, 0, 0, 0, 0])
+        if transform is not None:
+            _put(pose, name, transform)
+        return _Object(name, mesh, *self._assets[key]), pose
+
+    def _single(self, mesh, transform):
+        """A body that is in no manager, and its row."""
+        bodies = _Bodies()
+        bodies.put(*self._object("__external", mesh, transform))
+        return bodies, [0]
 
 
 def scene_to_collision(scene, *, repair=False):
@@ -307,25 +324,29 @@ def scene_to_collision(scene, *, repair=False):
 
 
 class _Pairs:
-    """Pairs of objects: their rows among those of either side."""
+    """Pairs of objects: their rows among those of either side, and their poses."""
 
     def __init__(self, of_a, of_b, first, second):
         self.of_a, self.of_b, self.first, self.second = of_a, of_b, first, second
+        self.poses_a, self.poses_b = of_a.poses[first], of_b.poses[second]
 
-    def gaps(self):
-        """[u] (n,): how far boxes are apart."""
-        a, b = self.of_a, self.of_b
-        apart = np.maximum(a.low[self.first] - b.high[self.second], b.low[self.second] - a.high[self.first])
-        return np.linalg.norm(np.maximum(apart, 0), axis=1)
+    def __len__(self):
+        return len(self.first)
 
-    def ask(self, query, chosen, aside=0, **settings):
+    def ask(self, query, chosen=slice(None), aside=0, **settings):
         """The query of some of them, in one call. aside: of B, in sizes of A."""
-        first, second = self.first[chosen], self.second[chosen]
-        poses = self.of_b.poses[second]
+        first = self.first[chosen]
+        poses = self.poses_b[chosen]
         if aside != 0:
-            poses[:, 4:] += aside * self.of_a.sizes[first, None] * _WAY
-        return query(self.of_a.solids[first], self.of_b.solids[second], poses,
-                     poses_a=self.of_a.poses[first], **settings)
+            poses = poses.copy()
+            poses[:, 4:] += aside * np.array([self.of_a.objects[row].size for row in first])[:, None] * _WAY
+        return query(self.of_a.solids(first), self.of_b.solids(self.second[chosen]), poses,
+                     poses_a=self.poses_a[chosen], **settings)
+
+    def penetration(self, chosen, aside=0):
+        answers = self.ask(ist.penetration, chosen, aside, measure="exact")
+        _refuse_unanswered(self, chosen, answers.status)
+        return answers
 
     def overlaps(self, chosen):
         """Volumes, forces on B and centroids.
@@ -333,30 +354,19 @@ class _Pairs:
         Where faces are flush beside an overlap its slope jumps, and the mean of both sides is that of
         neither face.
         """
-        sides = [self.ask(ist.penetration, chosen, aside, measure="exact") for aside in (-_ASIDE, _ASIDE)]
-        _refuse_unanswered(self, chosen, sides[0].status)
+        sides = [self.penetration(chosen, aside) for aside in (-_ASIDE, _ASIDE)]
         return ((getattr(sides[0], what) + getattr(sides[1], what)) / 2
                 for what in ("volume", "force", "centroid"))
 
-    def parts(self, i):
-        """The connected parts of the overlap of a pair, largest first."""
-        a, b = self.objects(i)
-        pose_a, pose_b = self.of_a.poses[self.first[i]], self.of_b.poses[self.second[i]]
-        move = _ASIDE * a.size * np.concatenate([np.zeros(4), _WAY])
-        sides = []
-        for pose in (pose_b - move, pose_b + move):
-            found = ist.overlap_outline(a.asset, b.asset, pose, poses_a=pose_a, max_patches=32).contact
-            sides.append((found, np.argsort(-found.volume[:found.count])))
-        if sides[0][0].count != sides[1][0].count:
-            sides = sides[:1]
-        out = []
-        for k in range(sides[0][0].count):
-            force, volume, point = (sum(getattr(found, what)[order[k]] for found, order in sides) / len(sides)
-                                    for what in ("force", "volume", "point"))
-            area = np.linalg.norm(force)
-            out.append(ContactData(self.names(i), (a, b), force / max(area, 1e-300), point,
-                                   min(volume / max(area, 1e-300), np.cbrt(volume)), volume))
-        return out
+    def touched(self, chosen, answers, rows):
+        """(k, 3): the middle of the faces that lie on each other, or else where solids touch."""
+        points = np.where(answers.contact_area[rows, None] > 0, answers.centroid[rows], np.nan)
+        for aside in (_ASIDE, -_ASIDE):
+            left = np.flatnonzero(np.isnan(points[:, 0]))
+            if len(left) > 0:
+                apart = self.ask(ist.separation, chosen[rows[left]], aside)
+                points[left] = np.where(apart.distance[:, None] > 0, (apart.point_a + apart.point_b) / 2, np.nan)
+        return points
 
     def objects(self, i):
         return self.of_a.objects[self.first[i]], self.of_b.objects[self.second[i]]
@@ -365,27 +375,62 @@ class _Pairs:
         return tuple(one.name for one in self.objects(i))
 
 
+def _hits(pairs, only_first):
+    """(those that collide, or the first of them; whether each only touches)"""
+    if len(pairs) == 0:
+        return np.zeros(0, int), np.zeros(0, bool)
+    hits, touching, stopped, status = pairs.ask(ist._core._collisions, only_first=only_first)
+    if stopped >= 0:
+        _refuse_unanswered(pairs, [stopped], np.array([status]))
+    return hits, touching
+
+
 def _collide(pairs, with_names, with_data):
-    """(whether any collide, their names, their ContactData); the first to collide, where that is all"""
-    with_names = with_names or with_data
-    hits, touches = [], []
-    begin, count = 0, len(pairs.first) if with_names else 1
-    while begin < len(pairs.first) and (with_names or not hits):
-        chosen = np.arange(begin, min(begin + count, len(pairs.first)))
-        answers = pairs.ask(ist.penetration, chosen, measure="exact")
-        _refuse_unanswered(pairs, chosen, answers.status)
-        for k in np.flatnonzero((answers.volume > 0) | answers.touching):
-            hits.append(chosen[k])
-            touches.append(None if answers.volume[k] > 0 else answers.contact_normal[k])
-        begin, count = begin + count, 4 * count
-    data = []
-    for i, normal in zip(hits, touches) if with_data else ():
-        if normal is None:
-            data += pairs.parts(i)
-        else:
-            point = pairs.ask(ist.separation, [i]).point_a[0]
-            data.append(ContactData(pairs.names(i), pairs.objects(i), normal, point, 0, 0))
-    return bool(len(hits)), [pairs.names(i) for i in hits], data
+    """(whether any collide, their names, their ContactData)"""
+    hits, touching = _hits(pairs, not (with_names or with_data))
+    names = [pairs.names(i) for i in hits.tolist()]
+    if not with_data:
+        return len(hits) > 0, names, []
+    data = _touches(pairs, hits[touching])
+    for i in hits[~touching].tolist():
+        data += _parts(pairs, i)
+    return len(hits) > 0, names, [contact for _, contact in sorted(data, key=operator.itemgetter(0))]
+
+
+def _touches(pairs, chosen):
+    """[(i, ContactData)] of pairs that touch."""
+    if len(chosen) == 0:
+        return []
+    answers = pairs.penetration(chosen)
+    points = pairs.touched(chosen, answers, np.arange(len(chosen)))
+    return [(i, ContactData(pairs, i, normal, point, 0.0, 0.0))
+            for i, normal, point in zip(chosen.tolist(), answers.contact_normal, points)]
+
+
+def _parts(pairs, i):
+    """[(i, ContactData)] of the connected parts of the overlap of a pair, the largest first."""
+    a, b = pairs.objects(i)
+    sides = []
+    for aside in (-_ASIDE, _ASIDE):
+        pose = pairs.poses_b[i].copy()
+        pose[4:] += aside * a.size * _WAY
+        found = ist.overlap_outline(a.asset, b.asset, pose, poses_a=pairs.poses_a[i], max_patches=32).contact
+        sides.append((int(found.count), found.force, found.volume, found.point))
+    count = sides[0][0]
+    if sides[1][0] != count:
+        sides = sides[:1]
+    orders = [np.argsort(-side[2][:count]) for side in sides]
+    force, volume, point = (sum(side[k][order] for side, order in zip(sides, orders)) / len(sides)
+                            for k in (1, 2, 3))
+    area = np.linalg.norm(force, axis=1)
+    normal, depth = force / np.maximum(area, 1e-300)[:, None], _depths(volume, area)
+    return [(i, ContactData(pairs, i, normal[k], point[k], float(depth[k]), float(volume[k])))
+            for k in range(count)]
+
+
+def _depths(volume, area):
+    """Where forces cancel, as of a solid inside another: the size of the overlap."""
+    return np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
 
 
 def _nearest(near_by, count, margin, with_data):
@@ -393,44 +438,70 @@ def _nearest(near_by, count, margin, with_data):
 
     near_by(margin): pairs whose boxes are no further apart, of `count` in all. margin: tried first.
     """
-    pairs = near_by(0)
-    near = np.arange(len(pairs.first))
     best, nearest = np.inf, None
-    if len(near) > 0:
-        answers = pairs.ask(ist.penetration, near, measure="exact")
-        _refuse_unanswered(pairs, near, answers.status)
-        near = near[answers.volume > 0]
-    if len(near) > 0:
-        volume, force, point = pairs.overlaps(near)
-        area = np.linalg.norm(force, axis=1)
-        # (where forces cancel, as of a solid inside another, the size of the overlap)
-        depth = np.minimum(volume / np.maximum(area, 1e-300), np.cbrt(volume))
-        k = int(depth.argmax())
-        half = 0.5 * depth[k] * force[k] / max(area[k], 1e-300)
-        best, nearest = -depth[k], (pairs, near[k], (point[k] + half, point[k] - half))
-    looked = -1.0  # pairs whose boxes are no further apart are known
+    looked, pairs = -1.0, near_by(0)
+    if len(pairs) > 0:
+        best, nearest = _deepest(pairs)
     while count > 0 and looked < best and best > 0 and looked < 1e37:
         looked = best if best < np.inf else margin
         pairs, margin = near_by(looked), 4 * margin
-        gap = pairs.gaps()
-        order, begin, size = np.argsort(gap, kind="stable"), 0, _FIRST
-        while begin < len(order) and gap[order[begin]] < best:
-            chosen = order[begin:begin + size]
-            chosen = chosen[gap[chosen] < best]
-            limit = {"max_distance": best} if best < np.inf else {}
-            found = pairs.ask(ist.separation, chosen, **limit)
-            _refuse_unanswered(pairs, chosen, found.status)
-            k = int(found.distance.argmin())
-            if found.distance[k] < best:
-                best, nearest = found.distance[k], (pairs, chosen[k], (found.point_a[k], found.point_b[k]))
-            begin, size = begin + size, 4 * size
-        if len(gap) == count:
+        if len(pairs) > 0:
+            best, nearest = _least(pairs, best, nearest)
+        if len(pairs) == count:
             break
     if nearest is None:
         return float("inf"), None, None
     pairs, i, points = nearest
-    data = DistanceData(pairs.names(i), pairs.objects(i), best, points) if with_data else None
+    data = DistanceData(pairs, i, float(best), points) if with_data else None
     return float(best), pairs.names(i), data
+
+
+def _deepest(pairs):
+    """(minus the depth of the deepest overlap, (pairs, its number, points on both)); 0 where solids
+    only touch, inf where they do not."""
+    best, nearest = np.inf, None
+    bound = pairs.ask(ist._core._nearness)
+    order, begin, size = np.argsort(bound, kind="stable"), 0, _FIRST
+    while begin < len(order) and bound[order[begin]] <= 0 and bound[order[begin]] < best:
+        chosen = order[begin:begin + size]
+        chosen = chosen[(bound[chosen] <= 0) & (bound[chosen] < best)]
+        answers = pairs.penetration(chosen)
+        touch = np.flatnonzero(answers.touching)[:1]
+        if best > 0 and len(touch) > 0:
+            point, = pairs.touched(chosen, answers, touch)
+            best, nearest = 0.0, (pairs, int(chosen[touch[0]]), (point, point))
+        # The likely deepest first. None is deeper than the cube root of its volume.
+        likely = np.argsort(-_depths(answers.volume, np.linalg.norm(answers.force, axis=1)), kind="stable")
+        most = -np.cbrt(answers.volume[likely])
+        for asked in slice(1), slice(1, None):
+            of = chosen[likely[asked]][most[asked] < min(best, 0)]
+            if len(of) == 0:
+                break
+            volume, force, point = pairs.overlaps(of)
+            area = np.linalg.norm(force, axis=1)
+            depth = _depths(volume, area)
+            k = int(depth.argmax())
+            if -depth[k] < best:
+                half = 0.5 * depth[k] * force[k] / max(area[k], 1e-300)
+                best, nearest = -depth[k], (pairs, int(of[k]), (point[k] + half, point[k] - half))
+        begin, size = begin + size, 4 * size
+    return best, nearest
+
+
+def _least(pairs, best, nearest):
+    """As _deepest(), of solids that do not overlap, where one is nearer than `best`."""
+    gap = np.maximum(pairs.ask(ist._core._nearness), 0)
+    order, begin, size = np.argsort(gap, kind="stable"), 0, _FIRST
+    while begin < len(order) and gap[order[begin]] < best:
+        chosen = order[begin:begin + size]
+        chosen = chosen[gap[chosen] < best]
+        found = pairs.ask(ist.separation, chosen, **({"max_distance": best} if best < np.inf else {}))
+        _refuse_unanswered(pairs, chosen, found.status)
+        k = int(found.distance.argmin())
+        if found.distance[k] < best:
+            best, nearest = found.distance[k], (pairs, int(chosen[k]), (found.point_a[k], found.point_b[k]))
+        begin, size = begin + size, 4 * size
+    return best, nearest
 
 
 def _refuse_unanswered(pairs, chosen, status):

@@ -73,6 +73,7 @@ NB_MODULE(_core, module) {
   python::add_meshes(module);
   python::add_assets(module);
   python::add_clash(module);
+  python::add_collisions(module);
   python::add_fields(module);
   python::add_solid_rows(module);
   python::add_penetration(module);

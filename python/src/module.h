@@ -11,6 +11,7 @@ namespace ist::python {
 void add_meshes(py::module_& module);
 void add_assets(py::module_& module);
 void add_clash(py::module_& module);
+void add_collisions(py::module_& module);
 void add_fields(py::module_& module);
 void add_gpu(py::module_& package);
 void add_gpu_penetration(py::module_& module);

@@ -166,7 +166,8 @@ void Rows::sort_by_asset() {
   // Below, sorting takes longer than what it saves: 2 % of a batch over four assets, 6 to 9 % over
   // 80 MB and more (benchmarks/run.sh cpu_batch).
   constexpr std::uint64_t kCache = 32u << 20;
-  if (a_.step + b_.step == 0) return;
+  constexpr std::size_t kFew = 64;  // rows
+  if (a_.step + b_.step == 0 || count_ < kFew) return;
   const auto header = [](const Solid& solid) -> const AssetHeader* {
     const AssetView* const tree = std::get_if<AssetView>(&solid);
     return tree != nullptr ? &tree->header() : nullptr;
@@ -245,6 +246,52 @@ void refuse_unanswered(const Rows& rows, QueryStatus status, Measure asked) {
   }
 }
 
+const char* write_pose(const double* matrix, double* row) {
+  constexpr double kRigid = 1e-6;  // how far a matrix may be from a rotation, each entry of RᵀR
+  const Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>> m(matrix);
+  const Eigen::Matrix3d r = m.topLeftCorner<3, 3>();
+  if ((m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > kRigid)
+    return "its last row is not 0, 0, 0, 1";
+  Eigen::Map<Eigen::Vector3d>(row + 4) = m.topRightCorner<3, 1>();
+  if (r.hasNaN()) {
+    std::fill_n(row, 4, std::numeric_limits<double>::quiet_NaN());
+    return nullptr;
+  }
+  const Eigen::Matrix3d off = r.transpose() * r - Eigen::Matrix3d::Identity();
+  if (!(off.cwiseAbs().array() <= kRigid).all())
+    return "its columns are not of length 1 and at right angles";
+  if (r.determinant() < 0) return "it mirrors";
+  // 4 q_k q, for each k: the longest of the four has no cancellation.
+  const double x = r(0, 0), y = r(1, 1), z = r(2, 2);
+  const double yz = r(2, 1) - r(1, 2), zx = r(0, 2) - r(2, 0), xy = r(1, 0) - r(0, 1);
+  const double in_yz = r(2, 1) + r(1, 2), in_zx = r(0, 2) + r(2, 0), in_xy = r(1, 0) + r(0, 1);
+  const Eigen::Vector4d all[] = {{1 + x + y + z, yz, zx, xy},
+                                 {yz, 1 + x - y - z, in_xy, in_zx},
+                                 {zx, in_xy, 1 - x + y - z, in_yz},
+                                 {xy, in_zx, in_yz, 1 - x - y + z}};
+  const Eigen::Vector4d* best = all;
+  double most = 0;
+  for (const Eigen::Vector4d& q : all)
+    if (const double length = std::sqrt(((q[0] * q[0] + q[1] * q[1]) + q[2] * q[2]) + q[3] * q[3]);
+        length > most) {
+      best = &q;
+      most = length;
+    }
+  for (int k = 0; k < 4; ++k) row[k] = (*best)[k] / most;
+  return nullptr;
+}
+
+Column<double> rows_of_matrices(const Doubles& matrices, const std::string& name) {
+  Shape shape = shape_of(matrices);
+  shape.pop_back();
+  shape.back() = 7;
+  const Column<double> rows(shape);
+  for (std::size_t i = 0; i < matrices.size() / 16; ++i)
+    if (const char* const fault = write_pose(matrices.data() + 16 * i, rows.data.get() + 7 * i))
+      throw value_error(name + ": matrix " + std::to_string(i) + " is no rigid motion: " + fault);
+  return rows;
+}
+
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted) {
   if (value.is_none())
     throw type_error(std::string(name) + ": None; wanted " + wanted +
@@ -252,8 +299,7 @@ Doubles take_poses(const py::handle& value, const char* name, const std::string&
   Doubles given = take_doubles(value, name, wanted);
   const std::size_t d = given.ndim();
   if (d < 2 || given.shape(d - 1) != 4 || given.shape(d - 2) != 4) return given;
-  const py::object rows = py::module_::import_("ist._poses").attr("rows_of")(value, name);
-  return take_doubles(rows, name, wanted);
+  return py::cast<Doubles>(rows_of_matrices(given, name).handed_out());
 }
 
 Pose take_pose(const py::object& pose, double scale, const std::string& name) {

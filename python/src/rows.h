@@ -103,6 +103,13 @@ std::string fault_of(const Pose& pose, double scale, const char* pose_name, cons
 /// The same of two placed solids, beside each other too. `name`: of B's pose.
 std::string fault_of(const Row& row, const char* name = "poses");
 
+/// Row qw, qx, qy, qz, tx, ty, tz of a matrix (4, 4), NaN where it holds one; or why that is no
+/// rigid motion.
+const char* write_pose(const double* matrix, double* row);
+
+/// (…, 7) of (…, 4, 4); ValueError that names the first that is no rigid motion.
+Column<double> rows_of_matrices(const Doubles& matrices, const std::string& name);
+
 /// Rows of seven numbers, of such or of matrices (4, 4).
 Doubles take_poses(const py::handle& value, const char* name, const std::string& wanted);
 

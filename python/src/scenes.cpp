@@ -12,6 +12,7 @@
 #include <nanobind/stl/unique_ptr.h>
 
 #include "penetration.h"
+#include "query/find_solid_box.h"
 #include "surfaces.h"
 
 namespace ist::python {
@@ -138,19 +139,18 @@ std::unique_ptr<ScenePoints> nearest(const PyScene& self, const py::object& poin
   return out;
 }
 
-Column<std::uint32_t> in_box(const PyScene& self, const py::object& lower,
-                             const py::object& upper) {
+/// Numbers of the bodies whose boxes meet this one.
+Column<std::uint32_t> in_box(const PyScene& self, const Eigen::Vector3d& lower,
+                             const Eigen::Vector3d& upper) {
   std::vector<std::uint32_t> numbers(self.scene.size());
-  numbers.resize(
-      self.scene.in_box(take_vector(lower, "lower"), take_vector(upper, "upper"), numbers));
+  numbers.resize(self.scene.in_box(lower, upper, numbers));
   std::sort(numbers.begin(), numbers.end());
   Column<std::uint32_t> out({numbers.size()});
   for (std::size_t i = 0; i < numbers.size(); ++i) out.write(i, numbers[i]);
   return out;
 }
 
-std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
-                                   const py::object& numbers) {
+SceneStep ask_step(PyScene& self, const py::object& poses, const py::object& numbers) {
   if (!poses.is_none())
     set_poses(self, poses, numbers);
   else if (!numbers.is_none())
@@ -163,6 +163,12 @@ std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
   if (found.pairs_exceeded)
     throw Error("more than " + std::to_string(self.scene.settings().max_pairs) +
                 " pairs of bodies have boxes that meet: make the Scene with a larger max_pairs");
+  return found;
+}
+
+std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
+                                   const py::object& numbers) {
+  const SceneStep found = ask_step(self, poses, numbers);
   auto out = std::make_shared<SceneAnswers>(SceneAnswers{{found.pairs.size()}});
   out->penetration = std::make_shared<Penetrations>(Penetrations{out->rows});
   out->separation = std::make_shared<Separations>(Separations{out->rows});
@@ -173,6 +179,7 @@ std::shared_ptr<SceneAnswers> step(PyScene& self, const py::object& poses,
     out->pairs.row(i)[1] = pair.b;
     out->begins.write(i, pair.event == SceneEvent::begins);
     out->overlapping.write(i, pair.overlapping);
+    if (pair.slot == ScenePair{}.slot) continue;  // they stay zero
     Row row;
     const auto pose_of = [&](std::uint32_t number) {
       const SceneBody body = *self.scene.body(number);
@@ -354,10 +361,33 @@ void add_scenes(py::module_& module) {
       .def(
           "in_box",
           [](const PyScene& self, const py::object& lower, const py::object& upper) {
-            return in_box(self, lower, upper).handed_out();
+            return in_box(self, take_vector(lower, "lower"), take_vector(upper, "upper"))
+                .handed_out();
           },
           py::arg("lower"), py::arg("upper"),
           "(k,) uint32: bodies whose boxes meet the box from lower to upper (3,) [u].")
+      .def(
+          "_step_pairs",  // for ist.trimesh: (2, n), the pairs of a step alone
+          [](PyScene& self, const py::object& poses, const py::object& numbers) {
+            const SceneStep found = ask_step(self, poses, numbers);
+            const std::size_t count = found.pairs.size();
+            const Column<std::int64_t> out({2, count});
+            for (std::size_t i = 0; i < count; ++i) {
+              out.write(i, found.pairs[i].a);
+              out.write(count + i, found.pairs[i].b);
+            }
+            return out.handed_out();
+          },
+          py::arg("poses"), py::arg("numbers"))
+      .def(
+          "_near",  // for ist.trimesh: bodies whose boxes are within `margin` of the solid's
+          [](const PyScene& self, const py::object& solid, const py::object& pose, double margin) {
+            const Pose at = take_pose(pose, 1);
+            const WorldBox box =
+                solid_box(tree_of(solid, "solid")).placed(Rotation::of(at.q), at.t, margin);
+            return in_box(self, vector(box.low), vector(box.high)).handed_out();
+          },
+          py::arg("solid"), py::arg("pose"), py::arg("margin"))
       .def(
           "exclude",
           [](PyScene& self, std::uint32_t a, std::uint32_t b) { self.scene.exclude(a, b); },

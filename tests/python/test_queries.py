@@ -348,7 +348,10 @@ def test_matrices_and_quaternions_of_either_order_are_poses(cube, random_poses):
     assert (ist.penetration(cube, cube, spoiled).status != 0).nonzero()[0].tolist() == [7]
     mirrored = matrices.copy()
     mirrored[9, :3, 0] *= -1
+    endless = matrices.copy()
+    endless[8, 1, 2] = -np.inf
     for wrong, text in ((2 * matrices, "poses: matrix 0 is no rigid motion: its last row"),
+                        (endless, "poses: matrix 8 is no rigid motion: its columns"),
                         (mirrored, "poses: matrix 9 is no rigid motion: it mirrors")):
         with pytest.raises(ValueError, match=text):
             ist.penetration(cube, cube, wrong)

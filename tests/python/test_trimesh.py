@@ -93,6 +93,61 @@ def test_many_are_asked_as_pairs():
     assert m.min_distance_single(Box(), moved, return_name=True) == (min(gaps), int(np.argmin(gaps)))
 
 
+def test_where_solids_touch():
+    m = CollisionManager()
+    m.add_object("a", Box(), at(5, 6, 7))
+    for aside, point in (((1, 0.5, 0), (5.5, 6.25, 7)),  # in a face: its middle
+                         ((1, -1, 0.5), (5.5, 5.5, None)),  # along an edge
+                         ((-1, 1, 1), (4.5, 6.5, 7.5))):
+        there = at(5 + aside[0], 6 + aside[1], 7 + aside[2])
+        contact, = m.in_collision_single(Box(), there, return_data=True)[1]
+        assert contact.touching and contact.depth == 0
+        far, data = m.min_distance_single(Box(), there, return_data=True)
+        assert far == data.distance == 0
+        for told in (contact.point, data.point("a"), data.point("__external")):
+            assert all(x == pytest.approx(y, abs=1e-8) for x, y in zip(told, point) if y is not None)
+            assert np.abs(told - (5, 6, 7)).max() <= 0.5 + 1e-8
+
+
+def test_a_collision_that_ends_is_not_told_again():
+    m = CollisionManager()
+    for name, x in (("a", 0), ("b", 0.5), ("c", 5), ("d", 6)):
+        m.add_object(name, Box(), at(x))
+    assert m.in_collision_internal() is True
+    m.set_transform("b", at(2))
+    assert m.in_collision_internal() is True and m.in_collision_internal(return_names=True)[1] == {("c", "d")}
+    m.remove_object("d")
+    assert m.in_collision_internal() is False
+    m.add_object("e", Box(), at(2.5))
+    assert m.in_collision_internal() is True
+    m.add_object("e", Box(), at(9))
+    assert m.in_collision_internal() is False
+
+
+def test_the_deepest_of_all_overlaps():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        m, n = CollisionManager(), 25
+        halves, poses = rng.uniform(0.2, 0.8, n), rng.normal(size=(n, 7))
+        poses[:, 4:] *= rng.uniform(0.5, 2)
+        for i, (half, pose) in enumerate(zip(halves, poses)):
+            transform = at(*pose[4:])
+            w, x, y, z = pose[:4] / np.linalg.norm(pose[:4])
+            transform[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                                 [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                                 [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]]
+            m.add_object(i, Box(half), transform)
+        first, second = np.triu_indices(n, 1)
+        assets = ist.Solids([m.add_object("other", Box(half)) for half in halves])
+        m.remove_object("other")
+        found = ist.penetration(assets[first], assets[second], poses[second], poses_a=poses[first], measure="exact")
+        area = np.linalg.norm(found.force, axis=1)
+        depth = np.minimum(found.volume / np.maximum(area, 1e-300), np.cbrt(found.volume))
+        far, names = m.min_distance_internal(return_names=True)
+        assert far == pytest.approx(-depth.max(), rel=1e-6)
+        assert names == (first[depth.argmax()], second[depth.argmax()])
+
+
 def test_few_of_many_are_looked_at(monkeypatch):
     real, rooms = ist.Scene, []
     monkeypatch.setattr(ist, "Scene", lambda **settings: rooms.append(settings["max_pairs"]) or real(**settings))
@@ -121,7 +176,7 @@ def test_what_a_scene_refuses_is_raised(monkeypatch):
         def __getattr__(self, name):
             return lambda *arguments, **settings: 0
 
-        def step(self, *arguments, **settings):
+        def _step_pairs(self, *arguments):
             raise ist.Error("no step")
 
     monkeypatch.setattr(ist, "Scene", Broken)
@@ -160,6 +215,11 @@ def test_mistakes_are_told():
         m.add_object("a", Box(), np.full((4, 4), np.nan))
     with pytest.raises(ValueError, match="transform of a: it is no rigid motion: .*; scale or mirror the mesh"):
         m.add_object("a", Box(), np.diag([2, 2, 2, 1]))
+    m.add_object("a", Box(), at(3))
+    for wrong in (np.diag([1, 1, -1, 1]), np.full((4, 4), np.inf), at(np.nan), np.eye(4)[:3]):
+        with pytest.raises(ValueError, match="transform"):
+            m.set_transform("a", wrong)
+    assert m.min_distance_single(Box()) == 2  # where it was
 
 
 def test_the_face_of_a_contact():
@@ -169,4 +229,6 @@ def test_the_face_of_a_contact():
     m = CollisionManager()
     m.add_object("a", trimesh.creation.box((1, 1, 1)))
     data = m.min_distance_single(trimesh.creation.box((0.2, 0.2, 0.2)), at(3), return_data=True)[1]
+    m.set_transform("a", at(6))  # what was told is of before
+    m.add_object("a", trimesh.creation.box((4, 4, 4)), at(6))
     assert trimesh.creation.box((1, 1, 1)).face_normals[data.index("a")] == pytest.approx([1, 0, 0])
