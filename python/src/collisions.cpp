@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include <nanobind/stl/tuple.h>
@@ -8,19 +7,12 @@
 #include "module.h"
 #include "pair_queries.h"
 #include "query/find_solid_box.h"
+#include "query/kernel/lens.h"
 
 // What ist.trimesh asks of many pairs at every call.
 
 namespace ist::python {
 namespace {
-
-/// [u³] common to two balls whose middles are this far apart.
-double lens(double apart, double r, double s) {
-  if (apart <= std::abs(r - s)) return 4 * std::numbers::pi / 3 * std::pow(std::min(r, s), 3);
-  const double deep = r + s - apart;
-  return std::numbers::pi * deep * deep *
-         (apart * apart + 2 * apart * (r + s) - 3 * (r - s) * (r - s)) / (12 * apart);
-}
 
 /// A lower bound of the distance of two placed assets [u]. Negative where they may overlap: minus
 /// the cube root of the volume that boxes and balls around them share. 0 where boxes share no more
@@ -40,7 +32,7 @@ double nearness(const Row& row) {
   if (between.maxCoeff() >= -rounded) return 0;
   const double volume =
       std::min((rounded - between).max(0).prod(),
-               lens((a.centre - b.centre).norm(), a.radius + rounded, b.radius + rounded));
+               lens(a.radius + rounded, b.radius + rounded, (a.centre - b.centre).norm()).volume());
   return -std::cbrt(std::max(volume, 0.0));
 }
 

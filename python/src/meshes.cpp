@@ -166,8 +166,7 @@ void add_meshes(py::module_& module) {
       .def_prop_ro(
           "declared_unit", [](const TriangleMesh& mesh) { return mesh.declared.unit; },
           "[m] length of the file's unit; 0: not declared. Vertices of COLLADA are scaled by it, "
-          "to "
-          "metres; those of other files are not.")
+          "to metres; those of other files are not.")
       .def_ro("notes", &TriangleMesh::notes,
               "What the file holds and was not read though it may change the shape: sentences.")
       .def("__reduce__", &remade);
