@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "clash/clash.h"
@@ -194,6 +195,53 @@ TEST(ClashPairs, ADeepCornerIsNoTouchHoweverLargeTheFaces) {
   };
   EXPECT_EQ(kind(flat), ClashKind::touching);
   EXPECT_EQ(kind(b), ClashKind::overlapping);
+}
+
+/// A ball of this radius about the origin, or the ring whose groove it rolls in, about `middle`.
+TriangleMesh turned(std::vector<Eigen::Vector2d> outline, std::uint32_t around, double middle) {
+  TriangleMesh mesh;
+  const auto n = static_cast<std::uint32_t>(outline.size());
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (const Eigen::Vector2d& p : outline) {
+      const double a = 2 * std::numbers::pi * i / around;
+      mesh.vertices.emplace_back(p.x() * std::cos(a) - middle, p.x() * std::sin(a), p.y());
+    }
+  for (std::uint32_t i = 0; i < around; ++i)
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const std::uint32_t a = i * n, b = (i + 1) % around * n, l = (k + 1) % n;
+      mesh.triangles.push_back({a + k, b + l, b + k});
+      mesh.triangles.push_back({a + k, a + l, b + l});
+    }
+  return rounded(std::move(mesh));
+}
+
+// Where facets of both meet along their edges there are parts of the overlap that are rounding.
+TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
+  constexpr double kRadius = 3, kRace = 15;
+  using Counts = std::array<std::uint32_t, 4>;
+  for (const auto& [around, meridians, parallels, groove] :
+       {Counts{24, 12, 8, 8}, Counts{32, 24, 12, 12}, Counts{64, 16, 8, 12}}) {
+    SCOPED_TRACE(around);
+    std::vector<Eigen::Vector2d> ring = {{16, -4}}, ball;
+    for (std::uint32_t i = 0; i <= groove; ++i) {
+      const double a = 0.425 * std::numbers::pi * (2.0 * i / groove - 1);
+      const Eigen::Vector2d p(kRace + kRadius * std::cos(a), kRadius * std::sin(a));
+      if (p.x() > 16) ring.push_back(p);
+    }
+    ring.insert(ring.end(), {{16, 4}, {21, 4}, {21, -4}});
+    std::reverse(ring.begin(), ring.end());
+    for (std::uint32_t i = 0; i <= parallels; ++i) {
+      const double a = std::numbers::pi * i / parallels;
+      const bool pole = i % parallels == 0;
+      ball.emplace_back(pole ? 0 : kRadius * std::sin(a), kRadius * std::cos(a));
+    }
+    const Asset a = testing::surface(turned(ring, around, kRace)),
+                b = testing::surface(turned(ball, meridians, 0));
+    const auto found = clashes({{"a", {a.view(), {}, 1}}, {"b", {b.view(), {}, 1}}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_GT(found[0].volume, 1e-4);
+    EXPECT_LT(found[0].depth, 0.05);
+  }
 }
 
 TEST(ClashPairs, AllPairsAreThoseOfSingleQueries) {
