@@ -15,6 +15,7 @@
 #include "support/exact_pair.h"
 #include "support/mated_rows.h"
 #include "support/random_mates.h"
+#include "support/turned_solid.h"
 #include "support/turns.h"
 
 // All pairs of an assembly: against single queries, CAD parts at their mates, and what follows from
@@ -197,24 +198,6 @@ TEST(ClashPairs, ADeepCornerIsNoTouchHoweverLargeTheFaces) {
   EXPECT_EQ(kind(b), ClashKind::overlapping);
 }
 
-/// A ball of this radius about the origin, or the ring whose groove it rolls in, about `middle`.
-TriangleMesh turned(std::vector<Eigen::Vector2d> outline, std::uint32_t around, double middle) {
-  TriangleMesh mesh;
-  const auto n = static_cast<std::uint32_t>(outline.size());
-  for (std::uint32_t i = 0; i < around; ++i)
-    for (const Eigen::Vector2d& p : outline) {
-      const double a = 2 * std::numbers::pi * i / around;
-      mesh.vertices.emplace_back(p.x() * std::cos(a) - middle, p.x() * std::sin(a), p.y());
-    }
-  for (std::uint32_t i = 0; i < around; ++i)
-    for (std::uint32_t k = 0; k < n; ++k) {
-      const std::uint32_t a = i * n, b = (i + 1) % around * n, l = (k + 1) % n;
-      mesh.triangles.push_back({a + k, b + l, b + k});
-      mesh.triangles.push_back({a + k, a + l, b + l});
-    }
-  return rounded(std::move(mesh));
-}
-
 // Where facets of both meet along their edges there are parts of the overlap that are rounding.
 TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
   constexpr double kRadius = 3, kRace = 15;
@@ -235,8 +218,10 @@ TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
       const bool pole = i % parallels == 0;
       ball.emplace_back(pole ? 0 : kRadius * std::sin(a), kRadius * std::cos(a));
     }
-    const Asset a = testing::surface(turned(ring, around, kRace)),
-                b = testing::surface(turned(ball, meridians, 0));
+    TriangleMesh race = testing::turned_solid(ring, around);
+    for (Vector3d& v : race.vertices) v.x() -= kRace;
+    const Asset a = testing::surface(rounded(std::move(race))),
+                b = testing::surface(rounded(testing::turned_solid(ball, meridians)));
     const auto found = clashes({{"a", {a.view(), {}, 1}}, {"b", {b.view(), {}, 1}}});
     ASSERT_EQ(found.size(), 1u);
     EXPECT_GT(found[0].volume, 1e-4);

@@ -41,8 +41,8 @@ struct LinkEllipsoid {
 struct LinkFault {
   std::string what;  ///< with file and line
 };
-using LinkShape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule,
-                               LinkEllipsoid, LinkFault>;
+using LinkShape =
+    std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkEllipsoid, LinkFault>;
 
 /// A shape of a link: x_link = rotation · x + translation.
 struct PlacedLinkShape {

@@ -180,8 +180,10 @@ class RobotXml {
     const double largest = endless > 0 ? HUGE_VAL : kLargest;
     const std::pair out(real(limit, "lower", 0 - endless, largest),
                         real(limit, "upper", endless, largest));
-    if (out.first > out.second) xml_.fail(limit, "lower is above upper. Exchange them, or make a joint continuous that "
-                       "turns without limits");
+    if (out.first > out.second)
+      xml_.fail(limit,
+                "lower is above upper. Exchange them, or make a joint continuous that "
+                "turns without limits");
     return out;
   }
 
