@@ -9,6 +9,7 @@
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/exact_pair.h"
 #include "cuda/query/exact_search.h"
+#include "query/exact/no_volume.h"
 #include "query/exact/overlap_formulas.h"
 
 // How two solids without common volume touch, as find_contact() has it on the CPU.
@@ -108,8 +109,7 @@ IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_
       std::fmin(pair.mesh[0].extent(), pair.place.a_from_b.scale * pair.mesh[1].extent());
   const bool is_none =
       crosses ? !(left.volume > 0)
-              : all && touches &&
-                    has_no_volume(left.volume, left.error, left.push, area, pair.touch, smaller);
+              : all && touches && has_no_volume(left.volume, left.push, area, pair.touch, smaller);
   if (team.lane() != 0 || !is_none) return false;
   const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
   const PairPlace& place = pair.place;

@@ -8,6 +8,7 @@
 
 #include "query/exact/crossing_search.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/no_volume.h"
 #include "query/exact/overlap_terms.h"
 
 namespace ist {
@@ -320,10 +321,9 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
                 : find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
     const double smaller =
         std::min(sides_[0].mesh.extent(), a_from_b_.scale * sides_[1].mesh.extent());
-    if (crosses
-            ? !(volume > 0)
-            : contact.touching && has_no_volume(volume, out_.error, length_bound(out_.sums.force),
-                                                contact.area, search_.touch, smaller)) {
+    if (crosses ? !(volume > 0)
+                : contact.touching && has_no_volume(volume, length_bound(out_.sums.force),
+                                                    contact.area, search_.touch, smaller)) {
       out_.contact = contact;
       out_.sums.six_volumes = {};
     }

@@ -126,16 +126,6 @@ IST_HD inline double touching_distance(double moved, const MeshTree& a, const Me
   return moved + 4 * exact::kHalfUnit * (a.extent() + a_from_b.scale * b.extent() + shift);
 }
 
-/// Whether solids that touch have no volume in common, where the sums' may be rounding alone. It is
-/// none if it is no thicker than the touching distance, spread over the faces that lie on each
-/// other
-/// (`area`) or push (no more than `push`), if `push` is rounding, too, as where edges or points
-/// touch, or if rounding leaves nothing. `error`: of the volume; `extent`: of the smaller solid.
-IST_HD inline bool has_no_volume(double volume, double error, double push, double area,
-                                 double touch, double extent) noexcept {
-  return std::abs(volume) <= 8 * touch * (area + push) || push * extent <= error || !(volume > 0);
-}
-
 /// Faces of touching solids lie on each other if their corners are within this of one plane: a CAD
 /// kernel rounds the corners of a face apart, and the planes of its slivers turn with them.
 IST_HD constexpr double flush_distance(double touch) noexcept { return 64 * touch; }
