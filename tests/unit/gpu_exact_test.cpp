@@ -87,7 +87,7 @@ TEST(GpuExact, WhatMeetsAlongEdgesAllRoundTouches) {
   for (std::uint32_t i = 0; i < pairs.size(); ++i) {
     const double half = std::numbers::pi * (i / 2) / kSides;
     pairs[i].b = 1 + i % 2;
-    pairs[i].pose_b.q = {std::cos(half), 0, 0, std::sin(half)};
+    pairs[i].pose_b = {{std::cos(half), 0, 0, std::sin(half)}, {0, 0, 0}};
   }
   HostBatch batch(views_of(assets));
   const std::vector<Penetration> answers = batch.run(pairs, Measure::exact);
