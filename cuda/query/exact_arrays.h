@@ -77,8 +77,8 @@ struct ExactFrame {
 
 /// The parts of a pair's sums that decide whether the solids touch, A's unit frame.
 struct ExactLeft {
-  double volume, error;
-  double push;  ///< no less than the force's length
+  double volume, error;  ///< the volume below 0 by rounding alone
+  double push;           ///< no less than the force's length
 };
 
 /// A pair of a round, with the results that one step hands to the next.

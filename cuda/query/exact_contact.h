@@ -9,6 +9,7 @@
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/exact_pair.h"
 #include "cuda/query/exact_search.h"
+#include "query/exact/no_volume.h"
 #include "query/exact/overlap_formulas.h"
 
 // How two solids without common volume touch, as find_contact() has it on the CPU.
@@ -63,7 +64,7 @@ IST_HD inline bool flush(double distance, const CornerView& view) {
 }
 
 /// Tests the next `count` queued pairs of triangles for contact. False if two cross wherever points
-/// move within the tolerance: then the volume is not 0, however small.
+/// move within the tolerance: then they overlap, however little.
 template <class Team>
 IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactMemory& memory,
                             std::uint32_t first, std::uint32_t count, bool& touches) {
@@ -84,8 +85,7 @@ IST_HD bool touch_triangles(const Team& team, const ExactPair& of, ExactContactM
 }
 
 /// Decides if the solids of pair i, whose volume may be 0, touch, and rewrites the answer if so;
-/// lane 0 returns true then. A volume within the rounding of sums counts as 0 if it is no thicker
-/// than the rounding of poses and vertices, spread over the faces that lie on each other or push.
+/// lane 0 returns true then.
 template <class Team>
 IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_t i,
                          const ExactPair& pair, ExactContactMemory& memory, const ExactLeft& left,
@@ -94,16 +94,23 @@ IST_HD bool find_contact(const Team& team, const SolidPairs& batch, std::uint32_
   for (auto& sums : memory.contact.of)
     for (int k = team.lane(); k < 32; k += Team::kWidth) sums[k] = 0;
   ExactSearch<Team> search(team, pair, memory, waiting, most_waiting, {});
-  bool touches = false;
+  bool touches = false, crosses = false;
   const bool all = search.run([&](std::uint32_t first, std::uint32_t count) {
-    return touch_triangles(team, pair, memory, first, count, touches);
+    crosses = !touch_triangles(team, pair, memory, first, count, touches);
+    return !crosses;
   });
+  if (crosses)
+    for (int k = 0; k < ContactSums::kCount; ++k) memory.contact.of[k][team.lane()] = 0;
   double total[ContactSums::kCount];
   for (int k = 0; k < ContactSums::kCount; ++k)
     total[k] = team.sum(memory.contact.of[k][team.lane()]);
   const double area = total[ContactSums::kArea];
-  if (team.lane() != 0 || !all || !touches || left.volume > 8 * pair.touch * (area + left.push))
-    return false;
+  const double smaller =
+      std::fmin(pair.mesh[0].extent(), pair.place.a_from_b.scale * pair.mesh[1].extent());
+  const bool is_none =
+      crosses ? !(left.volume > 0)
+              : all && touches && has_no_volume(left.volume, left.push, area, pair.touch, smaller);
+  if (team.lane() != 0 || !is_none) return false;
   const auto vector = [&](int k) { return Vec3{total[k], total[k + 1], total[k + 2]}; };
   const PairPlace& place = pair.place;
   ContactRow row = {};

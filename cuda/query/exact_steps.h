@@ -148,7 +148,7 @@ IST_HD bool write_exact(const Team& team, const ExactArrays& batch, std::uint32_
   const ExactInWorld sums(volume, vector(ExactSum::kMoment), vector(ExactSum::kPush),
                           vector(ExactSum::kTurn), memory.origin, pair.place);
   const double most = smaller_volume(batch, i);
-  memory.left.volume = std::abs(volume);
+  memory.left.volume = volume;
   memory.left.error = 1.01 * (total[ExactSum::kRounding] / 6 + total[ExactSum::kLayers]) +
                       4 * exact::kHalfUnit * std::abs(volume);
   memory.left.push = exact::length_bound(vector(ExactSum::kPush));

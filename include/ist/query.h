@@ -166,7 +166,7 @@ struct Penetration {
   std::uint32_t sphere_pairs = 0;
   /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
   /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
-  /// Spheres cannot tell: false.
+  /// So does what crosses by a volume that is lost in its rounding. Spheres cannot tell: false.
   bool touching = false;
 };
 

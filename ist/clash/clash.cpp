@@ -325,10 +325,14 @@ class PairQuery {
       }
     }
     parts_ = parts.size();
-    const double most = std::min(a_.diameter, b_.diameter);
-    for (const auto& [id, sums] : parts)
-      if (depth != nullptr && sums.volume > 0)
-        *depth = std::max(*depth, sums.area > 0 ? std::min(sums.depth(), most) : most);
+    const double diameter = std::min(a_.diameter, b_.diameter);
+    const double rounding = found.volume_max - found.volume_min;
+    for (const auto& [id, sums] : parts) {
+      if (depth == nullptr || !(sums.volume > 0)) continue;
+      // Of a part that is rounding the area is, too.
+      const double most = sums.volume > rounding ? diameter : std::cbrt(sums.volume);
+      *depth = std::max(*depth, sums.area > 0 ? std::min(sums.depth(), most) : most);
+    }
     return whole;
   }
 

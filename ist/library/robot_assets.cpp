@@ -21,6 +21,9 @@ std::string field_spec_of(const LinkShape& shape) {
     return fmt::format("cylinder:{:.17g},{:.17g}", cylinder->radius, cylinder->half_height);
   if (const auto* capsule = std::get_if<LinkCapsule>(&shape))
     return fmt::format("capsule:{:.17g},{:.17g}", capsule->radius, capsule->half_height);
+  if (std::holds_alternative<LinkEllipsoid>(shape))
+    throw Error(
+        "an ellipsoid is no field of a query. Leave its link out with --skip, or give a mesh");
   return fmt::format("ball:{:.17g}", std::get<LinkBall>(shape).radius);
 }
 
@@ -121,8 +124,12 @@ RobotAssets robot_assets(const RobotModel& robot, LinkShapes which, const std::s
             {{"asset", asset_of(link, shape) + ".ist"},
              {"pose", pose_json(Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero())}});
       else
-        shapes.push_back({{"field", field_spec_of(shape.shape)},
-                          {"pose", pose_json(shape.rotation, shape.translation)}});
+        try {
+          shapes.push_back({{"field", field_spec_of(shape.shape)},
+                            {"pose", pose_json(shape.rotation, shape.translation)}});
+        } catch (const Error& error) {
+          throw Error(fmt::format("{}: link {}: {}", robot.file.path, link.name, error.what()));
+        }
   }
   out.index = {{"robot", robot.name}, {"links", links}};
   return out;

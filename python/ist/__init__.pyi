@@ -240,7 +240,7 @@ class Solids:
         self, solids: Sequence[Asset | Shape], *, device: Any = "cpu",
     ) -> None: ...  # "cpu", "cuda", "cuda:1", a torch.device
     def __len__(self) -> int: ...
-    def __getitem__(self, index: int | _Rows) -> SolidRows: ...  # or (n,) indices
+    def __getitem__(self, index: int | _Rows) -> SolidRows: ...  # or (n,) indices, or a slice
     device: Final[str]
     shapes: Final[list[int]]
     bytes: Final[int]  # of device memory

@@ -98,6 +98,10 @@ def _fault(name, signature, args, kwargs):
                 return f"{parameter.name}: a {type(value).__name__}; wanted {words}"
             if annotation == "int" and value < 0:
                 return f"{parameter.name}: {value}; wanted {words}"
+        elif annotation is inspect.Parameter.empty:  # self
+            continue
+        elif value is None and "None" not in annotation:
+            return f"{name}(): the argument '{parameter.name}' is None"
         elif annotation.startswith("ist."):
             wanted = {word.rpartition(".")[2] for word in annotation.split(" | ")}
             kinds = {"None"} if value is None else {kind.__name__ for kind in type(value).__mro__}

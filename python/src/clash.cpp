@@ -33,6 +33,7 @@ double rounding_of(const py::object& mesh) {
   const bool pair = py::isinstance<py::tuple>(mesh) || py::isinstance<py::list>(mesh);
   const py::object vertices = pair && py::len(mesh) > 0       ? py::object(mesh[0])
                               : py::hasattr(mesh, "vertices") ? py::object(mesh.attr("vertices"))
+                              : py::hasattr(mesh, "points")   ? py::object(mesh.attr("points"))
                                                               : py::object(py::none());
   return rounding_of_array(vertices);
 }
@@ -40,6 +41,8 @@ double rounding_of(const py::object& mesh) {
 py::object clash(const py::object& given, const py::object& poses, const py::object& names,
                  const py::object& scales, double clearance, std::optional<double> tolerance,
                  std::optional<double> touch_within, unsigned threads) {
+  if (py::isinstance<py::dict>(given))
+    throw type_error("meshes: a dict; wanted a list, and names=[…] for what they are called");
   const py::list meshes(given);
   const std::size_t count = py::len(meshes);
   const auto fits = [&](const py::object& list, const char* name) {

@@ -112,10 +112,13 @@ std::shared_ptr<TriangleMesh> mesh_of(const py::object& value) {
   if (is_path(value)) return loaded(path_of(value), {});
   if ((py::isinstance<py::tuple>(value) || py::isinstance<py::list>(value)) && py::len(value) == 2)
     return std::make_shared<TriangleMesh>(mesh_of_arrays(value[0], value[1]));
-  for (const char* const triangles : {"faces", "triangles"})
-    if (py::hasattr(value, "vertices") && py::hasattr(value, triangles))
+  // of trimesh, of Open3D, and of PyVista where all faces are triangles
+  for (const auto& [vertices, triangles] :
+       {std::pair("vertices", "faces"), std::pair("vertices", "triangles"),
+        std::pair("points", "regular_faces")})
+    if (py::hasattr(value, vertices) && py::hasattr(value, triangles))
       return std::make_shared<TriangleMesh>(
-          mesh_of_arrays(value.attr("vertices"), value.attr(triangles)));
+          mesh_of_arrays(value.attr(vertices), value.attr(triangles)));
   throw type_error(
       "mesh: a " + type_name_of(value) +
       "; wanted a ClosedMesh, a Mesh, a path, (vertices, triangles), or an object with "

@@ -116,7 +116,8 @@ void run_offline(OfflineWork work, const py::object& progress, bool rounds) {
 }
 
 std::string path_of(const py::object& path) {
-  return py::cast<std::string>(py::module_::import_("os").attr("fspath")(path));
+  const py::object bytes = py::module_::import_("os").attr("fsencode")(path);
+  return py::cast<py::bytes>(bytes).c_str();
 }
 
 void add_offline(py::module_& module) {

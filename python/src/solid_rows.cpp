@@ -109,8 +109,13 @@ void add_solid_rows(py::module_& module) {
       .def(
           "__getitem__",
           [](const py::object& self, const py::object& index) {
-            if (!py::isinstance<py::int_>(index)) return SolidRows{self, index};
             const std::size_t size = py::cast<const Solids&>(self).count;
+            const bool is_empty = py::isinstance<py::list>(index) && py::len(index) == 0;
+            if (py::isinstance<py::slice>(index) || is_empty) {
+              const py::object all = py::module_::import_("numpy").attr("arange")(size);
+              return SolidRows{self, all[is_empty ? py::object(py::slice(0)) : index]};
+            }
+            if (!py::isinstance<py::int_>(index)) return SolidRows{self, index};
             std::size_t number = 0;
             if (!py::try_cast(index, number) || number >= size)
               throw py::index_error(

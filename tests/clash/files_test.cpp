@@ -431,6 +431,14 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   EXPECT_EQ(pairs(turned), Words{"world upper overlapping"});
   EXPECT_NE(turned["notes"].dump().find("round shapes"), std::string::npos);
 
+  write("egg.xml",
+        "<mujoco><worldbody><geom type='box' pos='0 0 -5' size='5 5 5'/><body name='egg'>"
+        "<freejoint/><geom type='ellipsoid' size='.1 .2 .3' euler='90 0 0'/></body></worldbody>"
+        "</mujoco>");
+  const Json egg = json("egg.xml", {}, 3);
+  ASSERT_EQ(pairs(egg), Words{"world egg overlapping"});
+  EXPECT_NEAR(egg["pairs"][0]["volume"].get<double>(), 2. / 3 * pi * .1 * .2 * .3, 2e-4);
+
   const auto box = [](const std::string& name, const std::string& x) {
     return "<link name='" + name + "'><pose>" + x +
            " 0 0 0 0 0</pose><collision name='c'><geometry><box><size>1 1 1</size></box></geometry>"

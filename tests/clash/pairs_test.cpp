@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numbers>
 #include <random>
 
 #include "clash/clash.h"
@@ -14,6 +15,7 @@
 #include "support/exact_pair.h"
 #include "support/mated_rows.h"
 #include "support/random_mates.h"
+#include "support/turned_solid.h"
 #include "support/turns.h"
 
 // All pairs of an assembly: against single queries, CAD parts at their mates, and what follows from
@@ -194,6 +196,37 @@ TEST(ClashPairs, ADeepCornerIsNoTouchHoweverLargeTheFaces) {
   };
   EXPECT_EQ(kind(flat), ClashKind::touching);
   EXPECT_EQ(kind(b), ClashKind::overlapping);
+}
+
+// Where facets of both meet along their edges there are parts of the overlap that are rounding.
+TEST(ClashPairs, ABallInItsRaceIsAsDeepAsItsFacets) {
+  constexpr double kRadius = 3, kRace = 15;
+  using Counts = std::array<std::uint32_t, 4>;
+  for (const auto& [around, meridians, parallels, groove] :
+       {Counts{24, 12, 8, 8}, Counts{32, 24, 12, 12}, Counts{64, 16, 8, 12}}) {
+    SCOPED_TRACE(around);
+    std::vector<Eigen::Vector2d> ring = {{16, -4}}, ball;
+    for (std::uint32_t i = 0; i <= groove; ++i) {
+      const double a = 0.425 * std::numbers::pi * (2.0 * i / groove - 1);
+      const Eigen::Vector2d p(kRace + kRadius * std::cos(a), kRadius * std::sin(a));
+      if (p.x() > 16) ring.push_back(p);
+    }
+    ring.insert(ring.end(), {{16, 4}, {21, 4}, {21, -4}});
+    std::reverse(ring.begin(), ring.end());
+    for (std::uint32_t i = 0; i <= parallels; ++i) {
+      const double a = std::numbers::pi * i / parallels;
+      const bool pole = i % parallels == 0;
+      ball.emplace_back(pole ? 0 : kRadius * std::sin(a), kRadius * std::cos(a));
+    }
+    TriangleMesh race = testing::turned_solid(ring, around);
+    for (Vector3d& v : race.vertices) v.x() -= kRace;
+    const Asset a = testing::surface(rounded(std::move(race))),
+                b = testing::surface(rounded(testing::turned_solid(ball, meridians)));
+    const auto found = clashes({{"a", {a.view(), {}, 1}}, {"b", {b.view(), {}, 1}}});
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_GT(found[0].volume, 1e-4);
+    EXPECT_LT(found[0].depth, 0.05);
+  }
 }
 
 TEST(ClashPairs, AllPairsAreThoseOfSingleQueries) {

@@ -35,7 +35,7 @@ TEST_F(AssetCommands, InfoShowsTheHeader) {
   EXPECT_EQ(json.at("bytes"), read("cube.ist").size());
   EXPECT_NEAR(json.at("volume"), 1, 1e-12);
   expect_exit(1, {"info", "none.ist"}, "none.ist");
-  expect_exit(1, {"info", "cube.obj"}, "not an .ist asset");
+  expect_exit(1, {"info", "cube.obj"}, "not an .ist asset; ist bake makes one");
 }
 
 TEST_F(AssetCommands, LevelsOfDetailAreListedAndExported) {

@@ -1,10 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
+#include <numbers>
 #include <random>
 
 #include "support/mate_checks.h"
+#include "support/turned_solid.h"
+#include "support/turns.h"
 
 // Exact queries of random mates, whose volumes and contact areas follow from plane geometry. The
 // soak has a million of them.
@@ -43,6 +47,43 @@ TEST(ExactMated, FacesOfRoundedCornersLieOnEachOther) {
                                       : testing::exactly(first, second, workspace);
       EXPECT_TRUE(p.touching) << corners;
       EXPECT_NEAR(p.contact_area, 0.15, 1e-9) << corners << " corners, exchanged " << exchanged;
+    }
+  }
+}
+
+// Between surfaces that meet along edges on all sides no direction keeps them apart: sums of
+// crossings remain, which are rounding.
+TEST(ExactMated, WhatMeetsAlongEdgesAllRoundTouches) {
+  Workspace workspace;
+  for (const std::uint32_t sides : {6u, 8u, 12u, 24u}) {
+    const auto ring = [&](double radius) {
+      return testing::surface(testing::turned_solid({{radius, 0}, {12, -1}, {12, 1}}, sides),
+                              "ring");
+    };
+    const Asset a = testing::surface(
+        testing::turned_solid({{5, -4}, {10, -4}, {10, 4}, {5, 4}}, sides), "tube");
+    const Asset on = ring(10), above = ring(10 + 1e-9), just_in = ring(10 - 1e-9),
+                in = ring(10 - 1e-5);
+    for (std::uint32_t k = 0; k < 3 * sides; ++k) {
+      SCOPED_TRACE(std::to_string(sides) + " sides, turned by " + std::to_string(k / 3));
+      const double half = std::numbers::pi * (k / 3) / sides;
+      const Pose pose = {{std::cos(half), 0, 0, std::sin(half)}, {0, 0, k % 3 * 1e-15}};
+      for (const bool exchanged : {false, true}) {
+        const auto ask = [&](const Asset& b) {
+          const PlacedAsset first = {a.view(), {}, 1}, second = {b.view(), pose, 1};
+          return exchanged ? testing::exactly(second, first, workspace)
+                           : testing::exactly(first, second, workspace);
+        };
+        const Penetration p = ask(on);
+        EXPECT_EQ(p.volume, 0);
+        EXPECT_TRUE(p.touching);
+        EXPECT_LT(p.contact_area, 1e-9);
+        EXPECT_FALSE(ask(above).touching);
+        EXPECT_EQ(ask(above).volume, 0);
+        EXPECT_NE(ask(just_in).volume > 0, ask(just_in).touching);  // its volume is rounding
+        EXPECT_FALSE(ask(in).touching);
+        EXPECT_GT(ask(in).volume, 1e-9);
+      }
     }
   }
 }

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -55,9 +56,11 @@ def test_a_bake_takes_a_mesh_in_any_form(tmp_path):
     text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in TETRAHEDRON[1])
     (tmp_path / "part.obj").write_text(text)
     expected = ist.bake(ist.close_mesh(mesh), max_spheres=20).to_bytes()
-    for form in (mesh, TETRAHEDRON, [array.tolist() for array in TETRAHEDRON],
+    vista = types.SimpleNamespace(points=TETRAHEDRON[0], regular_faces=TETRAHEDRON[1])
+    for form in (mesh, TETRAHEDRON, [array.tolist() for array in TETRAHEDRON], vista,
                  Faces(*TETRAHEDRON), tmp_path / "part.obj", str(tmp_path / "part.obj")):
         assert ist.bake(form, max_spheres=20).to_bytes() == expected
+    assert len(ist.load_mesh(bytes(tmp_path / "part.obj")).vertices) == 4
     assert np.array_equal(ist.from_trimesh(Faces(*TETRAHEDRON)).triangles, TETRAHEDRON[1])
     opened = TETRAHEDRON[0], TETRAHEDRON[1][:3]
     with pytest.raises(ist.OpenMeshError):

@@ -63,6 +63,8 @@ def test_faults_floats_and_mistakes():
                   {"poses": [at(np.nan), at(0)]}):
         with pytest.raises((ValueError, ist.Error)):
             ist.clash([CUBE, CUBE], **wrong)
+    with pytest.raises(TypeError, match="meshes: a dict; wanted a list"):
+        ist.clash({"a": CUBE, "b": CUBE})
     with pytest.raises(ValueError, match=r"names\[1\]: 'a' is given twice"):
         ist.clash([CUBE, CUBE], names=["a", "a"])
     with pytest.raises(ValueError, match=r"poses\[1\]: tx is nan"):

@@ -319,6 +319,9 @@ def test_mistakes_name_the_argument(cube):
             (lambda: ist.penetration(cube, cube, IDENTITY, threads="all"), "threads: a str; wanted a whole"),
             (lambda: ist.penetration(cube, cube, IDENTITY, threads=-1), "threads: -1; wanted a whole number"),
             (lambda: ist.penetration(cube, cube, IDENTITY, measure=1), "measure: a int; wanted a str"),
+            (lambda: ist.bake(None), "bake\\(\\): the argument 'mesh' is None"),
+            (lambda: ist.Scene().add(None), "add\\(\\): the argument 'solid' is None"),
+            (lambda: ist.Solids(None), "Solids\\(\\): the argument 'solids' is None"),
             (lambda: cube.spheres(witch="inner"), "did you mean 'which'?")):
         with pytest.raises(TypeError, match=text):
             call()

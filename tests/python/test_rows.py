@@ -207,6 +207,13 @@ def test_wrong_rows_are_named(solids, wrong, error, text):
         ask(ist.Solids(solids), **{**dict(a=0, b=1, poses=[IDENTITY] * 2), **wrong})
 
 
+def test_slices_and_empty_lists_are_rows(solids):
+    held, poses = ist.Solids(solids), np.tile(IDENTITY, (2, 1)).astype(float)
+    by_slice = ask(held, a=slice(1, None), b=slice(0, 2), poses=poses).volume
+    assert np.array_equal(by_slice, ask(held, a=[1, 2], b=[0, 1], poses=poses).volume)
+    assert len(ask(held, a=[], b=slice(0, 0), poses=poses[:0])) == 0
+
+
 def test_wrong_solids_are_named(solids):
     with pytest.raises(TypeError, match="a: an ist.Solids; wanted solids"):
         ist.penetration(ist.Solids(solids), solids[0], IDENTITY)

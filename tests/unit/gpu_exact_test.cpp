@@ -1,10 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "support/exact_batches.h"
+#include "support/turned_solid.h"
 
 // The GPU's batch of exact penetrations, its source run by teams of the host: of one lane, and of
 // 32 that go on in an order that nobody can count on.
@@ -75,6 +77,29 @@ TEST(GpuExact, ANeedleBesideFacesIsAVolume) {
 }
 
 /// Boxes and slabs are placed in floats, which end long before the range of ratios does.
+TEST(GpuExact, WhatMeetsAlongEdgesAllRoundTouches) {
+  constexpr std::uint32_t kSides = 12;
+  std::vector<Asset> assets;
+  assets.push_back(surface(turned_solid({{5, -4}, {10, -4}, {10, 4}, {5, 4}}, kSides), "tube"));
+  for (const double radius : {10.0, 10 - 1e-9})
+    assets.push_back(surface(turned_solid({{radius, 0}, {12, -1}, {12, 1}}, kSides), "ring"));
+  std::vector<BatchPair> pairs(2 * kSides);
+  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+    const double half = std::numbers::pi * (i / 2) / kSides;
+    pairs[i].b = 1 + i % 2;
+    pairs[i].pose_b = {{std::cos(half), 0, 0, std::sin(half)}, {0, 0, 0}};
+  }
+  HostBatch batch(views_of(assets));
+  const std::vector<Penetration> answers = batch.run(pairs, Measure::exact);
+  for (std::uint32_t i = 0; i < pairs.size(); ++i) {
+    const bool touches = answers[i].touching, has_volume = answers[i].volume > 0;
+    EXPECT_NE(touches, has_volume) << i;
+    if (i % 2 == 0) {
+      EXPECT_TRUE(touches) << i;
+    }
+  }
+}
+
 TEST(GpuExact, AnyRatioOfSizes) {
   std::vector<BatchPair> pairs;
   for (int power = -50; power <= 50; power += 5)

@@ -329,6 +329,7 @@ TEST(OtherContent, IsNamed) {
   EXPECT_ERROR("a.obj", "\n<!DOCTYPE html><html>", "web page");
   EXPECT_ERROR("a.obj", stl_binary(), "binary data");
   EXPECT_ERROR("a.mesh7", "v 0 0 0", "no mesh format ends in");
+  EXPECT_ERROR("a.step", "ISO-10303-21;\nHEADER;\n", "Make a GLB of it");
   EXPECT_THROW(load_mesh("/nonexistent/a.obj"), Error);
   EXPECT_THROW(load_mesh(::testing::TempDir()), Error);
 }

@@ -47,6 +47,7 @@ TEST(Mjcf, BodiesJointsAndGeoms) {
           <geom type='capsule' fromto='0 0 0 0 0 2'/>
           <geom type='mesh' mesh='hand'/>
           <geom type='ellipsoid' size='1 2 3'/>
+          <geom type='box' mesh='hand'/>
         </body>
       </body>
     </worldbody>
@@ -61,13 +62,14 @@ TEST(Mjcf, BodiesJointsAndGeoms) {
   EXPECT_EQ(std::get<LinkBox>(robot.links[1].visual[0].shape).half_extents, Vector3d(1, 2, 3));
   const RobotLink& b = robot.links.back();
   EXPECT_EQ(b.name, "b");
-  ASSERT_EQ(b.collision.size(), 3u);
+  ASSERT_EQ(b.collision.size(), 4u);
   const auto& capsule = std::get<LinkCapsule>(b.collision[0].shape);
   EXPECT_EQ(capsule.half_height, 1);
   EXPECT_EQ(b.collision[0].translation, Vector3d(0, 0, 1));
   EXPECT_EQ(std::get<LinkMesh>(b.collision[1].shape).file, "assets/hand.stl");
   EXPECT_EQ(std::get<LinkMesh>(b.collision[1].shape).scale, Vector3d(2, 2, 2));
-  EXPECT_NE(std::get<LinkFault>(b.collision[2].shape).what.find("m.xml: line"), std::string::npos);
+  EXPECT_EQ(std::get<LinkEllipsoid>(b.collision[2].shape).radii, Vector3d(1, 2, 3));
+  EXPECT_NE(std::get<LinkFault>(b.collision[3].shape).what.find("m.xml: line"), std::string::npos);
   EXPECT_EQ(robot.excluded.size(), 1u);
 
   // The hinge turns about y through (0, 0, 0.5) of b, whose frame is turned by 90 degrees.

@@ -42,6 +42,7 @@ TEST(Sdf, LinksJointsAndShapes) {
       solid("<mesh><uri>model://m/b.stl</uri><scale>2 2 -1</scale></mesh>",
             "<pose>0 0 0.5 0 0 0</pose>") +
       solid("<capsule><radius>0.1</radius><length>1</length></capsule>") +
+      solid("<ellipsoid><radii>1 2 3</radii></ellipsoid>") +
       "<visual name='v'><geometry><ellipsoid/></geometry></visual></link>"
       "<link name='c'><pose relative_to='b'>0 2 0 0 0 0</pose></link>"
       "<joint name='j' type='revolute'><parent>a</parent><child>b</child>"
@@ -60,6 +61,7 @@ TEST(Sdf, LinksJointsAndShapes) {
   EXPECT_TRUE(std::get<LinkMesh>(mesh.shape).scale.isApprox(Vector3d(2, 2, -1)));
   EXPECT_TRUE(mesh.translation.isApprox(Vector3d(0, 0, 0.5)));
   EXPECT_EQ(std::get<LinkCapsule>(robot.links[1].collision.at(1).shape).half_height, 0.5);
+  EXPECT_EQ(std::get<LinkEllipsoid>(robot.links[1].collision.at(2).shape).radii, Vector3d(1, 2, 3));
   EXPECT_TRUE(std::holds_alternative<LinkFault>(robot.links[1].visual.at(0).shape));
   EXPECT_EQ(robot.joints[0].lower, -1);
   EXPECT_EQ(robot.joints[0].upper, 2);

@@ -83,7 +83,7 @@ TEST(RobotJoints, SayWhatIsWrong) {
   expect(two + joint("j", "hinge", "a", "b"), "its type \"hinge\" is unknown");
   expect(two + joint("j", "revolute", "a", "b", ""), "has no <limit>");
   expect(two + joint("j", "revolute", "a", "b", "<limit lower='1' upper='0'/>"),
-         "lower is above upper");
+         "lower is above upper. Exchange them, or make a joint continuous that turns without");
   expect(two + joint("j", "continuous", "a", "b", "<axis xyz='0 0 0'/>"), "length 0");
   expect(two + joint("j", "continuous", "a", "b", "<mimic joint='x'/>"),
          "no joint is called \"x\"");

@@ -22,7 +22,7 @@ const char* describe(AssetStatus status) noexcept {
       "sound",
       "the file is truncated; bake again",
       "the bytes do not start on a 64-byte boundary",
-      "not an .ist asset",
+      "not an .ist asset; ist bake makes one of a mesh",
       "written in another format version; bake again",
       "the content does not match its checksum; bake again",
       "a field or offset is out of range; bake again",

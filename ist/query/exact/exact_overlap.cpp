@@ -8,6 +8,7 @@
 
 #include "query/exact/crossing_search.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/no_volume.h"
 #include "query/exact/overlap_terms.h"
 
 namespace ist {
@@ -311,16 +312,18 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
                4 * kHalfUnit * std::abs(out_.sums.volume());
   out_.consistent = std::isfinite(out_.error);  // NaN has no bound
   out_.complete = out_.consistent;
-  // If no triangles certainly cross, a volume within the rounding of sums may be 0. It is 0 if it
-  // is no thicker than the rounding of poses and vertices, spread over the faces that lie on each
-  // other or push.
-  const double volume = std::abs(out_.sums.volume());
-  if (volume <= 1.01 * (rounding_ + slots_.rounding()) / 6 && !settled &&
-      !any_settled(search_, left, scratch_)) {
+  // A volume within the rounding of sums may be 0.
+  const double volume = out_.sums.volume();
+  if (std::abs(volume) <= 1.01 * (rounding_ + slots_.rounding()) / 6) {
+    const bool crosses = settled || any_settled(search_, left, scratch_);
     const SurfaceContact contact =
-        find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
-    if (contact.touching &&
-        volume <= 8 * search_.touch * (contact.area + length_bound(out_.sums.force))) {
+        crosses ? SurfaceContact{.touching = true}
+                : find_contact(search_, block_pairs_, serves_ ? kept_ : nullptr, scratch_);
+    const double smaller =
+        std::min(sides_[0].mesh.extent(), a_from_b_.scale * sides_[1].mesh.extent());
+    if (crosses ? !(volume > 0)
+                : contact.touching && has_no_volume(volume, length_bound(out_.sums.force),
+                                                    contact.area, search_.touch, smaller)) {
       out_.contact = contact;
       out_.sums.six_volumes = {};
     }

@@ -119,6 +119,10 @@ ShapeMesh mesh_of(const PlacedLinkShape& placed, const PackagePaths& paths,
     } else if (const auto* capsule = std::get_if<LinkCapsule>(&placed.shape)) {
       const Vector3d end(0, 0, capsule->half_height);
       out = capsule_mesh({-end, end, capsule->radius});
+    } else if (const auto* ellipsoid = std::get_if<LinkEllipsoid>(&placed.shape)) {
+      out = capsule_mesh({Vector3d::Zero(), Vector3d::Zero(), 1});
+      scale_mesh(out.mesh, ellipsoid->radii);
+      out.slack *= ellipsoid->radii.maxCoeff();
     } else {
       throw Error("a sphere has no mesh");
     }

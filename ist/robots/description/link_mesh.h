@@ -13,8 +13,8 @@
 namespace ist {
 
 /// The mesh of a shape in its link's frame; mirrored meshes are turned, so that they keep their
-/// outside. A box is exact. A cylinder or capsule is a polyhedron that holds it, and is `slack` [u]
-/// wider at most.
+/// outside. A box is exact. A cylinder, capsule or ellipsoid is a polyhedron that holds it, and
+/// is `slack` [u] wider at most.
 /// `file`: for messages. Throws Error naming the URDF's line.
 struct ShapeMesh {
   TriangleMesh mesh;

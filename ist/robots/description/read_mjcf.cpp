@@ -376,10 +376,10 @@ class MjcfReader {
         const Vector3d begin(v[0], v[1], v[2]), end(v[3], v[4], v[5]);
         at = Eigen::Translation3d((begin + end) / 2) * turn_from_z(end - begin);
         const double half = (end - begin).norm() / 2;
-        size = type == "box" ? std::vector<double>{size[0], size[0], half}
-                             : std::vector<double>{size[0], half};
+        size = type == "box" || type == "ellipsoid" ? std::vector<double>{size[0], size[0], half}
+                                                    : std::vector<double>{size[0], half};
       }
-      const std::size_t count = type == "box" ? 3 : type == "sphere" ? 1 : 2;
+      const std::size_t count = type == "box" || type == "ellipsoid" ? 3 : type == "sphere" ? 1 : 2;
       if (size.size() < count ||
           !std::all_of(size.begin(), size.begin() + static_cast<std::ptrdiff_t>(count),
                        [](double x) { return x > 0; }))
@@ -392,9 +392,11 @@ class MjcfReader {
         placed.shape = LinkCapsule{size[0], size[1]};
       else if (type == "cylinder")
         placed.shape = LinkCylinder{size[0], size[1]};
+      else if (type == "ellipsoid")
+        placed.shape = LinkEllipsoid{{size[0], size[1], size[2]}};
       else
         fail(node, "its type " + in_quotes(type) +
-                       " is not read. Use mesh, box, sphere, capsule or cylinder");
+                       " is not read. Use mesh, box, sphere, capsule, cylinder or ellipsoid");
     }
     placed.rotation = Eigen::Quaterniond(at.linear());
     placed.translation = at.translation();

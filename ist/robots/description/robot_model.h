@@ -34,11 +34,15 @@ struct LinkBall {
 struct LinkCapsule {
   double radius = 1, half_height = 1;  ///< [u] > 0, of the segment along z
 };
+struct LinkEllipsoid {
+  Eigen::Vector3d radii = Eigen::Vector3d::Ones();  ///< [u] > 0
+};
 /// A visual shape that is not as it should be: an error where it is used.
 struct LinkFault {
   std::string what;  ///< with file and line
 };
-using LinkShape = std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkFault>;
+using LinkShape =
+    std::variant<LinkMesh, LinkBox, LinkCylinder, LinkBall, LinkCapsule, LinkEllipsoid, LinkFault>;
 
 /// A shape of a link: x_link = rotation · x + translation.
 struct PlacedLinkShape {

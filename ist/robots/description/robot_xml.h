@@ -145,7 +145,11 @@ class RobotXml {
     if (kind == "cylinder") return LinkCylinder{length("radius"), 0.5 * length("length")};
     if (kind == "sphere") return LinkBall{length("radius")};
     if (kind == "capsule") return LinkCapsule{length("radius"), 0.5 * length("length")};
-    xml_.fail(e, "is not read. Use mesh, box, cylinder, sphere or capsule");
+    if (kind == "ellipsoid") {
+      const std::vector<double> radii = lengths(e, "radii", 3);
+      return LinkEllipsoid{{radii[0], radii[1], radii[2]}};
+    }
+    xml_.fail(e, "is not read. Use mesh, box, cylinder, sphere, capsule or ellipsoid");
   }
 
   /// `others`: types that are taken as fixed, each behind a blank.
@@ -176,7 +180,10 @@ class RobotXml {
     const double largest = endless > 0 ? HUGE_VAL : kLargest;
     const std::pair out(real(limit, "lower", 0 - endless, largest),
                         real(limit, "upper", endless, largest));
-    if (out.first > out.second) xml_.fail(limit, "lower is above upper. Exchange them");
+    if (out.first > out.second)
+      xml_.fail(limit,
+                "lower is above upper. Exchange them, or make a joint continuous that "
+                "turns without limits");
     return out;
   }
 

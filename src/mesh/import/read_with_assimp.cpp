@@ -72,6 +72,8 @@ DeclaredFrame declared_frame(const aiScene& scene) {
 PolygonMesh read_with_assimp(const SourceFile& file) {
   Assimp::Importer importer;
   const std::string ending = ending_of(file.path);
+  if (ending == ".step" || ending == ".stp")  // assimp takes them for IFC
+    fail(file, "a STEP file has no triangles. Make a GLB of it, as cascadio does");
   if (ending.empty() || !importer.IsExtensionSupported(ending))
     fail(file, "no mesh format ends in " + in_quotes(ending) +
                    ". Known are obj, stl, ply, off, glb, gltf, dae and what assimp reads");
