@@ -97,7 +97,7 @@ TEST(BulletImpact, ABodyThatFallsGainsNoEnergy) {
 }
 
 // A corner that meets the floor fast must not let other corners part fast later on: thin bodies
-// rebounded with twice to four times as much energy in the mean.
+// rebounded with twice as much energy in the mean.
 TEST(BulletImpact, WhatIsThinLeavesWithLittleEnergy) {
   const Asset plate = baked(box_mesh({-0.05, -0.05, -0.001}, {0.05, 0.05, 0.001}), "thin", 500);
   const Asset bar = baked(box_mesh({-0.05, -0.004, -0.004}, {0.05, 0.004, 0.004}), "bar", 500);
