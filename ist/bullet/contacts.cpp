@@ -125,7 +125,8 @@ void Contacts::configure(btDynamicsWorld& world) {
   solver.m_splitImpulse = false;    // the patches' springs push by speed
   solver.m_numIterations = 50;      // a stack is a chain of contacts
   solver.m_warmstartingFactor = 1;  // else friction begins too weak in every step
-  solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+  solver.m_solverMode |=
+      SOLVER_USE_2_FRICTION_DIRECTIONS | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
 }
 
 void Contacts::updateAction(btCollisionWorld* world, btScalar step) {

@@ -39,6 +39,7 @@ void inherit(btManifoldPoint& point, const btManifoldPoint& from, double step) {
   point.m_appliedImpulseLateral2 = from.m_appliedImpulseLateral2;
   point.m_lateralFrictionDir1 = from.m_lateralFrictionDir1;
   point.m_lateralFrictionDir2 = from.m_lateralFrictionDir2;
+  point.m_contactMotion1 = from.m_contactMotion1;
 }
 
 btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
@@ -47,9 +48,52 @@ btVector3 velocity_of(const btCollisionObject& object, const btVector3& point) {
   return body->getVelocityInLocalPoint(point - body->getCenterOfMassPosition());
 }
 
+btVector3 friction_of(const btManifoldPoint& point) {
+  return point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+         point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2;
+}
+
+/// Bullet's friction stops the place at which a body touches when a step begins. Where a body
+/// rolls, that place moves on over it and has another speed when the next step begins. As a rod
+/// whirls on its rim, friction acts along this change in every step and drives the rod ever faster.
+/// So there it stops the place at which the body will touch. `before`: the friction of the step
+/// before the last one, since that may alternate; this function replaces it.
+void stop_next_place(btManifoldPoint& point, const btCollisionObject& first,
+                     const btCollisionObject& second, btVector3& before) {
+  const auto speed_known = [](const btCollisionObject& object) {
+    return object.isStaticOrKinematicObject() || btRigidBody::upcast(&object) != nullptr;
+  };
+  const bool corner = point.m_partId0 < 0;  // of a SupportPolygon, which does not roll
+  if (corner || !speed_known(first) || !speed_known(second)) {
+    point.m_contactMotion1 = 0;
+    before.setZero();
+    return;
+  }
+  const btVector3& normal = point.m_normalWorldOnB;
+  const btVector3 friction = friction_of(point), mean = before + friction;
+  before = friction;
+  btVector3 change = velocity_of(first, point.m_positionWorldOnA) -
+                     velocity_of(second, point.m_positionWorldOnB) -
+                     point.m_contactMotion1 * point.m_lateralFrictionDir1;
+  change -= normal.dot(change) * normal;
+  point.m_contactPointFlags &= ~BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
+  point.m_contactMotion1 = 0;
+  if (!(mean.dot(change) > 0)) return;
+  const btScalar size = change.length();
+  point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
+  point.m_lateralFrictionDir1 = change / size;
+  point.m_lateralFrictionDir2 = point.m_lateralFrictionDir1.cross(normal);
+  point.m_appliedImpulseLateral1 = friction.dot(point.m_lateralFrictionDir1);
+  point.m_appliedImpulseLateral2 = friction.dot(point.m_lateralFrictionDir2);
+  point.m_contactMotion1 = -size;
+}
+
 /// Points that are replaced.
 struct OldPoints {
-  explicit OldPoints(const std::vector<btPersistentManifold*>& manifolds) {
+  using Frictions = std::array<btVector3, Settings::kPatches>;
+
+  OldPoints(const std::vector<btPersistentManifold*>& manifolds, const Frictions& of_points)
+      : frictions(of_points) {
     for (btPersistentManifold* manifold : manifolds) {
       for (int i = 0; i < manifold->getNumContacts(); ++i)
         points[count++] = manifold->getContactPoint(i);
@@ -58,13 +102,17 @@ struct OldPoints {
     }
   }
 
-  void drop(std::size_t k) { points[k] = points[--count]; }
+  void drop(std::size_t k) {
+    points[k] = points[--count];
+    frictions[k] = frictions[count];
+  }
 
   /// The point of the same patch goes on in this one.
-  bool give_to(btManifoldPoint& point, double step) {
+  bool give_to(btManifoldPoint& point, btVector3& friction, double step) {
     for (std::size_t k = 0; k < count; ++k) {
       if (!same_name(points[k], point)) continue;
       inherit(point, points[k], step);
+      friction = frictions[k];
       point.m_userPersistentData = points[k].m_userPersistentData;
       point.m_lifeTime = points[k].m_lifeTime + 1;
       drop(k);
@@ -75,7 +123,7 @@ struct OldPoints {
 
   /// A patch gets another name as it moves over the triangles: it still bears what the nearest one
   /// bore that has no name any more.
-  void give_impulse_to(btManifoldPoint& point, double step) {
+  void give_impulse_to(btManifoldPoint& point, btVector3& friction, double step) {
     std::size_t nearest = count;
     btScalar least = BT_LARGE_FLOAT;
     for (std::size_t k = 0; k < count; ++k) {
@@ -85,10 +133,12 @@ struct OldPoints {
     }
     if (nearest == count) return;
     inherit(point, points[nearest], step);
+    friction = frictions[nearest];
     drop(nearest);
   }
 
   std::array<btManifoldPoint, Settings::kPatches> points;
+  Frictions frictions;
   std::size_t count = 0;
 };
 
@@ -135,10 +185,11 @@ void Points::move(const btCollisionObject& first, const btCollisionObject& secon
       btManifoldPoint& point = manifold->getContactPoint(i);
       point.m_positionWorldOnA = to_world_first * point.m_localPointA;
       point.m_positionWorldOnB = to_world_second * point.m_localPointB;
-      point.m_normalWorldOnB = to_world_first.getBasis() * normals_[at++];
+      point.m_normalWorldOnB = to_world_first.getBasis() * normals_[at];
       point.m_distance1 =
           (point.m_positionWorldOnA - point.m_positionWorldOnB).dot(point.m_normalWorldOnB);
       forget_impact(point, step);
+      stop_next_place(point, first, second, frictions_[at++]);
       ++point.m_lifeTime;
     }
   }
@@ -149,7 +200,7 @@ Eigen::Vector3d Points::together(const btCollisionObject& first, const btCollisi
   // Points that push against each other, as of wedged bodies, part none.
   Eigen::Vector3d together = Eigen::Vector3d::Zero();
   double apart = 0;
-  closing_ *= 1 - spring.step / (8 * (spring.step + spring.relaxation));
+  closing_ *= 1 - spring.step / (3 * (spring.step + spring.relaxation));
   for (const ContactPatch& patch : std::span(contact.patches).first(contact.count)) {
     const double force = spring.at(patch.depth) * patch.area * patch.depth;
     if (!(force > 0)) continue;
@@ -189,7 +240,7 @@ void Points::set_spring(btManifoldPoint& point, const ContactPatch& patch, const
 void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
                   const Contact& contact, const Spring& spring, btDispatcher& dispatcher) {
   const btCollisionObject &first = *a.getCollisionObject(), &second = *b.getCollisionObject();
-  OldPoints old(manifolds);
+  OldPoints old(manifolds, frictions_);
   const bool touched = old.count > 0;
   const Eigen::Vector3d pushed = together(first, second, contact, spring);
 
@@ -224,7 +275,8 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
       set_spring(point, patch, spring, pushed);
     }
     set_name(point, patch.id);
-    named[used] = old.give_to(point, spring.step);
+    frictions_[used].setZero();
+    named[used] = old.give_to(point, frictions_[used], spring.step);
     points[used++] = point;
   }
   for (std::size_t i = 0; i < old.count; ++i) {
@@ -233,7 +285,8 @@ void Points::fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrap
   }
   for (std::size_t i = 0; i < used; ++i) {
     btManifoldPoint& point = points[i];
-    if (!named[i]) old.give_impulse_to(point, spring.step);
+    if (!named[i]) old.give_impulse_to(point, frictions_[i], spring.step);
+    stop_next_place(point, first, second, frictions_[i]);
     if (gContactAddedCallback != nullptr &&
         ((first.getCollisionFlags() | second.getCollisionFlags()) &
          btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK)) {

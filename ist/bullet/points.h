@@ -41,6 +41,8 @@ class Points {
   btVector3 unsaid_at(const btVector3& x) const { return unsaid[0].at(x) - unsaid[1].at(x); }
 
   std::array<btVector3, Settings::kPatches> normals_;  // of all points, in the first's frame
+  std::array<btVector3, Settings::kPatches>
+      frictions_;       // of all points in the step before the last
   double closing_ = 0;  // [u/s] of an impact, forgotten as the bodies part
 };
 

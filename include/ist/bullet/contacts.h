@@ -104,7 +104,8 @@ class Contacts : public btActionInterface {
 
   /// register_with() the world's dispatcher, a btCollisionDispatcher, and what the patches' springs
   /// need of its solver: no split impulse, 50 iterations, a warm start of 1, two directions of
-  /// friction. This object must outlive the world.
+  /// friction, which a point may set (SOLVER_ENABLE_FRICTION_DIRECTION_CACHING). This object must
+  /// outlive the world.
   void configure(btDynamicsWorld& world);
 
   /// Registers the algorithm for all types that collide with a Shape; warn() reports the others.
