@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "cuda/base/atomics.h"
@@ -151,7 +150,7 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
     const std::uint32_t stills = scene.still[level][j];
     const BroadBox box =
         child < scene.nodes[level - 1] ? scene.boxes[level - 1][child] : BroadBox::none();
-    // Of the bodies before these on the curve only those that do not move count.
+    // Bodies before these on the curve count only if they do not move.
     const bool is_still = (stills >> team.lane() & 1) != 0;
     const bool behind = (std::uint64_t{child} + 1) << 5 * (level - 1) > first;
     for (std::uint32_t left = team.ballot((is_still || behind) && all.meets(box)); left != 0;

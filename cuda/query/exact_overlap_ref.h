@@ -3,10 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_insides.h"
-#include "cuda/query/exact_patch_arrays.h"
+#include "query/exact/exact_sums.h"
 #include "query/exact/overlap_octants.h"
-#include "query/exact/slot_sums.h"
 
 // An exact overlap with its crossings in the order of the meshes, as on the CPU: the data of
 // OverlapParts (query/exact/overlap_parts.h) on a GPU.

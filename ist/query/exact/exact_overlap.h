@@ -10,8 +10,8 @@
 #include "query/exact/box_integrals.h"
 #include "query/exact/crossing_search.h"
 #include "query/exact/exact_scratch.h"
+#include "query/exact/exact_sums.h"
 #include "query/exact/mesh_tree.h"
-#include "query/exact/slot_sums.h"
 
 namespace ist {
 

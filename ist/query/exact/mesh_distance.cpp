@@ -12,9 +12,9 @@
 
 #include "base/bits.h"
 #include "query/exact/box_gaps-inl.h"
-#include "query/exact/crossing.h"
 #include "query/exact/mesh_gap.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/orientation.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/triangle_gaps-inl.h"
 

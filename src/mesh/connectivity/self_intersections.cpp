@@ -13,7 +13,7 @@
 #include "mesh/connectivity/fan_slabs.h"
 #include "mesh/connectivity/surface_reduction.h"
 #include "mesh/connectivity/usable_mesh.h"
-#include "mesh/geometry/slenderness.h"
+#include "mesh/geometry/exact_triangle.h"
 
 namespace ist {
 namespace {
