@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <new>
 
+#include "base/bits.h"
 #include "cuda/base/atomics.h"
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/exact_pair.h"
@@ -417,8 +418,7 @@ class ExactInsides {
     for (int side = 0; side < 2; ++side)
       for (std::uint32_t w = static_cast<std::uint32_t>(team_.lane()); w < work_.words;
            w += static_cast<std::uint32_t>(Team::kWidth))
-        for (std::uint32_t left = work_.near[side][w]; left != 0; left &= left - 1)
-          bound(side, 32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
+        for (const std::uint32_t i : set_bits(work_.near[side][w])) bound(side, 32 * w + i);
   }
 
   /// Adds, for triangles of crossed blocks, the cones over the edges opposite to their apexes.

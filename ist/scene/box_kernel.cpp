@@ -1,3 +1,4 @@
+#include "base/bits.h"
 #include "scene/body_box.h"
 #include "scene/box_tree.h"
 
@@ -96,8 +97,7 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
     std::uint64_t found = 0, left = 0;
     for (std::uint32_t k = 0; k < kLanes - 1; ++k)
       found |= std::uint64_t{meeting(node, node, k) & (0xfeu << k)} << kLanes * k;
-    for (; found != 0; found &= found - 1) {
-      const auto bit = static_cast<std::uint32_t>(std::countr_zero(found));
+    for (const std::uint32_t bit : set_bits(found)) {
       if (node.is_body(bit / kLanes) && node.is_body(bit % kLanes))
         out[count++] = {node.child[bit / kLanes], node.child[bit % kLanes]};
       else
@@ -110,12 +110,11 @@ HWY_ATTR std::size_t next_of(PairSearch& search, BodyPair* out) {
                            std::uint32_t only) HWY_ATTR {
     const BoxNode &a = search.a[at_a], &b = search.b[at_b];
     std::uint64_t left = 0;
-    for (; lanes != 0; lanes &= lanes - 1) {
-      const auto k = static_cast<std::uint32_t>(std::countr_zero(lanes));
+    for (const std::uint32_t k : set_bits(lanes)) {
       std::uint32_t row = only != 0 ? only : meeting(b, a, k);
       if (a.is_body(k)) {
-        for (std::uint32_t bits = row & b.bodies; bits != 0; bits &= bits - 1)
-          out[count++] = {a.child[k], b.child[std::countr_zero(bits)]};
+        for (const std::uint32_t i : set_bits(row & b.bodies))
+          out[count++] = {a.child[k], b.child[i]};
         row &= ~b.bodies;
       }
       left |= std::uint64_t{row} << kLanes * k;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/bits.h"
 #include "query/ball_triangle/disc.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -373,24 +374,18 @@ void add_patch_to(const SurfacePatch& patch, std::uint32_t triangles, const Prob
   DiscList chords, corners;
   alignas(64) double height[kWidth], x[kWidth], y[kWidth];
   if (hwy::PopCount(triangles) <= hwy::PopCount(chosen)) {
-    for (; triangles != 0; triangles &= triangles - 1) {
-      const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(triangles);
-      std::uint32_t near = chosen & feet_near<true>(patch, t, balls, height, x, y);
-      for (; near != 0; near &= near - 1) {
-        const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+    for (const std::uint32_t t : set_bits(triangles)) {
+      for (const std::uint32_t b :
+           set_bits(chosen & feet_near<true>(patch, t, balls, height, x, y)))
         sort_disc(patch, t, b, height[b], x[b], y[b], balls.r[b], chords, corners, sums);
-      }
     }
   } else {
-    for (; chosen != 0; chosen &= chosen - 1) {
-      const std::size_t b = hwy::Num0BitsBelowLS1Bit_Nonzero32(chosen);
+    for (const std::uint32_t b : set_bits(chosen)) {
       const double centre[3] = {balls.origin[0] + balls.x[b], balls.origin[1] + balls.y[b],
                                 balls.origin[2] + balls.z[b]};
-      std::uint32_t near = triangles & feet_of<true>(patch, centre, balls.r[b], height, x, y);
-      for (; near != 0; near &= near - 1) {
-        const std::size_t t = hwy::Num0BitsBelowLS1Bit_Nonzero32(near);
+      for (const std::uint32_t t :
+           set_bits(triangles & feet_of<true>(patch, centre, balls.r[b], height, x, y)))
         sort_disc(patch, t, b, height[t], x[t], y[t], balls.r[b], chords, corners, sums);
-      }
     }
   }
   if (chords.size > 0) take_chords(patch, chords, sums);

@@ -11,6 +11,7 @@
 #include <bit>
 #include <cmath>
 
+#include "base/bits.h"
 #include "query/exact/crossing_search.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/points-inl.h"
@@ -366,8 +367,7 @@ class Meeting {
    public:
     template <class Find>
     std::uint32_t without(std::uint32_t i, std::uint32_t lanes, const Find& find) {
-      for (std::uint32_t left = lanes & ~known_; left != 0; left &= left - 1)
-        add(static_cast<std::uint32_t>(std::countr_zero(left)), find);
+      for (const std::uint32_t i : set_bits(lanes & ~known_)) add(i, find);
       known_ |= lanes;
       return lanes & ~apart_[i];
     }

@@ -10,6 +10,7 @@
 #define HWY_TARGET_INCLUDE "query/exact/crossing_search.cpp"
 #include <hwy/foreach_target.h>
 
+#include "base/bits.h"
 #include "query/exact/block_meeting-inl.h"
 #include "query/exact/nearest_points.h"
 #include "query/exact/pair_signs-inl.h"
@@ -235,10 +236,9 @@ class TriangleSearch : PairSigns {
       if (found.doubtful != 0) lanes |= both.straddling(i, found.doubtful);
       if (lanes != 0) lanes = both.within_edges(i, lanes, edges_);
       if (lanes == 0) continue;
-      for (; lanes != 0; lanes &= lanes - 1)
-        add_pair(kWidth * number_a + i, both.vertices(0),
-                 kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)),
-                 both.vertices(1), both.margin() == Margin::room);
+      for (const std::uint32_t k : set_bits(lanes))
+        add_pair(kWidth * number_a + i, both.vertices(0), kWidth * number_b + k, both.vertices(1),
+                 both.margin() == Margin::room);
       // Once both blocks are marked, planes decide far more.
       if (!flush || both.margin() != Margin::room) continue;
       if (!std::exchange(tried, true)) test_pairs();
@@ -271,9 +271,8 @@ class TriangleSearch : PairSigns {
     PairHeights heights;
     find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
-    for (std::uint32_t left = all & ~heights.apart(heights.certain) & ~certain; left != 0;
-         left &= left - 1)
-      find_heights_exactly(pairs, static_cast<std::uint32_t>(std::countr_zero(left)), heights);
+    for (const std::uint32_t i : set_bits(all & ~heights.apart(heights.certain) & ~certain))
+      find_heights_exactly(pairs, i, heights);
     const std::uint32_t meet = all & ~heights.apart(heights.certain);
     if (meet != 0) test_edges(pairs, heights, meet);
     note_near(pairs, count, asks);
@@ -291,8 +290,7 @@ class TriangleSearch : PairSigns {
       find_ways_closer(pairs, left, round);
       left = round.undecided(left, parts, round.certain);
     }
-    for (; left != 0; left &= left - 1)
-      find_round_exactly(pairs, parts, static_cast<std::uint32_t>(std::countr_zero(left)), round);
+    for (const std::uint32_t i : set_bits(left)) find_round_exactly(pairs, parts, i, round);
     round.pierced(parts, pierced);
     // Two edges pierce if triangles cross, else none.
     std::uint32_t once = 0, twice = 0, more = 0;
@@ -309,8 +307,7 @@ class TriangleSearch : PairSigns {
   /// The pairs whose blocks are not both marked as near.
   std::uint32_t not_marked(const TrianglePairs& pairs, std::uint32_t which) const {
     std::uint32_t out = 0;
-    for (; which != 0; which &= which - 1) {
-      const int n = std::countr_zero(which);
+    for (const std::uint32_t n : set_bits(which)) {
       const bool marked = are_near(pairs.triangle[0][n] / kWidth, pairs.triangle[1][n] / kWidth);
       out |= static_cast<std::uint32_t>(!marked) << n;
     }
@@ -327,8 +324,7 @@ class TriangleSearch : PairSigns {
     if (fresh == 0) return;
     fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
                             double{search_.near});
-    for (; fresh != 0; fresh &= fresh - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(fresh));
+    for (const std::uint32_t n : set_bits(fresh)) {
       const ExactCorners corners(pairs, n);
       if (not_marked(pairs, 1u << n) == 0 ||
           !exact::come_within(search_.near, corners.of[0], corners.of[1]))
@@ -345,9 +341,8 @@ class TriangleSearch : PairSigns {
     const std::uint32_t count = std::exchange(pairs.count, 0);
     pairs.asks = 0;
     gathered_ += count;
-    for (std::uint32_t left = ((1u << count) - 1) & ~apart_by_axes(pairs, count, double{reach_});
-         left != 0; left &= left - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t n :
+         set_bits(((1u << count) - 1) & ~apart_by_axes(pairs, count, double{reach_}))) {
       scratch_.kept.add(*keep_, std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]);
     }
   }
@@ -359,8 +354,7 @@ class TriangleSearch : PairSigns {
       found_.complete = false;
       return;
     }
-    for (; crossing != 0; crossing &= crossing - 1) {
-      const auto n = static_cast<std::uint32_t>(std::countr_zero(crossing));
+    for (const std::uint32_t n : set_bits(crossing)) {
       ends_.add(pairs, heights, pierced, n);
       ++found_.crossings;
       if (ends_.full()) ends_.write(found_.crossings, scratch_.crossings);

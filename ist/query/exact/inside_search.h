@@ -26,8 +26,7 @@ struct BlockInsides {
   IST_HD BlockInsides(const MeshBlock& mesh, std::uint64_t pierced, const Sum& sum,
                       const First& first) {
     std::uint32_t found = 0;
-    for (std::uint64_t left = pierced; left != 0; left &= left - 1) {
-      const auto edge = static_cast<std::uint32_t>(lowest_bit(left));
+    for (const std::uint32_t edge : set_bits(pierced)) {
       const std::uint32_t p = mesh.corner[edge % 3][edge / 3],
                           q = mesh.corner[(edge + 1) % 3][edge / 3];
       const int net = sum(edge), comes_first = first(edge);

@@ -38,7 +38,7 @@ inline constexpr int kTriangleBits = 28;
 
 template <class Visit>
 IST_HD void for_each_bit(std::uint64_t bits, const Visit& visit) {
-  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(lowest_bit(bits)));
+  for (const std::uint32_t i : set_bits(bits)) visit(i);
 }
 
 /// The least power of two that is at least n.

@@ -3,10 +3,10 @@
 #include <ist/shapes.h>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 
+#include "base/bits.h"
 #include "query/asset/shared_constants.h"
 #include "query/ball_triangle/patch_sums.h"
 #include "query/kernel/overlap.h"
@@ -42,8 +42,7 @@ inline void add_part(const Eigen::Vector3d& x, double volume, const Eigen::Vecto
 /// angle is not 0, as the share of the sphere inside the solid, [centre inside] + angle / 4π, is in
 /// [0, 1]; elsewhere `inside` does.
 inline std::uint32_t sides_by_angles(const ProbeSums& sums, std::uint32_t inside) noexcept {
-  for (std::uint32_t left = sums.met; left != 0; left &= left - 1) {
-    const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
+  for (const std::uint32_t i : set_bits(sums.met)) {
     if (!(std::abs(sums.angle[i]) > kLeastAngle)) continue;
     inside = sums.angle[i] < 0 ? inside | 1u << i : inside & ~(1u << i);
   }
@@ -55,8 +54,7 @@ inline std::uint32_t sides_by_angles(const ProbeSums& sums, std::uint32_t inside
 inline ProbeTotal total_of(const ProbeBalls& balls, const ProbeSums& sums, std::uint32_t inside,
                            const double (&origin)[3]) noexcept {
   ProbeTotal total;
-  for (std::uint32_t bits = inside | sums.met; bits != 0; bits &= bits - 1) {
-    const auto i = static_cast<std::size_t>(std::countr_zero(bits));
+  for (const std::uint32_t i : set_bits(inside | sums.met)) {
     const double r = balls.r[i];
     const double whole = ball_volume(r);
     const double contained = (inside >> i & 1) != 0 ? whole : 0;
