@@ -14,7 +14,6 @@
 #include "robots/covers/cover_proof.h"
 #include "robots/covers/cover_search.h"
 #include "robots/covers/offset_surface.h"
-#include "robots/covers/sampled_solid.h"
 
 // Simpler ways to a few spheres around a solid, unit frame. All are made just so much larger that
 // the same proof succeeds.

@@ -1,8 +1,8 @@
 #pragma once
 
 #include <cuda_runtime_api.h>
-
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -106,5 +106,8 @@ class DeviceArray {
   T* data_ = nullptr;
   std::size_t size_ = 0;
 };
+
+/// Replaces every element by the sum of those before it.
+void exclusive_sum(Queue& queue, DeviceArray<std::uint32_t>& values);
 
 }  // namespace ist::gpu

@@ -1,4 +1,4 @@
-#include "cuda/base/prefix_sum.h"
+#include "cuda/base/device_array.h"
 
 #include <cub/device/device_scan.cuh>
 

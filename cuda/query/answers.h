@@ -8,7 +8,7 @@
 
 #include "cuda/query/lens_sums.h"
 #include "query/base/members.h"
-#include "query/base/world_sums.h"
+#include "query/base/pair_place.h"
 #include "query/contact/contact_numbers.h"
 
 // The answers of a batch. A row has the same members as the arrays that it goes to (GpuPenetrations

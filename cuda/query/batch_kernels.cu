@@ -1,5 +1,4 @@
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/by_warps.h"
@@ -118,12 +117,11 @@ void find_batch_grids(Grids& grids) {
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(BatchCounters), stream), "starting a batch");
-  sift_pairs<<<blocks_for(batch.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
-  check_launch("placing pairs of trees");
+  launch("placing pairs of trees", sift_pairs, blocks_for(batch.pairs.count, kSiftThreads),
+         kSiftThreads, stream, batch);
   if (batch.measure == Measure::matched && batch.has_details) {
-    sum_detailed_pairs<<<static_cast<unsigned>(grids.details), 32 * kDetailWarps, 0, stream>>>(
-        batch);
-    check_launch("summing pairs of trees at several levels of detail");
+    launch("summing pairs of trees at several levels of detail", sum_detailed_pairs, grids.details,
+           32 * kDetailWarps, stream, batch);
   }
   // A small batch gets no more warps than can have work: warps that wait for tasks would block
   // other kernels.
@@ -131,8 +129,7 @@ void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t str
       (batch.pairs.count * (1 + std::uint64_t{kTasksOfPair}) + kWarps - 1) / kWarps;
   const auto most = static_cast<std::uint64_t>(grids.sum);
   const auto blocks = static_cast<unsigned>(wanted < most ? wanted : most);
-  sum_pairs<<<blocks, kThreads, 0, stream>>>(batch);
-  check_launch("summing pairs of trees");
+  launch("summing pairs of trees", sum_pairs, blocks, kThreads, stream, batch);
 }
 
 }  // namespace ist::gpu

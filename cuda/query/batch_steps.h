@@ -7,7 +7,7 @@
 #include "cuda/base/atomics.h"
 #include "cuda/query/answers.h"
 #include "cuda/query/batch_arrays.h"
-#include "query/lod/coincidence.h"
+#include "query/lod/level_pair.h"
 
 // The steps of a batch of pairs of trees, for the threads and warps of kernels and for tests on the
 // host. An answer depends on its pair and on how finely the batch is split (BatchArrays::cut_for())

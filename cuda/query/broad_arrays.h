@@ -1,13 +1,14 @@
 #pragma once
 
+#include <ist/types.h>
 #include <cstddef>
 #include <cstdint>
-
-#include <ist/types.h>
 
 #include "base/bits.h"
 #include "cuda/query/parts.h"
 #include "query/base/solid_box.h"
+
+struct CUstream_st;
 
 namespace ist::gpu {
 
@@ -108,5 +109,12 @@ inline void place_broad(Parts& parts, BroadArrays& of) {
   of.status = parts.take<QueryStatus>(of.count);
   of.scratch = parts.take<std::byte>(of.scratch_bytes);
 }
+
+/// The memory that sorting takes [bytes].
+std::size_t broad_scratch_bytes(const BroadArrays& scene);
+/// Sets the constant indices.
+void ready_broad(const BroadArrays& scene, CUstream_st* stream);
+/// Launches one step.
+void launch_broad(const BroadArrays& scene, CUstream_st* stream);
 
 }  // namespace ist::gpu

@@ -1,11 +1,10 @@
-#include "cuda/query/broad_kernels.h"
+#include "cuda/query/broad_arrays.h"
 
 #include <cub/device/device_radix_sort.cuh>
 
 #include <algorithm>
 
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/broad_steps.h"
 
@@ -63,8 +62,8 @@ std::size_t broad_scratch_bytes(const BroadArrays& scene) {
 }
 
 void ready_broad(const BroadArrays& scene, cudaStream_t stream) {
-  count_up<<<blocks_for(scene.count, kThreads), kThreads, 0, stream>>>(scene.indices, scene.count);
-  check_launch("counting bodies");
+  launch("counting bodies", count_up, blocks_for(scene.count, kThreads), kThreads, stream,
+         scene.indices, scene.count);
 }
 
 void launch_broad(const BroadArrays& scene, cudaStream_t stream) {
@@ -73,19 +72,19 @@ void launch_broad(const BroadArrays& scene, cudaStream_t stream) {
   check(cudaMemsetAsync(scene.found, 0xFF, scene.max_pairs * sizeof *scene.found, stream),
         "starting a step");
   if (scene.count > 0) {
-    place_bodies<<<blocks_for(scene.count, kThreads), kThreads, 0, stream>>>(scene);
-    check_launch("placing bodies");
+    launch("placing bodies", place_bodies, blocks_for(scene.count, kThreads), kThreads, stream,
+           scene);
     check(sort_bodies(scene, scene.scratch, bytes, stream), "sorting bodies");
     for (int level = 1; level <= scene.top; ++level) {
-      fit_nodes<<<blocks_for(scene.nodes[level], kWarps), kThreads, 0, stream>>>(scene, level);
-      check_launch("fitting boxes");
+      launch("fitting boxes", fit_nodes, blocks_for(scene.nodes[level], kWarps), kThreads, stream,
+             scene, level);
     }
-    find_body_pairs<<<blocks_for(scene.nodes[1], kWarps), kThreads, 0, stream>>>(scene);
-    check_launch("finding pairs");
+    launch("finding pairs", find_body_pairs, blocks_for(scene.nodes[1], kWarps), kThreads, stream,
+           scene);
   }
   check(sort_found(scene, scene.scratch, bytes, stream), "sorting pairs");
-  write_pairs<<<blocks_for(scene.max_pairs, kThreads), kThreads, 0, stream>>>(scene);
-  check_launch("writing pairs");
+  launch("writing pairs", write_pairs, blocks_for(scene.max_pairs, kThreads), kThreads, stream,
+         scene);
 }
 
 }  // namespace ist::gpu

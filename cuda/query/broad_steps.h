@@ -1,8 +1,8 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
+#include "base/bits.h"
 #include "cuda/base/atomics.h"
 #include "cuda/query/broad_arrays.h"
 
@@ -151,14 +151,12 @@ IST_HD void find_pairs_of(const Team& team, const BroadArrays& scene, std::uint3
     const std::uint32_t stills = scene.still[level][j];
     const BroadBox box =
         child < scene.nodes[level - 1] ? scene.boxes[level - 1][child] : BroadBox::none();
-    // Of the bodies before these on the curve only those that do not move count.
+    // Bodies before these on the curve count only if they do not move.
     const bool is_still = (stills >> team.lane() & 1) != 0;
     const bool behind = (std::uint64_t{child} + 1) << 5 * (level - 1) > first;
-    for (std::uint32_t left = team.ballot((is_still || behind) && all.meets(box)); left != 0;
-         left &= left - 1) {
-      const int lane = lowest_bit(left);
-      const std::uint32_t other = kFan * j + static_cast<std::uint32_t>(lane);
-      bool meets = mine.meets(broadcast(team, box, lane));
+    for (const std::uint32_t lane : set_bits(team.ballot((is_still || behind) && all.meets(box)))) {
+      const std::uint32_t other = kFan * j + lane;
+      bool meets = mine.meets(broadcast(team, box, static_cast<int>(lane)));
       if (level > 1) {
         // (these bodies may be far apart)
         if (!team.any(meets)) continue;

@@ -5,10 +5,10 @@
 
 #include "base/host_device.h"
 #include "cuda/query/batch_steps.h"
-#include "cuda/query/detail_ref.h"
+#include "cuda/query/solid_ref.h"
 #include "query/base/pair_place.h"
-#include "query/lod/coincidence.h"
 #include "query/lod/level_chain.h"
+#include "query/lod/level_pair.h"
 
 // Pairs of trees that need several levels of detail: under a pair budget, and copies of one asset
 // that nearly coincide. This is blend_levels() (query/lod/level_blend.h) by one team, in double,
@@ -26,7 +26,7 @@ struct QuickLook {
   PoseSlope slope;
 };
 
-/// quick_look() (query/kernel/look_kernel.h) by a team, in double.
+/// quick_look() (query/kernel/look_kernel.cpp) by a team, in double.
 template <class Team>
 class QuickLooker {
  public:

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <ist/gpu.h>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "cuda/query/batch_arrays.h"
+#include "query/base/pair_place.h"
 #include "query/exact/inside_search.h"
+#include "query/exact/mesh_tree.h"
 
 // The working memory of exact overlaps of a batch.
 
@@ -185,6 +189,138 @@ struct ExactArrays : SolidPairs {
   IST_HD ExactWorkspace workspace(int pass, std::uint32_t team) const {
     return ExactWorkspace::at((pass == 0 ? team_memory : memory) + team * bytes_of_team(pass),
                               most_blocks, pass);
+  }
+};
+
+// Candidates that exact batches keep for each pair from call to call: all pairs of triangles that a
+// search may find until B has moved by more than a margin.
+
+/// The motion of B relative to A: that of its box's centre, and that of the rotation per distance
+/// from the centre. A's unit frame.
+struct KeptMotion {
+  double shift, turn;
+
+  IST_HD static KeptMotion of(const MeshTree& b, const Similarity& from, const Similarity& to) {
+    double centre[3], at[3], to_at[3], shift = 0, turn = 0;
+    for (int k = 0; k < 3; ++k) centre[k] = 0.5 * (double{b.low[k]} + b.high[k]);
+    from.apply(centre, at);
+    to.apply(centre, to_at);
+    for (int k = 0; k < 3; ++k) shift += (to_at[k] - at[k]) * (to_at[k] - at[k]);
+    for (int k = 0; k < 9; ++k) turn += (to.m[k] - from.m[k]) * (to.m[k] - from.m[k]);
+    // The squared entries of a rotation minus the identity sum to twice the square of its largest
+    // motion.
+    return {std::sqrt(shift), std::sqrt(0.5 * turn) / from.scale};
+  }
+};
+
+enum class KeptState : std::uint32_t {
+  none,   ///< needs a search
+  fresh,  ///< needs a search that keeps its candidates
+  holds,
+};
+
+/// The state of a pair. All zero: nothing is kept.
+struct KeptHead {
+  std::uint64_t mesh[2];  ///< hashes of the assets
+  Similarity last;        ///< the map from B to A in the last call
+  Similarity found_at;    ///< the same when the list was made
+  KeptMotion margin;      ///< the motion that is allowed since then
+  double steps;           ///< the number of steps that the next margin allows for
+  KeptState state;
+  std::uint32_t rest;       ///< calls that make no list, after lists that did not fit
+  std::uint32_t blocks;     ///< pairs of blocks
+  std::uint32_t triangles;  ///< pairs of their triangles
+};
+
+/// The memory of a pair's list. Pairs of blocks fill it from the front, two words each. Their pairs
+/// of triangles fill it from the end, two bytes each: 256 · the position of the pair of blocks
+/// modulo 256 + 16 · A's lane + B's. Each pair of blocks has at least one.
+struct KeptList {
+  std::byte* memory;
+  std::uint32_t bytes;
+
+  IST_HD std::uint32_t* blocks(std::uint32_t n) const {
+    return reinterpret_cast<std::uint32_t*>(memory) + std::size_t{2} * n;
+  }
+  IST_HD std::uint16_t& triangles(std::uint32_t n) const {
+    return reinterpret_cast<std::uint16_t*>(memory)[bytes / 2 - 1 - n];
+  }
+  IST_HD bool hold(std::uint32_t block_pairs, std::uint32_t triangle_pairs) const {
+    return 8 * std::uint64_t{block_pairs} + 2 * std::uint64_t{triangle_pairs} <= bytes;
+  }
+};
+
+/// The counters of a round; two alternate.
+struct KeptRound {
+  std::uint32_t fresh, taken;  ///< queries whose search keeps candidates
+};
+
+/// The kept candidates of all pairs, by their position in the batch.
+struct ExactKept {
+  std::byte* memory;
+  std::uint32_t pairs;
+  std::uint32_t bytes;  ///< each
+  KeptRound* rounds;    ///< two
+  std::uint32_t* list;  ///< queries of a round that are `fresh`
+
+  IST_HD KeptHead& head(std::uint32_t i) const {
+    return *reinterpret_cast<KeptHead*>(memory + std::size_t{bytes} * i);
+  }
+  IST_HD KeptList list_of(std::uint32_t i) const {
+    return {reinterpret_cast<std::byte*>(&head(i) + 1),
+            bytes - static_cast<std::uint32_t>(sizeof(KeptHead))};
+  }
+  IST_HD KeptRound& round(std::uint32_t n) const { return rounds[n % 2]; }
+};
+
+// The working memory of contact patches by Measure::exact.
+
+/// A team's memory that is handed out piece by piece. All lanes make the same calls.
+struct Arena {
+  std::byte* at;
+  std::byte* end;
+
+  /// Null if the rest is too small.
+  template <class T>
+  IST_HD T* take(std::size_t count) {
+    constexpr std::size_t kAlign = 16;
+    static_assert(alignof(T) <= kAlign);
+    const std::size_t bytes = (count * sizeof(T) + kAlign - 1) / kAlign * kAlign;
+    if (static_cast<std::size_t>(end - at) < bytes) return nullptr;
+    T* const taken = reinterpret_cast<T*>(at);
+    at += bytes;
+    return taken;
+  }
+};
+
+/// Teams also search, as in the later passes of penetrations.
+constexpr int kFirstPatchPass = 0;
+/// [bytes] of a team's memory for crossings and parts. A crossing takes about 1 KB.
+IST_HD constexpr std::size_t patch_bytes(int pass) {
+  return pass == 0 ? 384u << 10 : pass == 1 ? 2u << 20 : 16u << 20;
+}
+
+struct ExactPatchArrays : ExactArrays {
+  GpuContactPatches patches;
+
+  IST_HD std::size_t bytes_of_team(int pass) const {
+    return searching(pass) + patch_bytes(pass) + 16 * std::size_t{most_blocks};
+  }
+  IST_HD std::byte* team(int pass, std::uint32_t n) const {
+    return memory + n * bytes_of_team(pass);
+  }
+  IST_HD ExactWorkspace workspace(int pass, std::uint32_t n) const {
+    return ExactWorkspace::at(team(pass, n), most_blocks, search_pass(pass));
+  }
+  IST_HD Arena arena(int pass, std::uint32_t n) const {
+    return {team(pass, n) + searching(pass), team(pass, n + 1)};
+  }
+
+ private:
+  /// The first two passes search in equal memory.
+  IST_HD static int search_pass(int pass) { return pass == 0 ? 1 : pass; }
+  IST_HD std::size_t searching(int pass) const {
+    return ExactArrays::bytes_of_team(search_pass(pass));
   }
 };
 

@@ -1,16 +1,15 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
 
 #include "base/team.h"
 #include "cuda/base/atomics.h"
-#include "cuda/query/exact_kept_arrays.h"
+#include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_search.h"
 #include "cuda/query/exact_steps.h"
 
-// Finds triangles among the candidates that exact batches keep (exact_kept_arrays.h). The tests are
+// Finds triangles among the candidates that exact batches keep (exact_arrays.h). The tests are
 // those of a search, box by box, so that the same pairs are found in the same order.
 
 namespace ist::gpu {

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/exact_kept.h"
@@ -181,12 +180,11 @@ void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& 
   check(cudaMemsetAsync(batch.counters, 0, sizeof(ExactCounters), stream), "starting a batch");
   const unsigned all = blocks_for(batch.pairs.count, kThreadsEach);
   if (kept == nullptr) {
-    sift_meshes<<<all, kThreadsEach, 0, stream>>>(batch);
+    launch("sifting pairs of meshes", sift_meshes, all, kThreadsEach, stream, batch);
   } else {
     check(cudaMemsetAsync(kept->rounds, 0, 2 * sizeof(KeptRound), stream), "starting a batch");
-    sift_kept_meshes<<<all, kThreadsEach, 0, stream>>>(batch, *kept);
+    launch("sifting pairs of meshes", sift_kept_meshes, all, kThreadsEach, stream, batch, *kept);
   }
-  check_launch("sifting pairs of meshes");
   // Large batches have rounds of 8,192 pairs with some 30 chunks each, small ones rounds of a
   // quarter.
   constexpr std::uint64_t kLeast = 1 << 13, kFew = 1 << 11;
@@ -199,35 +197,27 @@ void launch_exact(const ExactArrays& batch, const ExactKept* kept, const Grids& 
       grids.exact.sum[0]);
   for (std::uint32_t n = 0; n < rounds; ++n) {
     if (kept == nullptr) {
-      place_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, n);
-      check_launch("placing meshes");
-      search_meshes<<<blocks_of(batch, kWarps, grids.exact.search), kThreads, 0, stream>>>(batch,
-                                                                                           n);
+      launch("placing meshes", place_meshes, blocks, kThreadsEach, stream, batch, n);
+      launch("searching meshes", search_meshes, blocks_of(batch, kWarps, grids.exact.search),
+             kThreads, stream, batch, n);
     } else {
-      place_kept_meshes<<<blocks, kThreadsEach, 0, stream>>>(batch, *kept, n);
-      check_launch("placing meshes");
-      keep_meshes<<<blocks_of(batch, kWarps, grids.exact.kept[0]), kThreads, 0, stream>>>(batch,
-                                                                                          *kept, n);
-      check_launch("keeping triangles");
-      search_kept_meshes<<<blocks_of(batch, kWarps, grids.exact.kept[1]), kThreads, 0, stream>>>(
-          batch, *kept, n);
+      launch("placing meshes", place_kept_meshes, blocks, kThreadsEach, stream, batch, *kept, n);
+      launch("keeping triangles", keep_meshes, blocks_of(batch, kWarps, grids.exact.kept[0]),
+             kThreads, stream, batch, *kept, n);
+      launch("searching meshes", search_kept_meshes, blocks_of(batch, kWarps, grids.exact.kept[1]),
+             kThreads, stream, batch, *kept, n);
     }
-    check_launch("searching meshes");
-    sum_meshes<false><<<sums, kThreads, 0, stream>>>(batch, n);
-    check_launch("summing meshes");
-    sum_meshes<true>
-        <<<std::min(sums, static_cast<unsigned>(grids.exact.sum[1])), kThreads, 0, stream>>>(batch,
-                                                                                             n);
-    check_launch("summing meshes by exact signs");
-    touch_meshes<<<blocks_of(batch, kWholeWarps, grids.exact.touch), kWholeThreads, 0, stream>>>(
-        batch, n);
-    check_launch("looking for faces that touch");
+    launch("summing meshes", sum_meshes<false>, sums, kThreads, stream, batch, n);
+    launch("summing meshes by exact signs", sum_meshes<true>,
+           std::min(sums, static_cast<unsigned>(grids.exact.sum[1])), kThreads, stream, batch, n);
+    launch("looking for faces that touch", touch_meshes,
+           blocks_of(batch, kWholeWarps, grids.exact.touch), kWholeThreads, stream, batch, n);
   }
   for (int pass = 1; pass < kExactPasses; ++pass) {
     const unsigned whole =
         blocks_with_memory(batch, pass, batch.bytes, kWholeWarps, grids.exact.whole);
-    ask_meshes<<<whole, kWholeThreads, 0, stream>>>(batch, pass, rounds);
-    check_launch("asking the pairs that need more memory");
+    launch("asking the pairs that need more memory", ask_meshes, whole, kWholeThreads, stream,
+           batch, pass, rounds);
   }
 }
 

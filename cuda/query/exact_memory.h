@@ -7,9 +7,9 @@
 #include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_pair.h"
 #include "query/base/pair_place.h"
-#include "query/exact/block_insides.h"
 #include "query/exact/box_integrals.h"
 #include "query/exact/exact_sums.h"
+#include "query/exact/inside_search.h"
 
 namespace ist::gpu {
 

@@ -3,10 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/bits.h"
+#include "cuda/query/exact_arrays.h"
 #include "cuda/query/exact_insides.h"
-#include "cuda/query/exact_patch_arrays.h"
+#include "query/exact/exact_sums.h"
 #include "query/exact/overlap_octants.h"
-#include "query/exact/slot_sums.h"
 
 // An exact overlap with its crossings in the order of the meshes, as on the CPU: the data of
 // OverlapParts (query/exact/overlap_parts.h) on a GPU.
@@ -356,8 +357,7 @@ class OverlapRef {
   IST_HD void for_each_block(int side, const std::uint32_t* bits, const Visit& visit) const {
     const std::uint32_t words = (mesh(side).level[0].count + 31) / 32;
     for (std::uint32_t w = 0; w < words; ++w)
-      for (std::uint32_t left = bits[w]; left != 0; left &= left - 1)
-        visit(32 * w + static_cast<std::uint32_t>(lowest_bit(left)));
+      for (const std::uint32_t i : set_bits(bits[w])) visit(32 * w + i);
   }
 
   /// An upper bound of the vertices inside of crossed blocks.

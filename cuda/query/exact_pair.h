@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "base/bits.h"
-#include "query/exact/crossing.h"
+#include "query/exact/orientation.h"
 #include "query/exact/overlap_formulas.h"
 
 // Tests of a pair of triangles, each by a single lane.

@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/exact_patches.h"
@@ -51,16 +50,14 @@ bool has_memory(const ExactPatchArrays& batch) {
 
 void launch_exact_patches(const ExactPatchArrays& batch, const Grids& grids, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, sizeof(ExactCounters), stream), "starting a batch");
-  sift_patches_of_meshes<<<blocks_for(batch.pairs.count, kThreadsEach), kThreadsEach, 0, stream>>>(
-      batch);
-  check_launch("sifting pairs of meshes");
+  launch("sifting pairs of meshes", sift_patches_of_meshes,
+         blocks_for(batch.pairs.count, kThreadsEach), kThreadsEach, stream, batch);
   for (int pass = kFirstPatchPass; pass < kExactPasses; ++pass) {
     const std::size_t fit = batch.bytes / (kWarps * batch.bytes_of_team(pass));
     const auto most = static_cast<std::size_t>(std::min(
         blocks_for(batch.pairs.count, kWarps), static_cast<unsigned>(grids.divide_meshes)));
-    divide_meshes<<<static_cast<unsigned>(std::clamp(fit, std::size_t{1}, most)), kThreads, 0,
-                    stream>>>(batch, pass);
-    check_launch("dividing contacts of meshes into patches");
+    launch("dividing contacts of meshes into patches", divide_meshes,
+           std::clamp(fit, std::size_t{1}, most), kThreads, stream, batch, pass);
   }
 }
 

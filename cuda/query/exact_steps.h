@@ -8,7 +8,7 @@
 #include "cuda/query/exact_contact.h"
 #include "cuda/query/exact_insides.h"
 #include "cuda/query/exact_search.h"
-#include "query/exact/exact_in_world.h"
+#include "query/exact/exact_sums.h"
 
 // The steps of a batch by Measure::exact, for the threads and warps of kernels and for tests on the
 // host.

@@ -4,9 +4,9 @@
 
 #include "base/host_device.h"
 #include "cuda/query/batch_steps.h"
-#include "cuda/query/field_ref.h"
 #include "cuda/query/field_walk.h"
 #include "cuda/query/lens_sums.h"
+#include "cuda/query/solid_ref.h"
 
 // A batch's pairs of a tree and a field, as batch_arrays.h has those of trees. Sums are in double.
 // Whichever is A, the field comes first here: the tree is placed in the field's frame.

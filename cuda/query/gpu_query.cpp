@@ -3,7 +3,6 @@
 #include <ist/types.h>
 
 #include <algorithm>
-#include <cmath>
 #include <span>
 #include <string>
 #include <utility>
@@ -46,7 +45,7 @@ constexpr std::uint32_t kGapEntryCapacity = 1 << 20;  ///< of separations, whose
 }  // namespace
 
 GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
   gpu::check_gpu(settings.device);
   gpu::Queue queue(settings);
   std::vector<gpu::SolidRef> refs(solids.size());
@@ -84,10 +83,6 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
   }
   queue.wait();
 }
-
-GpuSolids::~GpuSolids() = default;
-GpuSolids::GpuSolids(GpuSolids&&) noexcept = default;
-GpuSolids& GpuSolids::operator=(GpuSolids&&) noexcept = default;
 
 std::size_t GpuSolids::size() const noexcept { return impl_->size; }
 std::size_t GpuSolids::bytes() const noexcept { return impl_->memory.bytes(); }
@@ -202,7 +197,7 @@ std::size_t place(std::byte* from, GpuWorkspace::Impl& work) {
 }  // namespace
 
 GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
   gpu::check_gpu(settings.device);
   if (most_pairs > 0xFFFFFFFFu) throw Error("GPU: a batch holds up to 2^32 - 1 pairs: divide it");
   gpu::Queue queue(settings);
@@ -222,10 +217,6 @@ GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
   queue.wait();
 }
 
-GpuWorkspace::~GpuWorkspace() = default;
-GpuWorkspace::GpuWorkspace(GpuWorkspace&&) noexcept = default;
-GpuWorkspace& GpuWorkspace::operator=(GpuWorkspace&&) noexcept = default;
-
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 std::size_t GpuWorkspace::bytes() const noexcept { return impl_->memory.bytes(); }
 
@@ -236,7 +227,7 @@ struct GpuKept::Impl {
 };
 
 GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettings& settings)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
   gpu::check_gpu(settings.device);
   if (most_pairs > 0xFFFFFFFFu || bytes_each < 1024 || bytes_each > 1 << 24)
     throw Error("GPU: what is kept is for up to 2^32 - 1 pairs, with 1,024 to 2^24 bytes each");
@@ -258,10 +249,6 @@ GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettin
              "readying what is kept");
   queue.wait();
 }
-
-GpuKept::~GpuKept() = default;
-GpuKept::GpuKept(GpuKept&&) noexcept = default;
-GpuKept& GpuKept::operator=(GpuKept&&) noexcept = default;
 
 std::size_t GpuKept::most_pairs() const noexcept { return impl_->arrays.pairs; }
 std::size_t GpuKept::bytes() const noexcept { return impl_->memory.bytes(); }

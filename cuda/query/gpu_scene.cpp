@@ -1,6 +1,6 @@
 #include <ist/gpu_scene.h>
 
-#include "cuda/query/broad_kernels.h"
+#include "cuda/query/broad_arrays.h"
 #include "cuda/query/gpu_solids.h"
 #include "cuda/query/make_broad_scene.h"
 
@@ -15,7 +15,7 @@ struct GpuScene::Impl {
 
 GpuScene::GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
                    const GpuSceneSettings& settings, const GpuSettings& gpu)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
   const gpu::BroadScene scene = gpu::make_broad_scene(solids.impl().boxes, bodies, settings);
   if (solids.device() != gpu.device)
     throw Error("GPU scene: the solids are on device " + std::to_string(solids.device()) +
@@ -38,10 +38,6 @@ GpuScene::GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies
   impl_->pairs = gpu::pairs_of(arrays);
   queue.wait();
 }
-
-GpuScene::~GpuScene() = default;
-GpuScene::GpuScene(GpuScene&&) noexcept = default;
-GpuScene& GpuScene::operator=(GpuScene&&) noexcept = default;
 
 std::size_t GpuScene::size() const noexcept { return impl_->arrays.count; }
 std::size_t GpuScene::bytes() const noexcept { return impl_->memory.bytes(); }

@@ -2,8 +2,8 @@
 
 #include <ist/gpu_query.h>
 
+#include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "cuda/base/check.h"
@@ -21,29 +21,24 @@ class DeviceBytes {
  public:
   DeviceBytes() = default;
   DeviceBytes(Queue& queue, const GpuSettings& settings, std::size_t bytes)
-      : settings_(settings), data_(queue.allocate(bytes)), bytes_(bytes) {}
-  ~DeviceBytes() {
-    if (data_ == nullptr) return;
-    try {
-      Queue(settings_).deallocate(data_, bytes_);
-    } catch (const Error&) {  // a device that is gone has no memory to give back
-    }
-  }
-  DeviceBytes(DeviceBytes&& other) noexcept { *this = std::move(other); }
-  DeviceBytes& operator=(DeviceBytes&& other) noexcept {
-    std::swap(settings_, other.settings_);
-    std::swap(data_, other.data_);
-    std::swap(bytes_, other.bytes_);
-    return *this;
-  }
+      : data_(static_cast<std::byte*>(queue.allocate(bytes)), {settings, bytes}) {}
 
-  std::byte* data() const { return static_cast<std::byte*>(data_); }
-  std::size_t bytes() const { return bytes_; }
+  std::byte* data() const { return data_.get(); }
+  std::size_t bytes() const { return data_.get_deleter().bytes; }
 
  private:
-  GpuSettings settings_;
-  void* data_ = nullptr;
-  std::size_t bytes_ = 0;
+  struct Release {
+    GpuSettings settings;
+    std::size_t bytes;
+
+    void operator()(std::byte* data) const {
+      try {
+        Queue(settings).deallocate(data, bytes);
+      } catch (const Error&) {  // a device that is gone has no memory to give back
+      }
+    }
+  };
+  std::unique_ptr<std::byte, Release> data_;
 };
 
 template <class T>

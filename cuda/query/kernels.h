@@ -4,9 +4,8 @@
 
 #include <cstddef>
 
-#include "cuda/query/exact_kept_arrays.h"
-#include "cuda/query/exact_patch_arrays.h"
-#include "cuda/query/patch_arrays.h"
+#include "cuda/query/exact_arrays.h"
+#include "cuda/query/patch_memory.h"
 #include "cuda/query/separation_arrays.h"
 #include "cuda/query/triangle_steps.h"
 
@@ -50,7 +49,6 @@ void find_patch_grids(Grids& grids);
 void find_field_grids(Grids& grids);
 void find_exact_grids(Grids& grids);
 void find_exact_patch_grids(Grids& grids);
-TriangleGrids triangle_grids();
 
 void launch_batch(const BatchArrays& batch, const Grids& grids, cudaStream_t stream);
 /// `kept` may be null.
@@ -71,8 +69,5 @@ void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t me
 /// `has`: the groups of which there are fields.
 void launch_field_batch(const FieldBatch& batch, const bool (&has)[kFieldGroups],
                         const Grids& grids, cudaStream_t stream);
-/// Launches the listed pairs with boxes and terrains.
-void launch_triangle_pairs(const FieldBatch& batch, const TriangleGrids& grids,
-                           cudaStream_t stream);
 
 }  // namespace ist::gpu

@@ -15,8 +15,6 @@
 #include <ist/shapes.h>
 #include <ist/types.h>
 
-#include "cuda/query/cuts_ref.h"
-#include "cuda/query/field_ref.h"
 #include "cuda/query/solid_ref.h"
 #include "query/asset/sphere_tree.h"
 #include "query/base/pair_place.h"
@@ -165,7 +163,7 @@ inline double reach_of(const std::vector<FilledBall>& balls, const double* centr
   return reach * (1 + 1e-9);
 }
 
-/// The index of the first solid that is the same asset (are_one_asset(), query/lod/coincident.h).
+/// The index of the first solid that is the same asset (are_one_asset(), query/lod/level_blend.h).
 inline std::uint32_t first_alike(std::span<const GpuSolid> solids, const AssetHeader& of) {
   for (std::uint32_t k = 0;; ++k) {
     const auto* const tree = std::get_if<AssetView>(&solids[k]);

@@ -7,8 +7,8 @@
 #include "cuda/query/exact_memory.h"
 #include "cuda/query/float_gaps.h"
 #include "query/exact/box_gaps.h"
-#include "query/exact/crossing.h"
 #include "query/exact/mesh_gap.h"
+#include "query/exact/orientation.h"
 #include "query/exact/overlap_formulas.h"
 
 // A team's memory for the distance of two meshes, with the queue of pairs of triangles that may be
@@ -218,7 +218,7 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   NearestTriangles next = m.best;
   const double before = next.least;
   next.meet(team.min(squared));
-  // Of equally near pairs the lowest counts.
+  // The lowest of equally near pairs counts.
   const bool wants = has && next.wants(squared, name);
   const std::uint64_t lowest = team.min(wants ? name : NearestTriangles::kNone);
   const bool any_crosses = team.any(crosses);

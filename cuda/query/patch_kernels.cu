@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/kernels.h"
@@ -45,13 +44,12 @@ void launch_patches(const PatchArrays& batch, const Grids& grids, std::size_t me
   check(cudaMemsetAsync(batch.pairs.counters, 0, sizeof(BatchCounters), stream),
         "starting a batch");
   const std::size_t pairs = batch.pairs.pairs.count;
-  sift_contacts<<<blocks_for(pairs, kSiftThreads), kSiftThreads, 0, stream>>>(batch);
-  check_launch("placing pairs of trees");
+  launch("placing pairs of trees", sift_contacts, blocks_for(pairs, kSiftThreads), kSiftThreads,
+         stream, batch);
   const std::size_t fit = memory_bytes / (kWarps * PatchWorkspace::bytes(batch.most_bins));
   const auto at_a_time =
       static_cast<unsigned>(std::min(fit, static_cast<std::size_t>(grids.divide)));
-  divide_contacts<<<at_a_time, kThreads, 0, stream>>>(batch);
-  check_launch("dividing contacts into patches");
+  launch("dividing contacts into patches", divide_contacts, at_a_time, kThreads, stream, batch);
 }
 
 }  // namespace ist::gpu

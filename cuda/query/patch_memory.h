@@ -1,15 +1,15 @@
 #pragma once
 
+#include <ist/gpu.h>
 #include <cstddef>
 #include <cstdint>
 
-#include <ist/gpu.h>
-
 #include "base/host_device.h"
 #include "cuda/query/answers.h"
-#include "cuda/query/cuts_ref.h"
+#include "cuda/query/batch_arrays.h"
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/pair_memory.h"
+#include "cuda/query/solid_ref.h"
 #include "query/contact/contact_numbers.h"
 
 // A team's memory for a pair's patches.
@@ -72,6 +72,18 @@ struct PatchMemory {
   std::uint16_t bins_before[kWords + 1];  ///< marked bins of lower words
   float term[32][kTerms + 1];  ///< the terms of lanes; an odd number avoids bank conflicts
   int bin[32];                 ///< the bins that they go to
+};
+
+/// A batch of contact patches, with its working memory.
+struct PatchArrays {
+  BatchArrays pairs;  ///< solids, pairs, answers, counters and the list
+  GpuContactPatches patches;
+  std::byte* team_memory;   ///< of the teams, one after another
+  std::uint32_t most_bins;  ///< of any asset
+
+  IST_HD PatchWorkspace workspace(std::uint32_t team) const {
+    return PatchWorkspace::at(team_memory + team * PatchWorkspace::bytes(most_bins), most_bins);
+  }
 };
 
 }  // namespace ist::gpu

@@ -1,10 +1,8 @@
 #pragma once
 
 #include <cmath>
-#include <cstdint>
 
 #include "base/host_device.h"
-#include "base/plain.h"
 #include "base/vec3.h"
 
 namespace ist::gpu {

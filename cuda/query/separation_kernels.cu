@@ -1,7 +1,6 @@
 #include <algorithm>
 
 #include "cuda/base/check.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/query/by_warps.h"
 #include "cuda/query/kernels.h"
@@ -127,34 +126,28 @@ __global__ void __launch_bounds__(kMeshThreads, kFinishBlocks)
 void launch_meshes(const SeparationArrays& batch, const Grids& grids, cudaStream_t stream) {
   const std::uint32_t capacity = batch.meshes.query_capacity;
   const auto count = static_cast<std::uint32_t>(batch.pairs.pairs.count);
-  const auto blocks = [](int of) { return static_cast<unsigned>(of); };
   check(cudaMemsetAsync(batch.meshes.rounds, 0, 2 * sizeof(MeshGapRound), stream),
         "starting rounds");
   for (std::uint32_t n = 0; n < (count + capacity - 1) / capacity; ++n) {
-    place_meshes<<<blocks_for(std::min(count, capacity), kPlaceThreads), kPlaceThreads, 0,
-                   stream>>>(batch, n);
-    check_launch("placing meshes");
-    glance_at_meshes<<<blocks(grids.mesh_gaps.glance), kThreads<float>, 0, stream>>>(batch, n);
-    check_launch("looking at spheres of meshes");
-    search_meshes<float>
-        <<<blocks(grids.mesh_gaps.search[0]), kSearchThreads<float>, 0, stream>>>(batch, n);
-    check_launch("searching distances of meshes");
-    search_meshes<double>
-        <<<blocks(grids.mesh_gaps.search[1]), kSearchThreads<double>, 0, stream>>>(batch, n);
-    check_launch("searching distances of meshes in double");
-    measure_meshes<<<blocks(grids.mesh_gaps.measure), kMeshThreads, 0, stream>>>(batch, n);
-    check_launch("measuring triangles of meshes");
-    finish_meshes<<<blocks(grids.mesh_gaps.finish), kMeshThreads, 0, stream>>>(batch, n);
-    check_launch("answering distances of meshes");
+    launch("placing meshes", place_meshes, blocks_for(std::min(count, capacity), kPlaceThreads),
+           kPlaceThreads, stream, batch, n);
+    launch("looking at spheres of meshes", glance_at_meshes, grids.mesh_gaps.glance,
+           kThreads<float>, stream, batch, n);
+    launch("searching distances of meshes", search_meshes<float>, grids.mesh_gaps.search[0],
+           kSearchThreads<float>, stream, batch, n);
+    launch("searching distances of meshes in double", search_meshes<double>,
+           grids.mesh_gaps.search[1], kSearchThreads<double>, stream, batch, n);
+    launch("measuring triangles of meshes", measure_meshes, grids.mesh_gaps.measure, kMeshThreads,
+           stream, batch, n);
+    launch("answering distances of meshes", finish_meshes, grids.mesh_gaps.finish, kMeshThreads,
+           stream, batch, n);
   }
 }
 
 template <class Real>
 void launch_searches(const SeparationArrays& batch, int blocks, cudaStream_t stream) {
-  separate_pairs<Real><<<static_cast<unsigned>(blocks), kThreads<Real>, 0, stream>>>(batch);
-  check_launch("separating pairs of trees");
-  separate_tasks<Real><<<static_cast<unsigned>(blocks), kThreads<Real>, 0, stream>>>(batch);
-  check_launch("separating what pairs left");
+  launch("separating pairs of trees", separate_pairs<Real>, blocks, kThreads<Real>, stream, batch);
+  launch("separating what pairs left", separate_tasks<Real>, blocks, kThreads<Real>, stream, batch);
 }
 
 }  // namespace
@@ -172,9 +165,8 @@ void find_separation_grids(Grids& grids) {
 void launch_separations(const SeparationArrays& batch, const Grids& grids, bool has_spheres,
                         bool has_meshes, cudaStream_t stream) {
   check(cudaMemsetAsync(batch.counters, 0, 3 * sizeof(BatchCounters), stream), "starting a batch");
-  sift_separations<<<blocks_for(batch.pairs.pairs.count, kSiftThreads), kSiftThreads, 0, stream>>>(
-      batch);
-  check_launch("placing pairs of trees");
+  launch("placing pairs of trees", sift_separations,
+         blocks_for(batch.pairs.pairs.count, kSiftThreads), kSiftThreads, stream, batch);
   if (has_spheres) {
     launch_searches<float>(batch, grids.search[0], stream);
     launch_searches<double>(batch, grids.search[1], stream);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include <ist/types.h>
@@ -34,6 +35,10 @@ struct GpuSettings {
   CUstream_st* stream = nullptr;           ///< null: made for the call
   DeviceMemoryResource* memory = nullptr;  ///< null: the device's own memory pool, which is kept
 };
+
+/// Owns an object of a type that only the library defines.
+template <class Impl>
+using HiddenImpl = std::unique_ptr<Impl, void (*)(Impl*)>;
 
 /// A GPU that this build can use.
 struct GpuInfo {

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <variant>
 
@@ -31,9 +30,6 @@ class GpuSolids {
   /// Error if the device cannot be used or has no memory left, for an asset with neither spheres
   /// nor a mesh, and for a FunctionShape, which a GPU cannot call.
   explicit GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings = {});
-  ~GpuSolids();
-  GpuSolids(GpuSolids&&) noexcept;
-  GpuSolids& operator=(GpuSolids&&) noexcept;
 
   std::size_t size() const noexcept;   ///< number of solids
   std::size_t bytes() const noexcept;  ///< of device memory
@@ -43,7 +39,7 @@ class GpuSolids {
   const Impl& impl() const noexcept { return *impl_; }
 
  private:
-  std::unique_ptr<Impl> impl_;
+  HiddenImpl<Impl> impl_;
 };
 
 /// Working memory of a batch on the device. One batch at a time may use it.
@@ -58,9 +54,6 @@ class GpuWorkspace {
   ///
   /// Throws Error if the device cannot be used or has no memory left.
   explicit GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings = {});
-  ~GpuWorkspace();
-  GpuWorkspace(GpuWorkspace&&) noexcept;
-  GpuWorkspace& operator=(GpuWorkspace&&) noexcept;
 
   std::size_t most_pairs() const noexcept;
   std::size_t bytes() const noexcept;  ///< of device memory
@@ -69,11 +62,11 @@ class GpuWorkspace {
   Impl& impl() noexcept { return *impl_; }
 
  private:
-  std::unique_ptr<Impl> impl_;
+  HiddenImpl<Impl> impl_;
 };
 
-/// What exact batches keep of each pair from call to call, in device memory: triangles that are
-/// near each other, so that a pair that has moved little is not searched again. For simulators,
+/// Data of each pair that exact batches keep from call to call, in device memory: triangles near
+/// each other, so that a pair that has moved little is not searched again. For simulators,
 /// which ask about the same pairs step by step. One batch at a time may use it.
 class GpuKept {
  public:
@@ -84,9 +77,6 @@ class GpuKept {
   /// Throws Error if the device cannot be used or has no memory left.
   explicit GpuKept(std::size_t most_pairs, std::size_t bytes_each = 8192,
                    const GpuSettings& settings = {});
-  ~GpuKept();
-  GpuKept(GpuKept&&) noexcept;
-  GpuKept& operator=(GpuKept&&) noexcept;
 
   std::size_t most_pairs() const noexcept;
   std::size_t bytes() const noexcept;  ///< of device memory
@@ -95,7 +85,7 @@ class GpuKept {
   const Impl& impl() const noexcept { return *impl_; }
 
  private:
-  std::unique_ptr<Impl> impl_;
+  HiddenImpl<Impl> impl_;
 };
 
 /// Settings of a batch, as in PenetrationSettings. There is no relative_error: nothing goes over
@@ -178,8 +168,8 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
                       const GpuSeparationSettings& settings, GpuWorkspace& workspace,
                       const GpuSeparations& answers, CUstream_st* stream);
 
-/// answers[i] and its patches = contact_patches(pairs[i]) of two assets, without limits: the contact
-/// condensed into at most `patches.most`.
+/// answers[i] and its patches = contact_patches(pairs[i]) of two assets, without limits: the
+/// contact condensed into at most `patches.most`.
 ///
 /// By lenses (PenetrationSettings::spheres_only) patches are the same regions of the same tree as
 /// there, with the same ids, unless two divisions are equally good to a float's digits. Answers

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 
 #include <ist/gpu_query.h>
@@ -62,9 +61,6 @@ class GpuScene {
   /// of range, for more than 2^31 bodies, and for a margin that is negative, infinite or NaN.
   GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
            const GpuSceneSettings& settings, const GpuSettings& gpu = {});
-  ~GpuScene();
-  GpuScene(GpuScene&&) noexcept;
-  GpuScene& operator=(GpuScene&&) noexcept;
 
   std::size_t size() const noexcept;   ///< number of bodies
   std::size_t bytes() const noexcept;  ///< of device memory
@@ -79,7 +75,7 @@ class GpuScene {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  HiddenImpl<Impl> impl_;
 };
 
 }  // namespace ist

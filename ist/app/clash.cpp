@@ -11,7 +11,7 @@
 #include "app/glb_scene.h"
 #include "app/options.h"
 #include "clash/assembly.h"
-#include "clash/report.h"
+#include "clash/clash.h"
 #include "library/text.h"
 
 namespace ist::app {

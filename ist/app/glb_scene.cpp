@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "library/text.h"
-#include "mesh/samples/shapes.h"
+#include "mesh/samples/samples.h"
 
 namespace ist::app {
 namespace {

@@ -31,9 +31,4 @@ std::vector<CommandReference> commands_of(const CLI::App& app);
 std::string man_page(const CommandReference& command);
 std::string man_page(const CLI::App& app);
 
-// Scripts that complete a command line of `ist`: for bash, zsh and fish.
-std::string bash_completion(const std::vector<CommandReference>& commands);
-std::string zsh_completion(const std::vector<CommandReference>& commands);
-std::string fish_completion(const std::vector<CommandReference>& commands);
-
 }  // namespace ist::app

@@ -117,10 +117,7 @@ std::string robot_glb(const SphereRobot& robot) {
   const auto frames = link_frames(robot.robot, robot.self.pose.positions);
   std::size_t mesh = 0;
   for (const SphereLink& link : robot.links) {
-    const auto at = std::find_if(robot.robot.links.begin(), robot.robot.links.end(),
-                                 [&](const RobotLink& one) { return one.name == link.name; });
-    const Eigen::Isometry3d& frame =
-        frames[static_cast<std::size_t>(at - robot.robot.links.begin())];
+    const Eigen::Isometry3d& frame = frames[index_named(robot.robot.links, link.name)];
     const Eigen::Quaterniond q(frame.linear());
     const Eigen::Vector3d t = frame.translation();
     const std::size_t node = scene.add_node(0, {{"name", link.name},

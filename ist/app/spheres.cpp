@@ -17,7 +17,7 @@
 #include "library/link_solids.h"
 #include "library/settings/spelling.h"
 #include "mesh/import/text_scanner.h"
-#include "robots/description/group_states.h"
+#include "robots/description/kinematics.h"
 #include "robots/description/link_mesh.h"
 
 namespace ist::app {

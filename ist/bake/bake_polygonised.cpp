@@ -6,9 +6,9 @@
 
 #include "bake/backend/make_backend.h"
 #include "bake/bake_solid.h"
+#include "base/elementary.h"
 #include "base/hashing.h"
 #include "base/message_text.h"
-#include "base/roots.h"
 #include "base/thread_arena.h"
 #include "mesh/level_set/polygonise.h"
 #include "packing/backend/solid_backend.h"

@@ -11,13 +11,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <string>
 #include <typeinfo>
 
 #include <ist/bullet/convert.h>
 
-#include "bullet/points.h"
+#include "bullet/meeting.h"
 
 namespace ist::bullet {
 
@@ -28,7 +27,7 @@ btRigidBody* movable(const btCollisionObject& object) {
   return body != nullptr && body->getInvMass() > 0 ? body : nullptr;
 }
 
-/// Where an object was a time ago, by its velocity.
+/// The place of an object a time ago, by its velocity.
 btTransform moved_back(const btCollisionObject& object, btScalar time) {
   btTransform before = object.getWorldTransform();
   const btRigidBody* const body = movable(object);

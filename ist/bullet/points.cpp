@@ -1,4 +1,4 @@
-#include "bullet/points.h"
+#include "bullet/meeting.h"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>

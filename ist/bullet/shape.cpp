@@ -2,17 +2,36 @@
 
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <LinearMath/btAabbUtil2.h>
-
-#include <Eigen/Eigenvalues>
-#include <cmath>
-#include <cstddef>
-
 #include <ist/asset_layout.h>
+#include <ist/bullet/contacts.h>
 #include <ist/bullet/convert.h>
 #include <ist/mass_properties.h>
 #include <ist/raycast.h>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
 
 namespace ist::bullet {
+namespace {
+
+void print(const char* sentence) { std::fprintf(stderr, "ist::bullet: %s\n", sentence); }
+
+struct Warnings {
+  std::mutex mutex;
+  WarningHandler handler = print;
+  std::set<std::pair<const Contacts*, std::string>> given;
+};
+Warnings& warnings() {
+  static Warnings all;
+  return all;
+}
+
+}  // namespace
 
 BodyFrame body_frame(const AssetView& tree) {
   const MassProperties mass = mass_properties(tree);
@@ -106,6 +125,28 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
     for (int t = 0; t < blocks[b].triangles; ++t)
       process(b * static_cast<std::uint32_t>(kWidth) + static_cast<std::uint32_t>(t));
   }
+}
+
+WarningHandler set_warning_handler(WarningHandler handler) {
+  const std::lock_guard lock(warnings().mutex);
+  const WarningHandler before = warnings().handler;
+  warnings().handler = handler != nullptr ? handler : print;
+  return before;
+}
+
+void warn(const char* sentence, const Contacts* world) {
+  WarningHandler handler = nullptr;
+  {
+    const std::lock_guard lock(warnings().mutex);
+    if (!warnings().given.emplace(world, sentence).second) return;
+    handler = warnings().handler;
+  }
+  handler(sentence);
+}
+
+Contacts::~Contacts() {
+  const std::lock_guard lock(warnings().mutex);
+  std::erase_if(warnings().given, [this](const auto& one) { return one.first == this; });
 }
 
 }  // namespace ist::bullet

@@ -1,7 +1,10 @@
 #include <ist/query.h>
+#include <ist/raycast.h>
+#include <ist/time_of_impact.h>
 #include <algorithm>
 
 #include "c_api/structs.h"
+#include "query/base/batch.h"
 #include "query/base/relative_pose.h"
 
 namespace ist::c_api {
@@ -72,6 +75,64 @@ ist_status_t check_room(ist_outline_t* given) noexcept {
   given->total = given->count = 0;
   if (given->segment_size != sizeof(ist_outline_segment_t)) return IST_WRONG_SIZE;
   return given->segments == nullptr && given->capacity > 0 ? IST_NULL_POINTER : IST_OK;
+}
+
+/// ask(placed, i) for each of `count`; the least of their statuses.
+template <class Ask>
+ist_status_t ask_each(const ist_placed_t* given, std::size_t count, bool there,
+                      const Ask& ask) noexcept {
+  PlacedSolid solid;
+  ist_status_t status = c_api::read(given, solid);
+  if (status == IST_OK && count > 0 && !there) status = IST_NULL_POINTER;
+  if (status != IST_OK) return status;
+  for (std::size_t i = 0; i < count; ++i) status = std::min(status, ask(solid, i));
+  return status;
+}
+
+bool is_finite(const Motion& motion) noexcept {
+  return motion.velocity.allFinite() && motion.angular_velocity.allFinite() &&
+         motion.about.allFinite();
+}
+
+/// The memory of the workers that answer pairs.
+struct Staff {
+  ist_workspace_t* workspaces;
+  std::size_t workers;
+  const ist_parallel_t* parallel;
+
+  ist_status_t check() const noexcept {
+    if (workers > 0 && workspaces == nullptr) return IST_NULL_POINTER;
+    ist_status_t status = parallel == nullptr ? IST_OK : check_size(parallel);
+    for (std::size_t i = 0; i < workers && status == IST_OK; ++i)
+      workspace_of(workspaces + i, status);
+    return status;
+  }
+};
+
+/// answers[i] by ask(i, workspace), or `unknown` without workers. `Settings`: of C++, for `given`.
+template <class Settings, class Given, class Answer, class Unknown, class Ask>
+ist_status_t answer_pairs(std::size_t count, const Given* given, const Staff& staff,
+                          Answer* answers, std::size_t answer_size, const Unknown& unknown,
+                          const Ask& ask) noexcept {
+  if (count > 0 && answers == nullptr) return IST_NULL_POINTER;
+  if (answer_size != sizeof(Answer)) return IST_WRONG_SIZE;
+  Settings settings;
+  ist_status_t status = read(given, settings);
+  if (status == IST_OK) status = staff.check();
+  if (status != IST_OK) return status;
+  if (staff.workers == 0) {
+    for (std::size_t i = 0; i < count; ++i) write(unknown, answers[i]);
+    return IST_OK;
+  }
+  const ParallelFor threads = staff.parallel == nullptr
+                                  ? ParallelFor{}
+                                  : ParallelFor{staff.parallel->run, staff.parallel->pool};
+  answer_all(count, staff.workers, threads, [&](std::size_t i, std::size_t worker) {
+    answers[i].size = sizeof answers[i];
+    // A pool that counts wrongly is told by the answer.
+    ask(i, worker < staff.workers ? staff.workspaces + worker : nullptr);
+  });
+  return IST_OK;
 }
 
 }  // namespace
@@ -188,4 +249,121 @@ ist_status_t ist_patches_without_protrusion(const ist_placed_t* a, const ist_pla
   if (status != IST_OK) return status;
   ist::without_protrusion(room_of(*patches).first(patches->count), first, second, found_with);
   return IST_OK;
+}
+
+ist_status_t ist_raycast(const ist_placed_t* solid, const ist_ray_t* rays, size_t count,
+                         ist_ray_hit_t* hits, size_t hit_size) {
+  if (hit_size != sizeof(ist_ray_hit_t)) return IST_WRONG_SIZE;
+  return ask_each(solid, count, rays != nullptr && hits != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    write(ist::raycast(placed, read(rays[i])), hits[i]);
+                    return hits[i].status;
+                  });
+}
+
+ist_status_t ist_closest_point(const ist_placed_t* solid, const double* points, size_t count,
+                               ist_surface_point_t* answers, size_t answer_size) {
+  if (answer_size != sizeof(ist_surface_point_t)) return IST_WRONG_SIZE;
+  return ask_each(solid, count, points != nullptr && answers != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    const double* const x = points + 3 * i;
+                    write(ist::closest_point(placed, {x[0], x[1], x[2]}), answers[i]);
+                    return answers[i].status;
+                  });
+}
+
+ist_status_t ist_contains(const ist_placed_t* solid, const double* points, size_t count,
+                          ist_yes_no_t* inside) {
+  return ask_each(solid, count, points != nullptr && inside != nullptr,
+                  [&](const auto& placed, std::size_t i) {
+                    const double* const x = points + 3 * i;
+                    const ist::YesNoAnswer found = ist::contains(placed, {x[0], x[1], x[2]});
+                    inside[i] = static_cast<ist_yes_no_t>(found.answer);
+                    return status_of(found.status);
+                  });
+}
+
+ist_status_t ist_motion_between(const ist_pose_t* from, const ist_pose_t* to, double duration,
+                                const double about[3], double scale, ist_motion_t* motion) {
+  if (motion == nullptr) return IST_NULL_POINTER;
+  *motion = {};
+  if (from == nullptr || to == nullptr) return IST_NULL_POINTER;
+  const Eigen::Vector3d centre =
+      about == nullptr ? Eigen::Vector3d::Zero() : Eigen::Vector3d(about);
+  const ist::Motion found =
+      ist::motion_between(pose(*from), pose(*to), duration, centre, scale == 0 ? 1 : scale);
+  if (!is_finite(found)) return IST_INVALID_INPUT;
+  write(found.velocity, motion->velocity);
+  write(found.angular_velocity, motion->angular_velocity);
+  write(found.about, motion->about);
+  return IST_OK;
+}
+
+ist_status_t ist_moved(const ist_pose_t* start, double scale, const ist_motion_t* motion,
+                       double time, ist_pose_t* end) {
+  if (end == nullptr) return IST_NULL_POINTER;
+  const ist::Pose from = start == nullptr ? ist::Pose() : pose(*start);
+  *end = {};  // which may be `start`
+  if (start == nullptr || motion == nullptr) return IST_NULL_POINTER;
+  if (scale == 0) scale = 1;
+  const ist::Pose to = ist::moved(from, read(motion), time, scale);
+  if (!ist::usable_rotation(to, scale)) return IST_INVALID_INPUT;
+  write(to, *end);
+  return IST_OK;
+}
+
+ist_status_t ist_time_of_impact(const ist_placed_t* a, const ist_placed_t* b,
+                                const ist_motion_t* motion_a, const ist_motion_t* motion_b,
+                                const ist_impact_settings_t* settings, ist_workspace_t* workspace,
+                                ist_impact_t* answer) {
+  return answer_with<ist::ImpactSettings, ist::TimeOfImpact>(
+      a, b, settings, workspace, answer,
+      [&](const auto& x, const auto& y, const ist::ImpactSettings& by, ist::Workspace& scratch) {
+        return ist::time_of_impact(x, y, {read(motion_a), read(motion_b)}, by, scratch);
+      });
+}
+
+ist_status_t ist_penetration_batch(const ist_pair_t* pairs, std::size_t count,
+                                   const ist_penetration_settings_t* settings,
+                                   ist_workspace_t* workspaces, std::size_t workers,
+                                   ist_penetration_t* answers, std::size_t answer_size,
+                                   const ist_parallel_t* parallel) {
+  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
+  return answer_pairs<ist::PenetrationSettings>(
+      count, settings, {workspaces, workers, parallel}, answers, answer_size,
+      ist::unknown_penetration(), [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_penetration(pairs[i].a, pairs[i].b, settings, scratch, answers + i);
+      });
+}
+
+ist_status_t ist_separation_batch(const ist_pair_t* pairs, std::size_t count,
+                                  const ist_separation_settings_t* settings,
+                                  ist_workspace_t* workspaces, std::size_t workers,
+                                  ist_separation_t* answers, std::size_t answer_size,
+                                  const ist_parallel_t* parallel) {
+  if (count > 0 && pairs == nullptr) return IST_NULL_POINTER;
+  return answer_pairs<ist::SeparationSettings>(
+      count, settings, {workspaces, workers, parallel}, answers, answer_size,
+      ist::unknown_separation(), [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_separation(pairs[i].a, pairs[i].b, settings, scratch, answers + i);
+      });
+}
+
+ist_status_t ist_contact_patches_batch(const ist_pair_t* pairs, std::size_t count,
+                                       const ist_contact_settings_t* settings,
+                                       ist_workspace_t* workspaces, std::size_t workers,
+                                       ist_contact_patches_t* patches, ist_penetration_t* wholes,
+                                       std::size_t whole_size, const ist_parallel_t* parallel) {
+  if (count > 0 && (pairs == nullptr || patches == nullptr)) return IST_NULL_POINTER;
+  // All are of one size, or there is no telling where the next one begins.
+  for (std::size_t i = 0; i < count; ++i) {
+    const ist_status_t status = check_size(patches + i);
+    if (status != IST_OK) return status;
+    patches[i].count = 0;
+  }
+  return answer_pairs<ist::ContactSettings>(
+      count, settings, {workspaces, workers, parallel}, wholes, whole_size,
+      ist::unknown_penetration(), [&](std::size_t i, ist_workspace_t* scratch) {
+        ist_contact_patches(pairs[i].a, pairs[i].b, settings, scratch, patches + i, wholes + i);
+      });
 }

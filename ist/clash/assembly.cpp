@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "base/thread_arena.h"
-#include "clash/sources.h"
 #include "library/csv_reader.h"
 #include "library/input_mesh.h"
 #include "library/settings/numbers.h"

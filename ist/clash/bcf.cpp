@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clash/report.h"
+#include "clash/clash.h"
 #include "mesh/import/xml_document.h"
 
 namespace ist {

@@ -1,4 +1,4 @@
-#include "clash/report.h"
+#include "clash/clash.h"
 
 #include <fmt/format.h>
 #include <ist/types.h>

@@ -1,4 +1,4 @@
-#include "clash/sources.h"
+#include "clash/assembly.h"
 
 #include <fmt/format.h>
 #include <ist/pose_eigen.h>
@@ -292,20 +292,19 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
     for (const RobotJoint& joint : robot->joints)
       if (joint.is_free()) free.push_back(joint.name);
     for (const auto& [name, value] : values) {
-      const auto at =
-          std::find_if(robot->joints.begin(), robot->joints.end(),
-                       [&sought = name](const RobotJoint& j) { return j.name == sought; });
-      if (at == robot->joints.end() || !at->is_free()) {
+      const std::size_t at = index_named(robot->joints, name);
+      if (at == robot->joints.size() || !robot->joints[at].is_free()) {
         const std::string nearest = nearest_word(name, free);
         throw Error(fmt::format("{}: no joint that moves freely is called '{}'{}", path, name,
                                 nearest.empty()
                                     ? fmt::format("; there are {}", fmt::join(free, ", "))
                                     : fmt::format("; did you mean '{}'?", nearest)));
       }
-      if (!(value >= at->lower && value <= at->upper))
+      const RobotJoint& joint = robot->joints[at];
+      if (!(value >= joint.lower && value <= joint.upper))
         throw Error(fmt::format("{}: {} = {:g}: the joint's limits are {:g} to {:g}", path, name,
-                                value, at->lower, at->upper));
-      positions[static_cast<std::size_t>(at - robot->joints.begin())] = value;
+                                value, joint.lower, joint.upper));
+      positions[at] = value;
     }
     const std::vector<Eigen::Isometry3d> frames = link_frames(*robot, positions);
     std::vector<Pose> poses;

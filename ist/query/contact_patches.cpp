@@ -7,7 +7,7 @@
 
 #include "query/asset/sphere_tree.h"
 #include "query/base/no_answer.h"
-#include "query/base/turned_over.h"
+#include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/contact/write_patches.h"
 #include "query/exact/keep_largest.h"

@@ -1,11 +1,11 @@
 #include <ist/query.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "base/bits.h"
 #include "query/asset/sphere_tree.h"
 #include "query/base/no_answer.h"
 #include "query/base/precision.h"
@@ -80,8 +80,7 @@ class OverlapSearch {
     const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
     const float* radii = side.x->level[opened.level].blocks[opened.block].r;
     waiting_.start(pair, open_a);
-    for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
-      const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t lane : set_bits(gaps.near & used)) {
       if (unit * gaps.gap[lane] <= error_) {
         // Distance over the sum of radii.
         waiting_.add(lane, 1 + gaps.gap[lane] / (radii[lane] + other_radius), true);

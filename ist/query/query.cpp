@@ -6,7 +6,7 @@
 
 #include "query/base/batch.h"
 #include "query/base/no_answer.h"
-#include "query/base/turned_over.h"
+#include "query/base/relative_pose.h"
 #include "query/scratch/workspace.h"
 #include "query/solid_queries.h"
 

@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include <ist/query.h>
 
+#include "base/bits.h"
 #include "query/asset/sphere_tree.h"
 #include "query/base/budget.h"
 #include "query/base/no_answer.h"
@@ -91,8 +91,7 @@ class GapDescent : GapStack {
     // Unused lanes are excluded by number: for solids far enough apart no radius would exclude
     // them.
     const std::uint32_t used = (1u << std::min(kWidth, below)) - 1;
-    for (std::uint32_t left = gaps.near & used; left != 0; left &= left - 1) {
-      const auto lane = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t lane : set_bits(gaps.near & used)) {
       WaitingPair child = pair;
       child.gap = unit * gaps.gap[lane];
       child.cover = unit * gaps.cover[lane];
@@ -159,8 +158,7 @@ bool finds_sphere_around(const SphereTree& tree, const Eigen::Vector3d& point, d
     float inside[kWidth];
     const std::size_t first = size, below = tree.count(level - 1) - std::size_t{kWidth} * block;
     const std::uint32_t used = (1u << std::min<std::size_t>(kWidth, below)) - 1;
-    for (std::uint32_t left = balls_around(balls, at, inside) & used; left != 0; left &= left - 1) {
-      const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t k : set_bits(balls_around(balls, at, inside) & used)) {
       if (level == 0) {
         const NodeBall sphere = tree.sphere(block, k);
         if ((vector(sphere.centre) - point).norm() < sphere.r - margin) return true;

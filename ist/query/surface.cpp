@@ -9,7 +9,7 @@
 #include "query/base/relative_pose.h"
 #include "query/exact/kept_mesh.h"
 #include "query/exact/mesh_queries.h"
-#include "query/shape/with_shape.h"
+#include "query/shape/patch_shapes.h"
 
 namespace ist {
 namespace {

@@ -6,8 +6,8 @@
 #include <ist/query.h>
 
 #include <ist/asset_layout.h>
+#include "base/elementary.h"
 #include "query/base/relative_pose.h"
-#include "query/base/smooth_step.h"
 #include "query/lod/unlike_sizes.h"
 
 namespace ist {

@@ -8,7 +8,7 @@
 #include "query/asset/sphere_tree.h"
 #include "query/base/precision.h"
 #include "query/base/relative_pose.h"
-#include "query/lod/coincident.h"
+#include "query/lod/level_blend.h"
 #include "query/lod/level_chain.h"
 #include "query/tree_overlap/descent.h"
 #include "query/tree_overlap/open_runs.h"

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "base/bits.h"
+
 namespace ist {
 
 /// A box along the axes; floats, rounded outward.
@@ -138,8 +140,7 @@ class BoxTree {
   /// Sets the boxes of some of the bodies from `first` on: until refit() nothing may be asked.
   void put(std::uint32_t first, std::uint32_t of, const float (&low)[3][kLanes],
            const float (&high)[3][kLanes]) noexcept {
-    for (; of != 0; of &= of - 1) {
-      const auto k = static_cast<std::uint32_t>(std::countr_zero(of));
+    for (const std::uint32_t k : set_bits(of)) {
       const std::uint32_t lane = lane_of_[first + k];
       BoxNode& node = nodes_[lane / kLanes];
       for (std::size_t c = 0; c < 3; ++c) {
@@ -193,8 +194,7 @@ class BoxTree {
       const std::uint32_t at = waiting[first % kRoom].node, k = waiting[first % kRoom].box;
       ++first;
       const SceneBox& box = boxes[k];
-      for (std::uint32_t lanes = nodes_[at].meeting(box); lanes != 0; lanes &= lanes - 1) {
-        const auto lane = static_cast<std::uint32_t>(std::countr_zero(lanes));
+      for (const std::uint32_t lane : set_bits(nodes_[at].meeting(box))) {
         const std::uint32_t child = nodes_[at].child[lane];
         if (nodes_[at].is_body(lane)) {
           visit(k, child);

@@ -7,6 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
+#include "base/bits.h"
 #include "scene/body_box.h"
 #include "scene/box_tree.h"
 
@@ -152,8 +153,7 @@ struct SceneBodies {
       still.put(kCount * b, stay & all.still, boxes.low, boxes.high);
       left &= ~(stay & (all.moving | all.still));
     }
-    for (; left != 0; left &= left - 1) {
-      const auto k = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t k : set_bits(left)) {
       const Body& body = bodies[kCount * b + k];
       SceneBox box;
       Place place = (boxes.placed >> k & 1) != 0 ? Place::tree : Place::refused;

@@ -10,7 +10,7 @@
 #include <ist/types.h>
 
 #include "arrays.h"
-#include "clash/report.h"
+#include "clash/clash.h"
 #include "library/text.h"
 #include "meshes.h"
 #include "module.h"

@@ -8,7 +8,7 @@
 
 #include "arrays.h"
 #include "module.h"
-#include "query/shape/sound_shapes.h"
+#include "query/shape/shapes.h"
 #include "solids.h"
 
 namespace ist::python {

@@ -64,4 +64,20 @@ IST_HD inline int lowest_bit(std::uint64_t bits) {
   return IST_GPU_OR_HOST(__ffsll(static_cast<long long>(bits)) - 1, std::countr_zero(bits));
 }
 
+/// The numbers of the bits that are set, the lowest first; its own iterator.
+template <class Word>
+struct SetBits {
+  Word left;
+
+  IST_HD SetBits begin() const { return *this; }
+  IST_HD SetBits end() const { return {0}; }
+  IST_HD std::uint32_t operator*() const { return static_cast<std::uint32_t>(lowest_bit(left)); }
+  IST_HD void operator++() { left &= left - 1; }
+  IST_HD bool operator!=(const SetBits&) const { return left != 0; }
+};
+
+/// For loops: for (const std::uint32_t i : set_bits(bits)).
+IST_HD inline SetBits<std::uint32_t> set_bits(std::uint32_t bits) { return {bits}; }
+IST_HD inline SetBits<std::uint64_t> set_bits(std::uint64_t bits) { return {bits}; }
+
 }  // namespace ist

@@ -1,10 +1,23 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "base/host_device.h"
 
 namespace ist {
+
+// Arithmetic on plain numbers, for host and device code.
+
+// std::min, std::max and std::clamp, which the device does not have.
+IST_HD inline double least(double x, double y) { return x < y ? x : y; }
+IST_HD inline double most(double x, double y) { return x > y ? x : y; }
+IST_HD inline double clamped(double x, double low, double high) {
+  return x < low ? low : high < x ? high : x;
+}
+
+inline constexpr double kBallVolume = 4 * std::numbers::pi / 3;
+IST_HD inline double ball_volume(double r) { return kBallVolume * (r * r * r); }
 
 /// Three doubles, for host and device code. Sums go from the left to the right.
 struct Vec3 {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "query/ball_triangle/cap.h"
+#include "query/shape/plain_shapes.h"
 
 // A ball cut by a plane, against arithmetic of 100 digits.
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "mesh/samples/samples.h"
-#include "query/lod/coincident.h"
+#include "query/lod/level_blend.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
 

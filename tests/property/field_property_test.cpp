@@ -7,7 +7,7 @@
 
 #include <ist/query.h>
 
-#include "query/ball_triangle/cap.h"
+#include "query/shape/plain_shapes.h"
 #include "support/box_overlap.h"
 #include "support/reference_sum.h"
 #include "support/surface_queries.h"

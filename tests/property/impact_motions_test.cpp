@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "query/impact/convex_pair.h"
+#include "query/impact/impact_side.h"
 #include "query/impact/moving_frame.h"
 #include "support/impact_bodies.h"
 

@@ -8,10 +8,10 @@
 #include <random>
 #include <vector>
 
-#include "query/ball_triangle/cap.h"
 #include "query/ball_triangle/patch_sums.h"
-#include "query/exact/crossing.h"
-#include "query/shape/probe_sum.h"
+#include "query/exact/orientation.h"
+#include "query/shape/patch_shapes.h"
+#include "query/shape/plain_shapes.h"
 #include "support/test_meshes.h"
 #include "support/turns.h"
 

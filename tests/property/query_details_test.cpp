@@ -7,7 +7,7 @@
 #include "query/asset/sphere_tree.h"
 #include "query/base/relative_pose.h"
 #include "query/kernel/lens.h"
-#include "query/kernel/look_kernel.h"
+#include "query/kernel/node_kernel.h"
 #include "query/lod/level_chain.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"

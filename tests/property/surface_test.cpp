@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "query/exact/crossing.h"
 #include "query/exact/nearest_points.h"
+#include "query/exact/orientation.h"
 #include "support/exact_pair.h"
 #include "support/float_traps.h"
 #include "support/random_assets.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "cuda/base/warp_team.h"
-#include "mesh/hierarchy/wide_rays.h"
+#include "mesh/hierarchy/wide_searches.h"
 
 namespace ist::gpu {
 namespace {

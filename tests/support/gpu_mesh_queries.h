@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "cuda/base/device_array.h"
-#include "mesh/hierarchy/wide_nearest.h"
+#include "mesh/hierarchy/wide_searches.h"
 
 // Many questions to a mesh at once, a warp each. All arrays are in device memory; answers come in
 // the order of the questions.

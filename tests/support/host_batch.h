@@ -7,7 +7,6 @@
 
 #include "cuda/query/batch_arrays.h"
 #include "cuda/query/exact_arrays.h"
-#include "cuda/query/exact_kept_arrays.h"
 #include "cuda/query/field_batch.h"
 #include "support/batch_pair.h"
 #include "support/host_solids.h"
@@ -54,7 +53,7 @@ class HostBatch {
   void run_exactly(const gpu::SolidPairs& asked, unsigned seed);
   void run_fields(const gpu::SolidPairs& asked, unsigned seed);
   gpu::TriangleWorkspace triangle_work();
-  /// The kernels of triangle_kernels.cu.
+  /// The kernels of field_kernels.cu.
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed);
 
   HostSolids solids_;

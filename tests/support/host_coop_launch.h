@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "base/team.h"
-#include "cuda/packing/banded/coop_launch.h"
+#include "cuda/packing/banded/banded_state.h"
 
 namespace ist::testing {
 
-/// A cooperative launch (cuda/packing/banded/coop_launch.h) of host threads, each a team of one.
+/// A cooperative launch (cuda/packing/banded/banded_state.h) of host threads, each a team of one.
 template <class Scratch_>
 class HostCoopLaunch {
  public:

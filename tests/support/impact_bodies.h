@@ -12,7 +12,6 @@
 #include <ist/pose_eigen.h>
 #include <ist/time_of_impact.h>
 
-#include "query/impact/convex_pair.h"
 #include "query/impact/impact_side.h"
 #include "support/baked.h"
 #include "support/random_assets.h"

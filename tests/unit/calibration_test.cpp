@@ -11,7 +11,7 @@
 #include <ist/bake.h>
 #include <ist/types.h>
 
-#include "base/roots.h"
+#include "base/elementary.h"
 #include "packing/calibrate/host_calibration.h"
 #include "support/on_host.h"
 #include "support/test_meshes.h"

@@ -13,7 +13,7 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
-#include "robots/covers/shared_count.h"
+#include "robots/covers/cover_search.h"
 #include "support/test_meshes.h"
 
 namespace ist::testing {

@@ -9,7 +9,7 @@
 #include "base/team.h"
 #include "cuda/query/detail_sums.h"
 #include "query/base/relative_pose.h"
-#include "query/kernel/look_kernel.h"
+#include "query/kernel/node_kernel.h"
 #include "support/detailed_pairs.h"
 #include "support/host_batch.h"
 #include "support/oracle_assets.h"

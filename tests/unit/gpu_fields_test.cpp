@@ -9,7 +9,7 @@
 #include <ist/types.h>
 
 #include "query/ball_triangle/disc.h"
-#include "query/base/turned_over.h"
+#include "query/base/relative_pose.h"
 
 #include "support/host_patches.h"
 #include "support/host_separations.h"

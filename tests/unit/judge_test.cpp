@@ -13,7 +13,7 @@
 #include <ist/solid.h>
 #include <ist/types.h>
 
-#include "base/angle.h"
+#include "base/elementary.h"
 #include "mesh/judge.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/outward_winding.h"

@@ -6,10 +6,10 @@
 #include "base/team.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/samples/samples.h"
-#include "packing/grids/grid_schedule.h"
 #include "packing/grids/host_grid.h"
 #include "packing/grids/local_winding.h"
 #include "packing/grids/nearest_primitive.h"
+#include "packing/grids/pack_grids.h"
 #include "support/test_meshes.h"
 
 namespace ist::packing {

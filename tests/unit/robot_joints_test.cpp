@@ -8,7 +8,6 @@
 
 #include <ist/types.h>
 
-#include "robots/description/group_states.h"
 #include "robots/description/kinematics.h"
 #include "robots/description/robot_model.h"
 #include "robots/description/self_collision.h"

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "bake/cluster/bounding_ball.h"
+#include "bake/cluster/ball_lanes.h"
 
 namespace ist {
 namespace {

@@ -11,8 +11,7 @@
 
 #include "base/team.h"
 #include "mesh/geometry/closest_point.h"
-#include "mesh/hierarchy/wide_nearest.h"
-#include "mesh/hierarchy/wide_rays.h"
+#include "mesh/hierarchy/wide_searches.h"
 #include "mesh/hierarchy/winding.h"
 #include "mesh/mesh_solid.h"
 #include "support/host_wide_tree.h"

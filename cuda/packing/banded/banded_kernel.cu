@@ -7,13 +7,12 @@
 #include "cuda/base/check.h"
 #include "cuda/base/warp_team.h"
 #include "cuda/packing/banded/banded_loop.h"
-#include "cuda/packing/banded/coop_launch.h"
 #include "packing/banded/wide_mesh_surface.h"
 
 namespace ist::gpu {
 namespace {
 
-/// A cooperative kernel as a launch (coop_launch.h): all its warps. Successive
+/// A cooperative kernel as a launch (banded_state.h): all its warps. Successive
 /// numbers stand in different blocks, so that little work spreads over many multiprocessors.
 template <class Scratch_>
 class WarpCoopLaunch {

@@ -1,8 +1,8 @@
 #include "cuda/packing/calibrate/on_gpu.h"
 
-#include "cuda/base/launch.h"
-#include "cuda/base/prefix_sum.h"
-#include "mesh/hierarchy/wide_nearest.h"
+#include "cuda/base/check.h"
+#include "cuda/base/device_array.h"
+#include "mesh/hierarchy/wide_searches.h"
 #include "packing/calibrate/power_relaxation.h"
 
 namespace ist::gpu {
@@ -12,7 +12,7 @@ constexpr unsigned kThreads = 128;
 /// A triangle over more lines than this is drawn by many threads.
 constexpr std::uint64_t kManyLines = 64;
 
-/// Where crossings go: counted, or written to each line's place.
+/// Takes crossings: counts them, or writes each to its line's place.
 struct CrossingSink {
   std::uint32_t* counts;  ///< of each line; counted down again while writing
   const std::uint32_t* first;
@@ -173,8 +173,8 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
   const auto draw_all = [&](Crossing* crossings) {
     const CrossingSink sink = {counts.data(), first.data(), crossings};
     large_count.fill_bytes(0);
-    draw_triangles<<<blocks_for(slots, kThreads), kThreads, 0, stream>>>(
-        mesh, lines, sink, large.data(), large_count.data());
+    launch("drawing the mesh onto columns", draw_triangles, blocks_for(slots, kThreads), kThreads,
+           stream, mesh, lines, sink, large.data(), large_count.data());
     draw_large<<<dim3(64, 16), kThreads, 0, stream>>>(mesh, lines, sink, large.data(),
                                                       large_count.data());
     check_launch("drawing the mesh onto columns");
@@ -189,12 +189,11 @@ void ColumnsOnGpu::cut(Queue& queue, const WideTree& mesh, const LineLattice& li
   first_ = DeviceArray<std::uint32_t>(queue, line_count + 1);
   first_.fill_bytes(0);
   spans_ = DeviceArray<ColumnSpan>(queue, crossing_count / 2 + 1);
-  count_spans<<<blocks_for(line_count, kThreads), kThreads, 0, stream>>>(
-      crossings.data(), first.data(), line_count, first_.data(), length.data());
+  launch("cutting columns", count_spans, blocks_for(line_count, kThreads), kThreads, stream,
+         crossings.data(), first.data(), line_count, first_.data(), length.data());
   exclusive_sum(queue, first_);
-  write_spans<<<blocks_for(line_count, kThreads), kThreads, 0, stream>>>(
-      crossings.data(), first.data(), line_count, first_.data(), spans_.data());
-  check_launch("cutting columns");
+  launch("cutting columns", write_spans, blocks_for(line_count, kThreads), kThreads, stream,
+         crossings.data(), first.data(), line_count, first_.data(), spans_.data());
   length_ = static_cast<double>(length.at(0)) * kLengthUnit;
 }
 
@@ -205,15 +204,14 @@ void ColumnsOnGpu::flag(Queue& queue) {
     flags_.back().fill_bytes(0);
     if (level == kFlagLevel) {
       const std::uint64_t line_count = grid_.columns.lines();
-      flag_spans<<<blocks_for(line_count, kThreads), kThreads, 0, queue.stream()>>>(
-          grid_, line_count, flags_.back().data());
+      launch("flagging cells of columns", flag_spans, blocks_for(line_count, kThreads), kThreads,
+             queue.stream(), grid_, line_count, flags_.back().data());
     } else {
-      flag_level<<<blocks_for(cells, kThreads), kThreads, 0, queue.stream()>>>(
-          grid_, level, flags_.back().data());
+      launch("flagging cells of columns", flag_level, blocks_for(cells, kThreads), kThreads,
+             queue.stream(), grid_, level, flags_.back().data());
     }
     grid_.flags[level] = flags_.back().data();
   }
-  check_launch("flagging cells of columns");
 }
 
 }  // namespace ist::gpu

@@ -1,10 +1,10 @@
-#include "cuda/packing/calibrate/on_gpu.h"
-
 #include "cuda/base/atomics.h"
+#include "cuda/base/check.h"
 #include "cuda/base/device_array.h"
-#include "cuda/base/launch.h"
 #include "cuda/base/warp_team.h"
-#include "mesh/hierarchy/wide_rays.h"
+#include "cuda/packing/calibrate/on_gpu.h"
+#include "mesh/hierarchy/wide_searches.h"
+#include "packing/calibrate/protrusion.h"
 #include "packing/cover/cover_cells.h"
 
 namespace ist::gpu {
@@ -117,6 +117,20 @@ struct FrontierArrays {
   }
 };
 
+/// Finds the largest protrusion of balls, a warp a ball.
+__global__ void __launch_bounds__(kThreads)
+    find_protrusion(WideTree tree, const Sphere* balls, std::uint32_t count,
+                    unsigned long long* largest) {
+  const std::uint32_t k = blockIdx.x * kWarps + threadIdx.x / 32;
+  if (k >= count) return;
+  const WarpTeam team;
+  const double centre[3] = {balls[k].x, balls[k].y, balls[k].z};
+  const double distance = exact_nearest(team, tree, centre, kAnywhere).distance;
+  const double out = protrusion_of(balls[k].r, distance, inside(team, tree, centre));
+  if (team.lane() == 0 && out > 0)  // positive doubles order as their bits
+    atomicMax(largest, static_cast<unsigned long long>(__double_as_longlong(out)));
+}
+
 }  // namespace
 
 std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverTask& task,
@@ -126,8 +140,8 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
   const unsigned all_blocks = kBlocksEach * static_cast<unsigned>(queue.multiprocessors());
   DeviceArray<CoverBall> balls(queue, count);
   balls.upload(task.balls);
-  clear_balls<<<blocks_for(count, kWarps), kThreads, 0, stream>>>(mesh, balls.data(), count,
-                                                                  task.slack);
+  launch("cover radii", clear_balls, blocks_for(count, kWarps), kThreads, stream, mesh,
+         balls.data(), count, task.slack);
   DeviceArray<double> extension(queue, count), raised(queue, count);
   extension.fill_bytes(0);
   raised.fill_bytes(0);
@@ -139,8 +153,8 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
   DeviceArray<Counters> counters(queue, 1);
   CoverCell first{task.middle[0], task.middle[1], task.middle[2], 0, count, false};
   from.cells.upload({&first, 1});
-  list_all<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(from.lists.data(), count);
-  check_launch("cover radii");
+  launch("cover radii", list_all, blocks_for(count, kThreads), kThreads, stream, from.lists.data(),
+         count);
 
   CoverLevel level;
   level.half = task.half;
@@ -154,11 +168,9 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
     Counters seen{};
     for (;;) {
       counters.fill_bytes(0);
-      divide<<<all_blocks, kThreads, 0, stream>>>(
-          mesh, level, from.view(), cells, to.view(), scratch.data(),
-          static_cast<std::uint32_t>(scratch.size()),
-          reinterpret_cast<unsigned long long*>(raised.data()), counters.data());
-      check_launch("cover radii");
+      launch("cover radii", divide, all_blocks, kThreads, stream, mesh, level, from.view(), cells,
+             to.view(), scratch.data(), static_cast<std::uint32_t>(scratch.size()),
+             reinterpret_cast<unsigned long long*>(raised.data()), counters.data());
       counters.download({&seen, 1});
       queue.wait();
       // If a capacity was too small, enlarges it and repeats the level; violations that were noted
@@ -182,6 +194,18 @@ std::vector<double> cover_radii(Queue& queue, const WideTree& mesh, const CoverT
   queue.wait();
   for (std::size_t k = 0; k < radii.size(); ++k) radii[k] = cleared[k].radius + radii[k];
   return radii;
+}
+
+double largest_protrusion(Queue& queue, const WideTree& mesh, std::span<const Sphere> balls) {
+  const auto count = static_cast<std::uint32_t>(balls.size());
+  DeviceArray<Sphere> on_device(queue, count);
+  on_device.upload(balls);
+  DeviceArray<double> largest(queue, 1);
+  largest.fill_bytes(0);
+  launch("measuring protrusions", find_protrusion, blocks_for(count, kWarps), kThreads,
+         queue.stream(), mesh, on_device.data(), count,
+         reinterpret_cast<unsigned long long*>(largest.data()));
+  return largest.at(0);
 }
 
 }  // namespace ist::gpu

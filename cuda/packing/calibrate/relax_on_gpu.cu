@@ -1,8 +1,7 @@
 #include "cuda/packing/calibrate/on_gpu.h"
 
 #include "cuda/base/atomics.h"
-#include "cuda/base/launch.h"
-#include "cuda/base/warp_reduce.h"
+#include "cuda/base/check.h"
 #include "cuda/base/warp_team.h"
 #include "packing/calibrate/power_relaxation.h"
 
@@ -283,10 +282,10 @@ class Relaxation {
     while (!fits());
     const unsigned blocks = blocks_for(count_, kThreads);
     total_.fill_bytes(0);
-    sum_lengths<<<blocks, kThreads, 0, queue_.stream()>>>(sums_.data(), count_, total_.data());
-    relax_all<<<blocks, kThreads, 0, queue_.stream()>>>(sites_.data(), sums_.data(), shares_.data(),
-                                                        count_, total_.data(), volume);
-    check_launch("relaxing power cells");
+    launch("relaxing power cells", sum_lengths, blocks, kThreads, queue_.stream(), sums_.data(),
+           count_, total_.data());
+    launch("relaxing power cells", relax_all, blocks, kThreads, queue_.stream(), sites_.data(),
+           sums_.data(), shares_.data(), count_, total_.data(), volume);
   }
 
   RelaxedSites result() {
@@ -314,19 +313,21 @@ class Relaxation {
     const PowerRound round = view();
     const cudaStream_t stream = queue_.stream();
     const unsigned blocks = kBlocksEach * static_cast<unsigned>(queue_.multiprocessors());
-    start_round<<<blocks_for(count_, kThreads), kThreads, 0, stream>>>(round, count_);
+    launch("cutting power cells", start_round, blocks_for(count_, kThreads), kThreads, stream,
+           round, count_);
     unsigned most = 1;  // cells of the level
     for (int level = grid_.levels - 1; level >= 0; --level) {
       const int above = grid_.levels - 1 - level;
       if (above < kLongLevels)
-        look_into_blocks<kLongThreads><<<most, kLongThreads, 0, stream>>>(round, level);
+        launch("cutting power cells", look_into_blocks<kLongThreads>, most, kLongThreads, stream,
+               round, level);
       else if (above < kBlockLevels)
-        look_into_blocks<kThreads><<<most, kThreads, 0, stream>>>(round, level);
+        launch("cutting power cells", look_into_blocks<kThreads>, most, kThreads, stream, round,
+               level);
       else
-        look_into_cells<<<blocks, kThreads, 0, stream>>>(round, level);
+        launch("cutting power cells", look_into_cells, blocks, kThreads, stream, round, level);
       most = least(8 * most, blocks);
     }
-    check_launch("cutting power cells");
   }
 
   /// Whether the last cut fitted; if not, enlarges the buffers.

@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <span>
 
-#include "cuda/base/launch.h"
-#include "cuda/base/prefix_sum.h"
-#include "cuda/packing/grids/grid_triangles.h"
+#include "cuda/base/check.h"
+#include "cuda/base/device_array.h"
 #include "packing/grids/cell_listing.h"
-#include "packing/grids/discrete_distance.h"
+#include "packing/grids/distance_grid.h"
 
 namespace ist::gpu {
 namespace {
@@ -234,8 +233,8 @@ void DeviceGrid::build(const GridLayout& layout) {
   cover(0);
 
   DeviceArray<std::uint32_t> slots(*queue_, std::size_t{cells} + 1);
-  flag_active_cells<<<blocks_for(std::size_t{cells} + 1, kThreads), kThreads, 0, stream>>>(
-      words_.data(), cells, slots.data());
+  launch("listing cells", flag_active_cells, blocks_for(std::size_t{cells} + 1, kThreads), kThreads,
+         stream, words_.data(), cells, slots.data());
   exclusive_sum(*queue_, slots);
   exclusive_sum(*queue_, counts);
   const std::uint32_t active = slots.at(cells), listed = counts.at(cells);
@@ -244,8 +243,8 @@ void DeviceGrid::build(const GridLayout& layout) {
   active_ = active;
   records_ = DeviceArray<CellRecord>(*queue_, active);
   triangle_lists_ = DeviceArray<std::uint32_t>(*queue_, listed);
-  make_records<<<blocks_for(cells, kThreads), kThreads, 0, stream>>>(
-      cells, slots.data(), counts.data(), windings.data(), words_.data(), records_.data());
+  launch("listing cells", make_records, blocks_for(cells, kThreads), kThreads, stream, cells,
+         slots.data(), counts.data(), windings.data(), words_.data(), records_.data());
   slots.release();
   fill_triangle_lists(*queue_, mesh, layout, triangle_count_, words_, records_, windings, large,
                       triangle_lists_);
@@ -270,11 +269,9 @@ void DeviceGrid::cover(std::size_t first_new) {
   if (sphere_count_ > first_new) {
     const auto most = static_cast<std::size_t>(64 * queue_->multiprocessors());
     const GridWords words = words_of(words_, keys_);
-    cover_cells<<<static_cast<unsigned>(std::min(most, sphere_count_ - first_new)), kThreads, 0,
-                  queue_->stream()>>>(
-        layout_, spheres_.data(), static_cast<std::uint32_t>(first_new),
-        static_cast<std::uint32_t>(sphere_count_), words, counter_.data());
-    check_launch("covering cells");
+    launch("covering cells", cover_cells, std::min(most, sphere_count_ - first_new), kThreads,
+           queue_->stream(), layout_, spheres_.data(), static_cast<std::uint32_t>(first_new),
+           static_cast<std::uint32_t>(sphere_count_), words, counter_.data());
   }
   listed_ = sphere_count_;
 }
@@ -286,13 +283,12 @@ void DeviceGrid::drop_inactive() {
   const cudaStream_t stream = queue_->stream();
   const GridWords words = words_of(words_, keys_);
   DeviceArray<std::uint32_t> places(*queue_, count + 1);
-  flag_active_records<<<blocks_for(count + 1, kThreads), kThreads, 0, stream>>>(
-      records_.data(), static_cast<std::uint32_t>(count), words, places.data());
+  launch("giving cells back", flag_active_records, blocks_for(count + 1, kThreads), kThreads,
+         stream, records_.data(), static_cast<std::uint32_t>(count), words, places.data());
   exclusive_sum(*queue_, places);
   DeviceArray<CellRecord> kept(*queue_, active_);
-  move_records<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
-      records_.data(), static_cast<std::uint32_t>(count), places.data(), words, kept.data());
-  check_launch("giving cells back");
+  launch("giving cells back", move_records, blocks_for(count, kThreads), kThreads, stream,
+         records_.data(), static_cast<std::uint32_t>(count), places.data(), words, kept.data());
   records_ = std::move(kept);
   hash_words();
 }
@@ -304,10 +300,9 @@ void DeviceGrid::hash_words() {
   words_ = DeviceArray<std::uint32_t>(*queue_, size);
   keys_.fill_bytes(0xFF);
   words_.fill_bytes(0xFF);
-  hash_records<<<blocks_for(records_.size(), kThreads), kThreads, 0, queue_->stream()>>>(
-      records_.data(), static_cast<std::uint32_t>(records_.size()), keys_.data(), words_.data(),
-      static_cast<std::uint32_t>(size - 1));
-  check_launch("hashing cells");
+  launch("hashing cells", hash_records, blocks_for(records_.size(), kThreads), kThreads,
+         queue_->stream(), records_.data(), static_cast<std::uint32_t>(records_.size()),
+         keys_.data(), words_.data(), static_cast<std::uint32_t>(size - 1));
 }
 
 void DeviceGrid::list_spheres() {
@@ -319,20 +314,20 @@ void DeviceGrid::list_spheres() {
   const auto list = [&](std::uint32_t* lists) {
     if (spheres == 0) return;
     const auto most = static_cast<unsigned>(64 * queue_->multiprocessors());
-    list_spheres_of<<<std::min(most, spheres), kThreads, 0, stream>>>(
-        layout_, spheres_.data(), spheres, words, records_.data(), lists);
-    check_launch("listing spheres");
+    launch("listing spheres", list_spheres_of, std::min(most, spheres), kThreads, stream, layout_,
+           spheres_.data(), spheres, words, records_.data(), lists);
   };
-  clear_sphere_counts<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count);
+  launch("listing spheres", clear_sphere_counts, blocks_for(count, kThreads), kThreads, stream,
+         records_.data(), count);
   list(nullptr);
   DeviceArray<std::uint32_t> begins(*queue_, std::size_t{count} + 1);
-  take_sphere_counts<<<blocks_for(std::size_t{count} + 1, kThreads), kThreads, 0, stream>>>(
-      records_.data(), count, begins.data());
+  launch("listing spheres", take_sphere_counts, blocks_for(std::size_t{count} + 1, kThreads),
+         kThreads, stream, records_.data(), count, begins.data());
   exclusive_sum(*queue_, begins);
   sphere_lists_.release();
   sphere_lists_ = DeviceArray<std::uint32_t>(*queue_, begins.at(count));
-  place_sphere_lists<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count,
-                                                                           begins.data());
+  launch("listing spheres", place_sphere_lists, blocks_for(count, kThreads), kThreads, stream,
+         records_.data(), count, begins.data());
   list(sphere_lists_.data());
 }
 
@@ -343,15 +338,14 @@ void DeviceGrid::measure_distances() {
   const GridWords words = words_of(words_, keys_);
   DeviceArray<std::uint8_t> field(*queue_, layout_.count());
   field.fill_bytes(packing::kInactiveCell);
-  start_field<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count, words,
-                                                                    field.data());
+  launch("measuring discrete distances", start_field, blocks_for(count, kThreads), kThreads, stream,
+         records_.data(), count, words, field.data());
   for (int axis = 0; axis < 3; ++axis)
-    sweep_field<<<blocks_for(static_cast<std::size_t>(packing::grid_lines(layout_, axis)),
-                             kThreads),
-                  kThreads, 0, stream>>>(layout_, axis, field.data());
-  take_field<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(records_.data(), count, words,
-                                                                   field.data());
-  check_launch("measuring discrete distances");
+    launch("measuring discrete distances", sweep_field,
+           blocks_for(static_cast<std::size_t>(packing::grid_lines(layout_, axis)), kThreads),
+           kThreads, stream, layout_, axis, field.data());
+  launch("measuring discrete distances", take_field, blocks_for(count, kThreads), kThreads, stream,
+         records_.data(), count, words, field.data());
 }
 
 }  // namespace ist::gpu

@@ -3,10 +3,10 @@
 #include <algorithm>
 
 #include "cuda/base/atomics.h"
-#include "cuda/base/launch.h"
+#include "cuda/base/check.h"
 #include "cuda/base/warp_team.h"
-#include "packing/grids/discrete_distance.h"
-#include "packing/grids/grid_certificate.h"
+#include "packing/grids/ascent.h"
+#include "packing/grids/distance_grid.h"
 #include "packing/grids/prototype_cells.h"
 
 namespace ist::gpu {
@@ -199,18 +199,17 @@ void DeviceRounds::place_prototypes(const packing::GridLayout& layout) {
   prototypes_ = layout;
   count_ = layout.count();
   cells_ = DeviceArray<std::uint32_t>(queue_, count_);
-  number_cells<<<blocks_for(count_, kThreads), kThreads, 0, queue_.stream()>>>(
-      cells_.data(), static_cast<std::uint32_t>(count_));
-  check_launch("placing prototypes");
+  launch("placing prototypes", number_cells, blocks_for(count_, kThreads), kThreads,
+         queue_.stream(), cells_.data(), static_cast<std::uint32_t>(count_));
 }
 
 void DeviceRounds::split_prototypes() {
   const GridLayout coarse = prototypes_;
   prototypes_ = packing::refined(coarse);
   DeviceArray<std::uint32_t> children(queue_, 8 * count_);
-  split_cells<<<blocks_for(8 * count_, kThreads), kThreads, 0, queue_.stream()>>>(
-      coarse, prototypes_, cells_.data(), static_cast<std::uint32_t>(count_), children.data());
-  check_launch("splitting prototype cells");
+  launch("splitting prototype cells", split_cells, blocks_for(8 * count_, kThreads), kThreads,
+         queue_.stream(), coarse, prototypes_, cells_.data(), static_cast<std::uint32_t>(count_),
+         children.data());
   cells_ = std::move(children);
   count_ *= 8;
 }
@@ -223,12 +222,13 @@ bool DeviceRounds::converge(const packing::AscentSettings& settings, const packi
   DeviceArray<std::uint32_t> kept(queue_, count_);
   const auto before = static_cast<std::uint32_t>(count_);
   if (scene.grid.layout.level > prototypes_.level + 1)
-    keep_active_cells<true><<<blocks_for(before, kWarps), kThreads, 0, stream>>>(
-        scene, prototypes_, cells_.data(), before, kept.data(), counters_.data() + kKept);
+    launch("looking for active cells", keep_active_cells<true>, blocks_for(before, kWarps),
+           kThreads, stream, scene, prototypes_, cells_.data(), before, kept.data(),
+           counters_.data() + kKept);
   else
-    keep_active_cells<false><<<blocks_for(before, kThreads), kThreads, 0, stream>>>(
-        scene, prototypes_, cells_.data(), before, kept.data(), counters_.data() + kKept);
-  check_launch("looking for active cells");
+    launch("looking for active cells", keep_active_cells<false>, blocks_for(before, kThreads),
+           kThreads, stream, scene, prototypes_, cells_.data(), before, kept.data(),
+           counters_.data() + kKept);
   count_ = counters_.at(kKept);
   if (8 * count_ < 7 * kept.size()) {
     cells_ = DeviceArray<std::uint32_t>(queue_, count_);
@@ -248,15 +248,14 @@ bool DeviceRounds::converge(const packing::AscentSettings& settings, const packi
           "starting a round");
     const auto last = static_cast<std::uint32_t>(end);
     if (count_ <= kMostBlocks) {
-      converge_by_blocks<<<static_cast<unsigned>(std::min(most, count_)), SearchBlock::kThreads, 0,
-                           stream>>>(scene, settings, cells_.data(), last, counters_.data() + kNext,
-                                     candidates_.data());
+      launch("letting prototypes converge", converge_by_blocks, std::min(most, count_),
+             SearchBlock::kThreads, stream, scene, settings, cells_.data(), last,
+             counters_.data() + kNext, candidates_.data());
     } else {
       const std::size_t blocks = std::min<std::size_t>(most, blocks_for(end - from, kWarps));
-      converge_prototypes<<<static_cast<unsigned>(blocks), kThreads, 0, stream>>>(
-          scene, settings, cells_.data(), last, counters_.data() + kNext, candidates_.data());
+      launch("letting prototypes converge", converge_prototypes, blocks, kThreads, stream, scene,
+             settings, cells_.data(), last, counters_.data() + kNext, candidates_.data());
     }
-    check_launch("letting prototypes converge");
     if (count_ > kChunk) queue_.wait();
     if (!go_on()) return false;
   }
@@ -281,26 +280,23 @@ std::vector<GridWinner> DeviceRounds::round(const packing::AscentSettings& setti
     DeviceArray<std::uint32_t> keys(queue_, size), values(queue_, size);
     keys.fill_bytes(0xFF);
     const auto mask = static_cast<std::uint32_t>(size - 1);
-    fill_table<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
-        cells_.data(), count, keys.data(), values.data(), mask);
-    select_ahead<<<blocks_for(count, kThreads), kThreads, 0, stream>>>(
-        prototypes_, CellTable{keys.data(), values.data(), mask}, candidates_.data(), count,
-        ahead.data(), counters_.data() + kAhead);
-    check_launch("selecting prototypes");
+    launch("selecting prototypes", fill_table, blocks_for(count, kThreads), kThreads, stream,
+           cells_.data(), count, keys.data(), values.data(), mask);
+    launch("selecting prototypes", select_ahead, blocks_for(count, kThreads), kThreads, stream,
+           prototypes_, CellTable{keys.data(), values.data(), mask}, candidates_.data(), count,
+           ahead.data(), counters_.data() + kAhead);
   }
   DeviceArray<std::uint32_t> winners(queue_, count_);
   const auto most = static_cast<std::size_t>(16 * queue_.multiprocessors());
-  select_winners<<<static_cast<unsigned>(std::min<std::size_t>(most, blocks_for(count, kWarps))),
-                   kThreads, 0, stream>>>(candidates_.data(), ahead.data(),
-                                          counters_.data() + kAhead, winners.data(),
-                                          counters_.data() + kWinners);
-  check_launch("selecting prototypes");
+  launch("selecting prototypes", select_winners,
+         std::min<std::size_t>(most, blocks_for(count, kWarps)), kThreads, stream,
+         candidates_.data(), ahead.data(), counters_.data() + kAhead, winners.data(),
+         counters_.data() + kWinners);
   const std::uint32_t found = counters_.at(kWinners);
   if (found == 0) return {};
   DeviceArray<GridWinner> certified(queue_, found);
-  certify<<<blocks_for(found, kWarps), kThreads, 0, stream>>>(
-      scene, candidates_.data(), winners.data(), found, certified.data());
-  check_launch("certifying spheres");
+  launch("certifying spheres", certify, blocks_for(found, kWarps), kThreads, stream, scene,
+         candidates_.data(), winners.data(), found, certified.data());
   return certified.to_host(found);
 }
 

@@ -1,6 +1,6 @@
-#include "cuda/packing/grids/grid_triangles.h"
+#include "cuda/packing/grids/device_grid.h"
 
-#include "cuda/base/launch.h"
+#include "cuda/base/check.h"
 #include "packing/grids/local_winding.h"
 
 namespace ist::gpu {
@@ -138,11 +138,10 @@ void act_on_all(Queue& queue, const GridScene& mesh, const GridLayout& layout, s
                 const Act& act, DeviceArray<std::uint32_t>& large) {
   DeviceArray<std::uint32_t> large_count(queue, 1);
   large_count.fill_bytes(0);
-  act_on_small_triangles<<<blocks_for(count, kWarps), kThreads, 0, queue.stream()>>>(
-      mesh, layout, count, act, large.data(), large_count.data());
-  act_on_large_triangles<<<static_cast<unsigned>(4 * queue.multiprocessors()), kThreads, 0,
-                           queue.stream()>>>(mesh, layout, act, large.data(), large_count.data());
-  check_launch("listing triangles");
+  launch("listing triangles", act_on_small_triangles<Act>, blocks_for(count, kWarps), kThreads,
+         queue.stream(), mesh, layout, count, act, large.data(), large_count.data());
+  launch("listing triangles", act_on_large_triangles<Act>, 4 * queue.multiprocessors(), kThreads,
+         queue.stream(), mesh, layout, act, large.data(), large_count.data());
 }
 
 }  // namespace
@@ -150,10 +149,9 @@ void act_on_all(Queue& queue, const GridScene& mesh, const GridLayout& layout, s
 void prepare_triangles(Queue& queue, const DeviceArray<double>& vertices,
                        const DeviceArray<std::uint32_t>& corners,
                        DeviceArray<packing::GridTriangle>& triangles) {
-  make_triangles<<<blocks_for(triangles.size(), kThreads), kThreads, 0, queue.stream()>>>(
-      vertices.data(), corners.data(), static_cast<std::uint32_t>(triangles.size()),
-      triangles.data());
-  check_launch("preparing the triangles");
+  launch("preparing the triangles", make_triangles, blocks_for(triangles.size(), kThreads),
+         kThreads, queue.stream(), vertices.data(), corners.data(),
+         static_cast<std::uint32_t>(triangles.size()), triangles.data());
 }
 
 void count_triangles(Queue& queue, const GridScene& mesh, const GridLayout& layout,
@@ -167,9 +165,8 @@ void count_triangles(Queue& queue, const GridScene& mesh, const GridLayout& layo
 void classify_rows(Queue& queue, const GridLayout& layout, const DeviceArray<std::uint32_t>& counts,
                    DeviceArray<std::int32_t>& windings, DeviceArray<std::uint32_t>& words) {
   const auto rows = static_cast<std::size_t>(layout.n[1]) * static_cast<std::size_t>(layout.n[2]);
-  classify_row_of_warp<<<blocks_for(rows, kWarps), kThreads, 0, queue.stream()>>>(
-      layout, counts.data(), windings.data(), words.data());
-  check_launch("classifying cells");
+  launch("classifying cells", classify_row_of_warp, blocks_for(rows, kWarps), kThreads,
+         queue.stream(), layout, counts.data(), windings.data(), words.data());
 }
 
 void fill_triangle_lists(Queue& queue, const GridScene& mesh, const GridLayout& layout,

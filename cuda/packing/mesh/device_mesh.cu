@@ -1,9 +1,8 @@
 #include "cuda/packing/mesh/device_mesh.h"
 
-#include "cuda/base/launch.h"
+#include "cuda/base/check.h"
 #include "cuda/base/pageable_upload.h"
 #include "cuda/base/warp_team.h"
-#include "cuda/packing/mesh/triangle_order.h"
 #include "mesh/hierarchy/wide_build.h"
 
 namespace ist::gpu {
@@ -119,16 +118,17 @@ DeviceMesh::DeviceMesh(Queue& queue, const MeshView& mesh) {
   std::uint32_t node_count = blocks_for(block_count, kWideWidth);
   nodes_ = DeviceArray<WideNode>(queue, first_wide_node(depth - 1) + node_count);
   oriented_ = DeviceArray<WideOriented>(queue, node_count);
-  fill_blocks<<<blocks_for(std::size_t{node_count} * kWideWidth, kWarps), kThreads, 0, stream>>>(
-      vertices_.data(), triangles.data(), order.data(), count, blocks_.data(), block_count,
-      nodes_.data(), oriented_.data(), tree_.first_leaf);
+  launch("building the mesh's hierarchy", fill_blocks,
+         blocks_for(std::size_t{node_count} * kWideWidth, kWarps), kThreads, stream,
+         vertices_.data(), triangles.data(), order.data(), count, blocks_.data(), block_count,
+         nodes_.data(), oriented_.data(), tree_.first_leaf);
   for (int level = depth - 1; level > 0; --level) {
     const std::uint32_t parents = blocks_for(node_count, kWideWidth);
-    join_boxes<<<blocks_for(std::size_t{parents} * kWideWidth, kWarps), kThreads, 0, stream>>>(
-        nodes_.data(), first_wide_node(level), node_count);
+    launch("building the mesh's hierarchy", join_boxes,
+           blocks_for(std::size_t{parents} * kWideWidth, kWarps), kThreads, stream, nodes_.data(),
+           first_wide_node(level), node_count);
     node_count = parents;
   }
-  check_launch("building the mesh's hierarchy");
   tree_.vertices = vertices_.data();
   tree_.blocks = blocks_.data();
   tree_.nodes = nodes_.data();

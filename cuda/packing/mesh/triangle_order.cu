@@ -1,4 +1,4 @@
-#include "cuda/packing/mesh/triangle_order.h"
+#include "cuda/packing/mesh/device_mesh.h"
 
 // Parts of a power of two of triangles begin at multiples of it, so that a place in the order tells
 // its part. The triangles of one last node are cut in halves in shared memory; larger parts, by
@@ -10,7 +10,7 @@
 #include <bit>
 #include <utility>
 
-#include "cuda/base/launch.h"
+#include "cuda/base/check.h"
 #include "cuda/base/warp_team.h"
 #include "mesh/hierarchy/wide_build.h"
 
@@ -78,7 +78,7 @@ struct Extent {
     return axis;
   }
 
-  /// Where a coordinate lies between the sides, in 0 … most.
+  /// The place of a coordinate between the sides, in 0 … most.
   __device__ std::uint32_t place(float x, int axis, std::uint32_t most) const {
     const float side = upper(axis) - lower(axis);
     const float cells = static_cast<float>(most);
@@ -201,8 +201,8 @@ DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
   const cudaStream_t stream = queue.stream();
   DeviceArray<float> middles(queue, 3 * std::size_t{count});
   DeviceArray<std::uint32_t> order(queue, count), keys(queue, count);
-  find_middles<<<blocks, kThreads, 0, stream>>>(vertices, triangles, count, middles.data(),
-                                                order.data());
+  launch("ordering the triangles", find_middles, blocks, kThreads, stream, vertices, triangles,
+         count, middles.data(), order.data());
 
   // Sorts the parts of `whole` triangles; cut in parts of `size`, if there is more than one.
   const auto cut = [&](std::uint32_t whole, std::uint32_t size) {
@@ -212,10 +212,10 @@ DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
     const int place_bits = std::min(kPlaceBits, 32 - part_bits);
     DeviceArray<Extent> extents(queue, parts);
     extents.fill_bytes(0xFF);
-    find_extents<<<blocks, kThreads, 0, stream>>>(middles.data(), order.data(), count, whole,
-                                                  extents.data());
-    place_in_parts<<<blocks, kThreads, 0, stream>>>(middles.data(), order.data(), count, whole,
-                                                    extents.data(), place_bits, keys.data());
+    launch("ordering the triangles", find_extents, blocks, kThreads, stream, middles.data(),
+           order.data(), count, whole, extents.data());
+    launch("ordering the triangles", place_in_parts, blocks, kThreads, stream, middles.data(),
+           order.data(), count, whole, extents.data(), place_bits, keys.data());
     sort_pairs(queue, keys, order, part_bits + place_bits);
   };
   constexpr std::uint32_t kMost = 1u << 30;  // triangles
@@ -224,8 +224,8 @@ DeviceArray<std::uint32_t> order_triangles(Queue& queue, const double* vertices,
     cut(whole / 4, whole / 16);
     cut(whole / 16, whole / 32);
   }
-  cut_into_blocks<<<blocks, kThreads, 0, stream>>>(middles.data(), count, order.data());
-  check_launch("ordering the triangles");
+  launch("ordering the triangles", cut_into_blocks, blocks, kThreads, stream, middles.data(), count,
+         order.data());
   return order;
 }
 

@@ -1,4 +1,4 @@
-#include "bake/cluster/bounding_ball.h"
+#include "bake/cluster/ball_lanes.h"
 
 #include <ist/asset_layout.h>
 

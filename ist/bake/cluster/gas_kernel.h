@@ -3,7 +3,6 @@
 #include <ist/asset_layout.h>
 
 #include "bake/cluster/ball_lanes.h"
-#include "bake/cluster/bounding_ball.h"
 
 namespace ist {
 

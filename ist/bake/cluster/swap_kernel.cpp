@@ -1,4 +1,5 @@
 #include "bake/cluster/gas_kernel.h"
+#include "base/bits.h"
 
 #include <limits>
 
@@ -89,8 +90,7 @@ class JoinCosts {
       return;
     }
     fill(group.ball, added, reach, of_ball_);
-    for (std::uint32_t left = group.touching; left != 0; left &= left - 1) {
-      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+    for (const std::uint32_t i : set_bits(group.touching)) {
       fill(group.without[i], added, reach, of_touching_[i]);
     }
   }
@@ -104,8 +104,7 @@ class JoinCosts {
   LaneValues column(std::size_t joining) const {
     LaneValues costs;
     costs.fill(of_ball_[joining]);
-    for (std::uint32_t left = group_.touching; left != 0; left &= left - 1) {
-      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+    for (const std::uint32_t i : set_bits(group_.touching)) {
       costs[i] = of_touching_[i][joining];
     }
     return costs;
@@ -150,8 +149,7 @@ class SwapSearch {
     bool found = false;
     std::uint32_t fitted = 0;  // the members of b that have their fit into a
     std::array<Fit, kWidth> into_a;
-    for (std::uint32_t rest = free_a; rest != 0; rest &= rest - 1) {
-      const auto s = static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(rest));
+    for (const std::uint32_t s : set_bits(free_a)) {
       const std::uint32_t hopeful =
           gaining(into_a_at_least.row(s), into_b_at_least.column(s)) & free_b;
       if (hopeful == 0) continue;
@@ -159,9 +157,7 @@ class SwapSearch {
       if (!gains(without_a, least_cost_b)) continue;
       const Ball from_a = a_.members.ball(s);
       const Fit into_b(b_.members, from_a);
-      for (std::uint32_t left = promising(without_a, into_b) & hopeful; left != 0;
-           left &= left - 1) {
-        const auto t = static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
+      for (const std::uint32_t t : set_bits(promising(without_a, into_b) & hopeful)) {
         const double least_b = cost(into_b.least_radius(b_, t));
         if (!gains(without_a, least_b)) continue;
         const Ball from_b = b_.members.ball(t);

@@ -7,9 +7,8 @@
 #include <numbers>
 #include <utility>
 
-#include "base/plain.h"
-#include "base/roots.h"
-#include "base/rounding.h"
+#include "base/elementary.h"
+#include "base/vec3.h"
 
 namespace ist {
 namespace {

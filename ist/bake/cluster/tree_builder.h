@@ -1,7 +1,7 @@
 #pragma once
 
 #include "bake/asset/asset_writer.h"
-#include "bake/cluster/bounding_ball.h"
+#include "bake/cluster/ball_lanes.h"
 
 namespace ist {
 

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "bake/mesh/patches.h"
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/item_groups.h"
 #include "mesh/geometry/mesh_view.h"

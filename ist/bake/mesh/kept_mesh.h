@@ -1,9 +1,14 @@
 #pragma once
 
 #include <ist/asset.h>
+#include <algorithm>
+#include <array>
+#include <span>
+#include <vector>
 
 #include "bake/asset/asset_writer.h"
-#include "base/aside.h"
+#include "base/thread_arena.h"
+#include "mesh/geometry/mesh_view.h"
 #include "mesh/mesh_solid.h"
 #include "mesh/resolve/resolve.h"
 
@@ -29,5 +34,37 @@ struct SharedMesh : Aside<KeptMesh> {
           return wanted ? keep_mesh(solid, resolution) : KeptMesh();
         }) {}
 };
+
+/// A closed, oriented mesh over float vertices, unit frame.
+struct FloatMesh {
+  using Vertex = std::array<float, 3>;
+  using Triangle = std::array<std::uint32_t, 3>;  ///< counter-clockwise seen from outside
+
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;
+};
+
+FloatMesh in_floats(const MeshView& mesh);
+
+/// Triangles that go into one block: at most kWidth, of at most kWidth vertices.
+struct BlockPatch {
+  std::vector<std::uint32_t> triangles;
+  std::vector<std::uint32_t> vertices;  ///< theirs, each once
+
+  std::uint8_t place_of(std::uint32_t vertex) const {
+    return static_cast<std::uint8_t>(std::find(vertices.begin(), vertices.end(), vertex) -
+                                     vertices.begin());
+  }
+};
+
+/// Cuts a mesh into patches that are full and compact: each grows from a triangle by neighbours
+/// that add few vertices and lie near its middle; what is left in small pieces goes together where
+/// it is near and shares a vertex. Every triangle is in one patch. Deterministic.
+std::vector<BlockPatch> cut_into_patches(const FloatMesh& mesh);
+
+/// An order of points in which neighbours are near each other: their box is halved across its
+/// longest side, again and again, so that every group of 16, 256, … from the start is compact. Ties
+/// go by index. The same for any number of threads.
+std::vector<std::uint32_t> spatial_order(std::span<const std::array<float, 3>> points);
 
 }  // namespace ist

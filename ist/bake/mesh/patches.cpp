@@ -1,4 +1,4 @@
-#include "bake/mesh/patches.h"
+#include "bake/mesh/kept_mesh.h"
 
 #include <ist/asset_layout.h>
 #include <tbb/parallel_invoke.h>

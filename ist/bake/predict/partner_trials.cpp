@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "bake/predict/trial_random.h"
+#include "bake/predict/trial_poses.h"
 #include "mesh/hierarchy/line_lattice.h"
 #include "query/ball_triangle/patch_sums.h"
 

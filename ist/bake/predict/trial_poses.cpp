@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "bake/predict/trial_random.h"
-
 namespace ist {
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include <ist/asset_layout.h>
 
-#include "base/plain.h"
+#include "base/vec3.h"
 #include "query/asset/node_ball.h"
 
 namespace ist {

@@ -2,9 +2,8 @@
 
 #include <cmath>
 
-#include "base/angle.h"
+#include "base/elementary.h"
 #include "base/host_device.h"
-#include "base/plain.h"
 #include "base/vec3.h"
 #include "query/asset/shared_constants.h"
 

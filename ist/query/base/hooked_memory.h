@@ -1,14 +1,32 @@
 #pragma once
 
+#include <ist/query.h>
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <new>
 #include <type_traits>
+#include <utility>
 
-#include <ist/query.h>
+#include "base/bits.h"
 
 namespace ist {
+
+/// A direct-mapped cache of placed blocks. Call forget() before the first use.
+template <class T, std::uint32_t kPlaces>
+struct PlacedCache {
+  std::uint32_t number[kPlaces];
+  T placed[kPlaces];
+
+  void forget() noexcept { std::fill_n(number, kPlaces, kNoIndex); }
+
+  /// The slot of block n, and whether it contains that block.
+  std::pair<T&, bool> find(std::uint32_t n) noexcept {
+    return {placed[n % kPlaces], std::exchange(number[n % kPlaces], n) == n};
+  }
+};
 
 /// Allocates by a caller's hooks, or by operator new without hooks. Throws std::bad_alloc.
 inline void* take_memory(const MemoryHooks& hooks, std::size_t bytes, std::size_t alignment) {

@@ -1,10 +1,10 @@
 #pragma once
 
+#include <ist/query.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <optional>
-
-#include <ist/query.h>
+#include <span>
 
 #include "query/base/pair_place.h"
 
@@ -49,5 +49,21 @@ std::optional<RelativePose> relative_pose(const PlacedAsset& a, const PlacedAsse
 /// The same for a shape A, whose unit frame is its own frame.
 std::optional<RelativePose> relative_pose(const Pose& a, double scale_a,
                                           const PlacedAsset& b) noexcept;
+
+/// Converts forces and torques on the solid at `moved` to those on the one at `other`.
+template <class Answer>
+void turn_over(const Pose& moved, const Pose& other, Answer& answer) noexcept {
+  const Vec3 arm = vec3(moved.t) - vec3(other.t);
+  answer.torque = vector(turned_over(arm, plain(answer.force), plain(answer.torque)));
+  answer.force = -answer.force;
+}
+
+inline void turn_over(const Pose& moved, const Pose& other,
+                      std::span<ContactPatch> patches) noexcept {
+  for (ContactPatch& patch : patches) {
+    patch.normal = -patch.normal;
+    turn_over(moved, other, patch);
+  }
+}
 
 }  // namespace ist

@@ -1,7 +1,8 @@
 #include "query/contact/contact_bins.h"
 
-#include <bit>
 #include <new>
+
+#include "base/bits.h"
 
 namespace ist {
 namespace {
@@ -10,8 +11,7 @@ namespace {
 template <class F>
 void for_each_bit(const std::uint64_t (&words)[ContactBins::kBins / 64], F f) {
   for (std::uint32_t w = 0; w < ContactBins::kBins / 64; ++w)
-    for (std::uint64_t left = words[w]; left != 0; left &= left - 1)
-      f(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+    for (const std::uint32_t i : set_bits(words[w])) f(64 * w + i);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
+#include "base/bits.h"
 #include "query/exact/crossing_search.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -125,17 +125,15 @@ class BlockSearch {
     // Unused lanes may intersect large boxes.
     std::uint32_t rows = meeting(boxes_a.low, boxes_a.high, all.low, all.high) &
                          ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
-    for (; rows != 0; rows &= rows - 1) {
-      const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+    for (const std::uint32_t i : set_bits(rows)) {
       const OneBox here(boxes_a.low, boxes_a.high, i, search_.reach);
       std::uint32_t columns = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
       if (columns == 0) continue;
       const OneBox there(a_in_b.low, a_in_b.high, i, room_b_);
       columns &= meeting(boxes_b.low, boxes_b.high, there.low, there.high);
       if (columns != 0) columns &= in_slabs(boxes_a, i, boxes_b, b_in_a);
-      for (; columns != 0; columns &= columns - 1)
-        push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b - 1,
-             kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(columns)));
+      for (const std::uint32_t k : set_bits(columns))
+        push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b - 1, kWidth * pair.b + k);
     }
   }
 
@@ -145,9 +143,8 @@ class BlockSearch {
     const OneBox all(b_in_a.all_low, b_in_a.all_high, search_.reach);
     std::uint32_t found = meeting(boxes.low, boxes.high, all.low, all.high) &
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
-    for (; found != 0; found &= found - 1)
-      push(pair.level_a - 1, kWidth * pair.a + static_cast<std::uint32_t>(std::countr_zero(found)),
-           pair.level_b, pair.b);
+    for (const std::uint32_t i : set_bits(found))
+      push(pair.level_a - 1, kWidth * pair.a + i, pair.level_b, pair.b);
   }
 
   void open_larger_b(const BoxPair& pair) {
@@ -156,9 +153,8 @@ class BlockSearch {
     const OneBox all(a_in_b.all_low, a_in_b.all_high, room_b_);
     std::uint32_t found = meeting(boxes.low, boxes.high, all.low, all.high) &
                           ((1u << used_lanes(b_, pair.level_b, pair.b)) - 1);
-    for (; found != 0; found &= found - 1)
-      push(pair.level_a, pair.a, pair.level_b - 1,
-           kWidth * pair.b + static_cast<std::uint32_t>(std::countr_zero(found)));
+    for (const std::uint32_t i : set_bits(found))
+      push(pair.level_a, pair.a, pair.level_b - 1, kWidth * pair.b + i);
   }
 
   /// True if a box intersects the box and the plane of one of a block's triangles. `half`: half of
@@ -202,8 +198,7 @@ class BlockSearch {
     std::uint32_t found = meeting(b_in_a.low, b_in_a.high, here.low, here.high);
     if (found == 0) return;
     const PlacedTriangles& block = placed_.triangles(false, pair.a);
-    for (; found != 0; found &= found - 1) {
-      const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
+    for (const std::uint32_t i : set_bits(found)) {
       float half[3][3];
       for (int side = 0; side < 3; ++side)
         for (int k = 0; k < 3; ++k)
@@ -222,8 +217,7 @@ class BlockSearch {
                           ((1u << used_lanes(a_, pair.level_a, pair.a)) - 1);
     if (found == 0) return;
     const PlacedTriangles& block = placed_.triangles(true, pair.b);
-    for (; found != 0; found &= found - 1) {
-      const auto i = static_cast<std::uint32_t>(std::countr_zero(found));
+    for (const std::uint32_t i : set_bits(found)) {
       float half[3][3] = {};
       for (int k = 0; k < 3; ++k) half[k][k] = 0.5f * (boxes.high[k][i] - boxes.low[k][i]);
       if (meets_triangle(block, OneBox(boxes.low, boxes.high, i, search_.reach), half))

@@ -1,17 +1,17 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 
 #include <ist/query.h>
 
+#include "base/bits.h"
 #include "query/base/relative_pose.h"
 #include "query/exact/box_integrals.h"
 #include "query/exact/crossing_search.h"
 #include "query/exact/exact_scratch.h"
+#include "query/exact/exact_sums.h"
 #include "query/exact/mesh_tree.h"
-#include "query/exact/slot_sums.h"
 
 namespace ist {
 
@@ -85,8 +85,7 @@ class ExactQuery {
   static void for_each_block(const HookedArray<std::uint64_t>& bits, std::uint32_t blocks,
                              const Visit& visit) {
     for (std::uint32_t w = 0; w < (blocks + 63) / 64; ++w)
-      for (std::uint64_t left = bits[w]; left != 0; left &= left - 1)
-        visit(64 * w + static_cast<std::uint32_t>(std::countr_zero(left)));
+      for (const std::uint32_t i : set_bits(bits[w])) visit(64 * w + i);
   }
 
   /// Calls visit(level, box block, lane) for the blocks below box block i of a level that are

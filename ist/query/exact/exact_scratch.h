@@ -8,10 +8,9 @@
 #include <ist/asset_layout.h>
 
 #include "query/base/hooked_memory.h"
-#include "query/base/placed_cache.h"
-#include "query/exact/crossing.h"
 #include "query/exact/exact_sums.h"
 #include "query/exact/kept_pairs.h"
+#include "query/exact/orientation.h"
 
 namespace ist {
 

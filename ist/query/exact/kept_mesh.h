@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cmath>
-
 #include <ist/asset_layout.h>
 #include <ist/query.h>
 

@@ -12,9 +12,9 @@
 
 #include "base/bits.h"
 #include "query/exact/box_gaps-inl.h"
-#include "query/exact/crossing.h"
 #include "query/exact/mesh_gap.h"
 #include "query/exact/mesh_queries.h"
+#include "query/exact/orientation.h"
 #include "query/exact/placed_mesh-inl.h"
 #include "query/exact/triangle_gaps-inl.h"
 
@@ -237,8 +237,7 @@ class MeshGapSearch {
     left &= (1u << std::min(kWidth, mesh.level[level - 1].count - kWidth * number)) - 1;
     const std::uint32_t first = size_;
     const BlockFaces* const beside = left != 0 ? triangles_beside(pair, open_a) : nullptr;
-    for (; left != 0; left &= left - 1) {
-      const auto l = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t l : set_bits(left)) {
       double gap = unit * double{squared[l]};
       if (gap > squared_limit_) continue;
       if (beside != nullptr)
@@ -322,15 +321,13 @@ class MeshGapSearch {
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
     const auto take = [&](std::uint32_t i, std::uint32_t lanes) {
-      for (; lanes != 0; lanes &= lanes - 1)
-        add(kWidth * number_a + i, of_a,
-            kWidth * number_b + static_cast<std::uint32_t>(std::countr_zero(lanes)), of_b);
+      for (const std::uint32_t k : set_bits(lanes))
+        add(kWidth * number_a + i, of_a, kWidth * number_b + k, of_b);
     };
     const WayAxes axes = axes_between(number_a, number_b);
     if (!single_) {
       const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
-      for (std::uint32_t left = a.near(b, squared_limit_) & all_a; left != 0; left &= left - 1) {
-        const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
+      for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a)) {
         take(i, b.near(a, i, squared_limit_) & all_b);
       }
       return known;
@@ -339,8 +336,7 @@ class MeshGapSearch {
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
     TriangleCulls culls(a, b, axes, static_cast<float>(blur_));
     float least = HUGE_VALF;
-    for (std::uint32_t left = culls.rows(limit_) & all_a; left != 0; left &= left - 1) {
-      const auto i = static_cast<std::uint32_t>(std::countr_zero(left));
+    for (const std::uint32_t i : set_bits(culls.rows(limit_) & all_a)) {
       take(i, culls.lanes(i, nearest_limit_, limit_, least) & all_b);
     }
     return std::max(known, std::sqrt(double{least}));

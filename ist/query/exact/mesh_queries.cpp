@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "base/team.h"
-#include "query/exact/crossing.h"
 #include "query/exact/nearest_points.h"
+#include "query/exact/orientation.h"
 
 namespace ist {
 namespace {

@@ -1,14 +1,93 @@
 #pragma once
 
-#include <cmath>
+#include <cstdint>
 
-#include "query/base/smooth_step.h"
+#include "base/elementary.h"
 #include "query/exact/exact_sums.h"
 #include "query/exact/overlap_formulas.h"
 
-// Joins the octants of a part that belong together, on the host and on a GPU.
+// Cuts triangles by the planes between the octants of a part, and joins octants that belong
+// together, on the host and on a GPU.
 
 namespace ist::octants {
+
+/// A point relative to a part's centroid, along the axes of the octants.
+struct Corner {
+  double at[3];
+  int octant;
+
+  IST_HD exact::Point point() const noexcept { return {at[0], at[1], at[2]}; }
+};
+
+/// The point where an edge crosses a plane, taken on the side of `from`.
+IST_HD inline Corner between(const Corner& from, const Corner& to, int plane) noexcept {
+  const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
+  Corner out = {{0, 0, 0}, from.octant};
+  for (int k = 0; k < 3; ++k) {
+    if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
+    // If both ends are on one side of a plane, so is the point, whatever rounding does.
+    const int bit = 1 << k;
+    if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
+      out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
+  }
+  return out;
+}
+
+/// A triangle that a plane cuts into three pieces.
+struct Cut {
+  int bit, alone;  ///< the corner that is alone on its side
+  const Corner &lone, &next, &other;
+  Corner to_next[2], to_other[2];  ///< where the plane cuts, on the side of `lone` and beyond
+
+  IST_HD Cut(const Corner& p, const Corner& q, const Corner& r, int plane) noexcept
+      : bit(1 << plane),
+        alone(((q.octant ^ r.octant) & bit) == 0   ? 0
+              : ((p.octant ^ r.octant) & bit) == 0 ? 1
+                                                   : 2),
+        lone(alone == 0   ? p
+             : alone == 1 ? q
+                          : r),
+        next(alone == 0   ? q
+             : alone == 1 ? r
+                          : p),
+        other(alone == 0   ? r
+              : alone == 1 ? p
+                           : q) {
+    to_next[0] = to_next[1] = between(lone, next, plane);
+    to_other[0] = to_other[1] = between(lone, other, plane);
+    to_next[1].octant ^= bit;
+    to_other[1].octant ^= bit;
+  }
+  IST_HD const Corner& corner(int piece, int k) const noexcept {
+    if (k == 0) return piece == 0 ? lone : to_next[1];
+    if (k == 1) return piece == 0 ? to_next[0] : piece == 1 ? next : other;
+    return piece == 0 ? to_other[0] : piece == 1 ? other : to_other[1];
+  }
+};
+IST_HD inline bool are_alike(const Corner& p, const Corner& q, const Corner& r, int bits) noexcept {
+  return (((p.octant ^ q.octant) | (p.octant ^ r.octant)) & bits) == 0;
+}
+IST_HD inline exact::OctantTerms terms_of(bool of_b, double times, const Corner& p, const Corner& q,
+                                          const Corner& r) noexcept {
+  return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(), r.point());
+}
+
+/// Cuts a triangle down to a piece, whose number has a digit from 0 to 2 for each plane, the
+/// first plane's in front. False if there is no such piece.
+IST_HD_COLD bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
+  std::uint32_t digits = number, unit = CutPieces::kMost / 3;
+  for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
+    const auto piece = static_cast<int>(digits / unit);
+    if (are_alike(at[0], at[1], at[2], 1 << plane)) {
+      if (piece != 0) return false;  // the first is all of it
+      continue;
+    }
+    const Cut cut(at[0], at[1], at[2], plane);
+    const Corner kept[3] = {cut.corner(piece, 0), cut.corner(piece, 1), cut.corner(piece, 2)};
+    for (int k = 0; k < 3; ++k) at[k] = kept[k];
+  }
+  return true;
+}
 
 /// Relative to a part's sums: an octant with less is left to the others.
 inline constexpr double kRounding = 1e-9;

@@ -1,23 +1,44 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 
 #include "base/bits.h"
+#include "base/host_device.h"
 #include "query/exact/exact_sums.h"
-#include "query/exact/heap_sort.h"
 #include "query/exact/mesh_tree.h"
 
 // Joins what is connected in an overlap, on the host and on a GPU.
 
 namespace ist {
 
+/// Sorts on the host and on a GPU, in place.
+template <class T, class Less>
+IST_HD void heap_sort(T* items, std::uint32_t count, const Less& less) {
+  const auto sink = [&](std::uint32_t at, std::uint32_t end) {
+    const T item = items[at];
+    for (std::uint32_t child = 2 * at + 1; child < end; child = 2 * at + 1) {
+      if (child + 1 < end && less(items[child], items[child + 1])) ++child;
+      if (!less(item, items[child])) break;
+      items[at] = items[child];
+      at = child;
+    }
+    items[at] = item;
+  };
+  for (std::uint32_t k = count / 2; k > 0; --k) sink(k - 1, count);
+  for (std::uint32_t end = count; end > 1; --end) {
+    const T last = items[end - 1];
+    items[end - 1] = items[0];
+    items[0] = last;
+    sink(0, end - 1);
+  }
+}
+
 /// The number of bits of a triangle's name, so that eight times a pair's name fits into 64.
 inline constexpr int kTriangleBits = 28;
 
 template <class Visit>
 IST_HD void for_each_bit(std::uint64_t bits, const Visit& visit) {
-  for (; bits != 0; bits &= bits - 1) visit(static_cast<std::uint32_t>(lowest_bit(bits)));
+  for (const std::uint32_t i : set_bits(bits)) visit(i);
 }
 
 /// The least power of two that is at least n.

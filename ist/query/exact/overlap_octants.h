@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "query/base/smooth_step.h"
+#include "base/elementary.h"
 #include "query/exact/exact_sums.h"
 #include "query/exact/octant_joins.h"
 #include "query/exact/overlap_formulas.h"
@@ -26,6 +26,8 @@ template <class Overlap>
 class OverlapOctants : public OverlapParts<Overlap> {
   using Parts = OverlapParts<Overlap>;
   using Point = exact::Point;
+  using Corner = octants::Corner;
+  using Cut = octants::Cut;
 
  public:
   using Parts::Parts;
@@ -58,14 +60,6 @@ class OverlapOctants : public OverlapParts<Overlap> {
   using Parts::mesh;
   using Parts::pieces;
   using Parts::width;
-
-  /// A point relative to a part's centroid, along the axes of the octants.
-  struct Corner {
-    double at[3];
-    int octant;
-
-    IST_HD Point point() const noexcept { return {at[0], at[1], at[2]}; }
-  };
 
   /// Selects the parts to divide. False if there are none.
   IST_HD bool begin_octants(std::uint32_t parts, double least) noexcept {
@@ -102,61 +96,6 @@ class OverlapOctants : public OverlapParts<Overlap> {
 
   IST_HD Point in_axes(const Point& x) const noexcept {
     return {dot(axis_[0], x), dot(axis_[1], x), dot(axis_[2], x)};
-  }
-
-  /// The point where an edge crosses a plane, taken on the side of `from`.
-  IST_HD static Corner between(const Corner& from, const Corner& to, int plane) noexcept {
-    const double t = from.at[plane] / (from.at[plane] - to.at[plane]);
-    Corner out = {{0, 0, 0}, from.octant};
-    for (int k = 0; k < 3; ++k) {
-      if (k != plane) out.at[k] = from.at[k] + t * (to.at[k] - from.at[k]);
-      // If both ends are on one side of a plane, so is the point, whatever rounding does.
-      const int bit = 1 << k;
-      if (k > plane && ((from.octant ^ to.octant) & bit) != 0)
-        out.octant = (out.octant & ~bit) | (out.at[k] >= 0 ? bit : 0);
-    }
-    return out;
-  }
-
-  /// A triangle that a plane cuts into three pieces.
-  struct Cut {
-    int bit, alone;  ///< the corner that is alone on its side
-    const Corner &lone, &next, &other;
-    Corner to_next[2], to_other[2];  ///< where the plane cuts, on the side of `lone` and beyond
-
-    IST_HD Cut(const Corner& p, const Corner& q, const Corner& r, int plane) noexcept
-        : bit(1 << plane),
-          alone(((q.octant ^ r.octant) & bit) == 0   ? 0
-                : ((p.octant ^ r.octant) & bit) == 0 ? 1
-                                                     : 2),
-          lone(alone == 0   ? p
-               : alone == 1 ? q
-                            : r),
-          next(alone == 0   ? q
-               : alone == 1 ? r
-                            : p),
-          other(alone == 0   ? r
-                : alone == 1 ? p
-                             : q) {
-      to_next[0] = to_next[1] = between(lone, next, plane);
-      to_other[0] = to_other[1] = between(lone, other, plane);
-      to_next[1].octant ^= bit;
-      to_other[1].octant ^= bit;
-    }
-    IST_HD const Corner& corner(int piece, int k) const noexcept {
-      if (k == 0) return piece == 0 ? lone : to_next[1];
-      if (k == 1) return piece == 0 ? to_next[0] : piece == 1 ? next : other;
-      return piece == 0 ? to_other[0] : piece == 1 ? other : to_other[1];
-    }
-  };
-  IST_HD static bool are_alike(const Corner& p, const Corner& q, const Corner& r,
-                               int bits) noexcept {
-    return (((p.octant ^ q.octant) | (p.octant ^ r.octant)) & bits) == 0;
-  }
-  IST_HD static exact::OctantTerms terms_of(bool of_b, double times, const Corner& p,
-                                            const Corner& q, const Corner& r) noexcept {
-    return exact::octant_terms(0.5 * times, (of_b ? 0.5 : -0.5) / 3, p.point(), q.point(),
-                               r.point());
   }
 
   /// Adds a triangle piece by piece. No plane before `kPlane` cuts it.
@@ -200,23 +139,6 @@ class OverlapOctants : public OverlapParts<Overlap> {
                             [&](std::uint32_t k) { return cut.term[p][k]; });
     meet();
   }
-  /// Cuts a triangle down to a piece, whose number has a digit from 0 to 2 for each plane, the
-  /// first plane's in front. False if there is no such piece.
-  IST_HD_COLD static bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
-    std::uint32_t digits = number, unit = CutPieces::kMost / 3;
-    for (int plane = 0; plane < 3; ++plane, digits %= unit, unit /= 3) {
-      const auto piece = static_cast<int>(digits / unit);
-      if (are_alike(at[0], at[1], at[2], 1 << plane)) {
-        if (piece != 0) return false;  // the first is all of it
-        continue;
-      }
-      const Cut cut(at[0], at[1], at[2], plane);
-      const Corner kept[3] = {cut.corner(piece, 0), cut.corner(piece, 1), cut.corner(piece, 2)};
-      for (int k = 0; k < 3; ++k) at[k] = kept[k];
-    }
-    return true;
-  }
-
   /// Sets lane l of the view to the part of an element, or to none if it is kNoIndex. False if
   /// that part is not divided.
   IST_HD bool look(std::uint32_t l, std::uint32_t element) noexcept {

@@ -7,7 +7,6 @@
 #define IST_QUERY_PAIR_SIGNS_INL_H_
 #endif
 
-#include <bit>
 #include <cmath>
 
 #include "query/exact/crossing_search.h"

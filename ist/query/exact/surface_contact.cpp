@@ -1,3 +1,4 @@
+#include "base/bits.h"
 #include "query/exact/crossing_search.h"
 
 #include <bit>
@@ -59,8 +60,7 @@ class ContactSearch : PairSigns {
           Meeting& both = meet(number_a, number_b);
           lanes = both.flush(i, lanes);
           if (lanes != 0) lanes = both.within_edges(i, lanes, edges_);
-          for (; lanes != 0; lanes &= lanes - 1) {
-            const auto j = static_cast<std::uint32_t>(std::countr_zero(lanes));
+          for (const std::uint32_t j : set_bits(lanes)) {
             gather(kWidth * number_a + i, both.vertices(0), kWidth * number_b + j,
                    both.vertices(1));
             if (pairs.count == 8) add_areas();
@@ -108,9 +108,7 @@ class ContactSearch : PairSigns {
       if (!is_near(a, b)) continue;
       const PlacedTriangles &of_a = placed_.triangles(false, a), &of_b = placed_.triangles(true, b);
       const OneBox all(of_b.all_low, of_b.all_high, search_.near);
-      for (std::uint32_t rows = meeting(of_a.low, of_a.high, all.low, all.high); rows != 0;
-           rows &= rows - 1) {
-        const auto i = static_cast<std::uint32_t>(std::countr_zero(rows));
+      for (const std::uint32_t i : set_bits(meeting(of_a.low, of_a.high, all.low, all.high))) {
         const OneBox box(of_a.low, of_a.high, i, search_.near);
         const std::uint32_t lanes = meeting(of_b.low, of_b.high, box.low, box.high);
         if (lanes != 0 && visit(a, i, b, lanes)) return;

@@ -64,4 +64,52 @@ class ImpactSide {
 /// True if a part of B lies inside A's mesh without an intersection of their surfaces.
 bool contains_part(const MeshTree& a, const ImpactSide& b, const Similarity& a_from_b) noexcept;
 
+/// The nearest points of two pieces, up to rounding; valid if they do not cross.
+struct NearestPoints {
+  Eigen::Vector3d a = Eigen::Vector3d::Zero(), b = Eigen::Vector3d::Zero();
+  double distance = 0;
+};
+NearestPoints nearest_points(const ConvexPiece& a, const ConvexPiece& b) noexcept;
+
+/// The point of a piece that is nearest to x.
+Eigen::Vector3d nearest_in_piece(const ConvexPiece& piece, const Eigen::Vector3d& x) noexcept;
+
+/// True if an edge of one triangle passes through the other.
+bool triangles_cross(const ConvexPiece& a, const ConvexPiece& b) noexcept;
+
+/// The gap between two pieces along a direction, from A to B. For a unit vector it is a lower bound
+/// on their distance.
+double apart_along(const Eigen::Vector3d& n, const ConvexPiece& a, const ConvexPiece& b) noexcept;
+
+/// The shortest displacement between two convex sets, from A to B, by differences of their points
+/// (Gilbert, Johnson and Keerthi 1988).
+class GjkDistance {
+ public:
+  /// Adds the difference of a point of B and one of A. False if it does not reduce the distance.
+  bool add(const Eigen::Vector3d& difference, const Eigen::Vector3d& of_b) noexcept;
+
+  const Eigen::Vector3d& shortest() const noexcept { return shortest_; }
+  /// The point of B at its end.
+  const Eigen::Vector3d& point() const noexcept { return point_; }
+
+ private:
+  int count_ = 0;  ///< differences kept; `shortest_` is the nearest point of their hull
+  Eigen::Vector3d difference_[4], of_b_[4];
+  Eigen::Vector3d shortest_ = Eigen::Vector3d::Zero(), point_ = Eigen::Vector3d::Zero();
+};
+
+/// The point of a hull that is furthest along a direction.
+Eigen::Vector3d furthest(const PointHull& hull, const Eigen::Vector3d& n) noexcept;
+
+/// A plane between two hulls, which are `apart` along its normal if that is positive.
+struct HullPlane {
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< unit, from A to B
+  double apart = 0;
+};
+
+/// Searches for a plane that shows most of the distance, from a guess of the direction from A to B.
+/// Finds none if they are no further apart than `least`.
+HullPlane plane_between(const PointHull& a, const PointHull& b, const Eigen::Vector3d& guess,
+                        double least) noexcept;
+
 }  // namespace ist

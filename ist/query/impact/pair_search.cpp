@@ -3,8 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "query/impact/convex_pair.h"
-#include "query/impact/gjk.h"
+#include "query/impact/impact_side.h"
 
 namespace ist {
 

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "query/impact/impact_loop.h"
 #include "query/impact/impact_side.h"
+#include "query/impact/moving_frame.h"
 
 namespace ist {
 

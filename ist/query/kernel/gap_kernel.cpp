@@ -7,6 +7,7 @@
 #define HWY_TARGET_INCLUDE "query/kernel/gap_kernel.cpp"
 #include <hwy/foreach_target.h>
 
+#include "base/bits.h"
 #include "query/kernel/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -111,8 +112,7 @@ HWY_INLINE LeafGap leaf_gap_as(const GapSide& side, std::uint32_t block_x, std::
     V gap = hn::Set(d, hwy::HighestValue<T>());
     V cover = gap;
     V task = hn::Zero(d);
-    for (std::uint32_t left = tasks; left != 0; left &= left - 1) {
-      const std::size_t i = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+    for (const std::uint32_t i : set_bits(tasks)) {
       const V dx = xj - hn::Set(d, static_cast<T>(bx.x[i]));
       const V dy = yj - hn::Set(d, static_cast<T>(bx.y[i]));
       const V dz = zj - hn::Set(d, static_cast<T>(bx.z[i]));
@@ -149,8 +149,7 @@ HWY_INLINE void child_gaps_to(const GapSide& side, TreeNode x, TreeNode y, doubl
   Gaps<T> gaps;
   child_gaps_as<T>(side, x, y, gaps);
   out.near = nearer(gaps, rounded_up<T>(gap_limit), rounded_up<T>(cover_limit));
-  for (std::uint32_t left = out.near; left != 0; left &= left - 1) {
-    const std::size_t lane = hwy::Num0BitsBelowLS1Bit_Nonzero32(left);
+  for (const std::uint32_t lane : set_bits(out.near)) {
     out.gap[lane] = static_cast<double>(gaps.gap[lane]);
     out.cover[lane] = static_cast<double>(gaps.cover[lane]);
   }

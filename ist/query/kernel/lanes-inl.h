@@ -12,6 +12,7 @@
 #include <cstring>
 
 #include <ist/asset_layout.h>
+#include "base/bits.h"
 #include "query/kernel/compress_table.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -125,8 +126,7 @@ HWY_INLINE std::size_t append_lanes(LaneTag<T> d, M chosen, std::uint32_t first,
     return compress.count();
   } else {
     std::size_t count = 0;
-    for (std::uint32_t bits = mask_bits(d, chosen); bits != 0; bits &= bits - 1)
-      out[count++] = first + static_cast<std::uint32_t>(hwy::Num0BitsBelowLS1Bit_Nonzero32(bits));
+    for (const std::uint32_t i : set_bits(mask_bits(d, chosen))) out[count++] = first + i;
     return count;
   }
 }

@@ -1,4 +1,4 @@
-#include "query/kernel/look_kernel.h"
+#include "query/kernel/node_kernel.h"
 
 #include <numbers>
 

@@ -9,6 +9,28 @@
 
 namespace ist {
 
+/// A coarse estimate of the overlap of two trees, each a few balls that are evenly filled with the
+/// volume of the spheres below. Smooth in the pose. A's unit frame.
+struct QuickLook {
+  double volume = 0;
+  PoseSlope slope;
+};
+
+/// Uses the lowest levels of no more than 64 nodes. `slopes`: computes the derivatives, else 0.
+QuickLook quick_look(const SphereTree& a, const SphereTree& b, const Similarity& a_from_b,
+                     bool slopes) noexcept;
+
+/// Running sums over spheres, in their tree's unit frame, by lanes. Without factors of π.
+struct alignas(64) SubtreeSums {
+  double cubes[kWidth] = {};      ///< Σ r³
+  double moment[3][kWidth] = {};  ///< Σ r³ · centre
+  std::uint32_t spheres = 0;
+};
+
+/// Adds the spheres below n nodes of a level, in order. Same bits on every instruction set.
+void add_subtrees(const SphereTree& tree, int level, const std::uint32_t* nodes, std::size_t n,
+                  SubtreeSums& sums) noexcept;
+
 /// The largest number of pairs that are opened together.
 inline constexpr std::size_t kNodePairs = 64;
 

@@ -3,10 +3,10 @@
 #include <Eigen/Core>
 #include <numbers>
 
+#include "query/base/pair_place.h"
 #include "query/base/relative_pose.h"
-#include "query/base/world_sums.h"
 #include "query/kernel/leaf_kernel.h"
-#include "query/kernel/subtree_kernel.h"
+#include "query/kernel/node_kernel.h"
 
 namespace ist {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include <ist/asset_layout.h>
-#include "query/base/placed_cache.h"
+#include "query/base/hooked_memory.h"
 #include "query/base/precision.h"
 
 namespace ist {

@@ -6,8 +6,7 @@
 #include <utility>
 
 #include "query/base/solid_bounds.h"
-#include "query/kernel/look_kernel.h"
-#include "query/lod/coincident.h"
+#include "query/kernel/node_kernel.h"
 #include "query/lod/level_chain.h"
 #include "query/lod/unlike_sizes.h"
 #include "query/lod/wanted_error.h"
@@ -360,6 +359,21 @@ Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const Relat
       BlendSum{queries, chain, by_wanted, shares, coarse, smaller_volume(a, b)}.run();
   if (has_exact && answer.status == QueryStatus::budget_exhausted) bound_by_solids(a, b, answer);
   return queries.with_counts(answer);
+}
+
+LevelChain::LevelChain(const AssetHeader& a, const AssetHeader& b, double scale) noexcept {
+  plan(
+      a.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(a, i)); },
+      b.detail_count, [&](std::uint32_t i) { return LevelCost::of(matched_tree(b, i)); }, scale);
+}
+
+LevelChain::Weights LevelChain::weights(double coarse, double budget,
+                                        const Weights& wanted) const noexcept {
+  Weights weights = {};
+  share(
+      coarse, budget, [&](std::size_t i) { return wanted[i]; },
+      [&](std::size_t i, const LevelWeight& weight) { weights[i] = weight; });
+  return weights;
 }
 
 }  // namespace ist

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <utility>
 
+#include "base/elementary.h"
 #include "query/asset/sphere_tree.h"
 #include "query/base/no_answer.h"
-#include "query/base/smooth_step.h"
 #include "query/base/solid_bounds.h"
 #include "query/lod/wanted_error.h"
 #include "query/tree_overlap/descent.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "query/base/smooth_step.h"
+#include "base/elementary.h"
 #include "query/lod/unlike_sizes.h"
 
 namespace ist {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 #include <ist/query.h>
 
@@ -10,8 +9,8 @@
 #include "query/base/relative_pose.h"
 #include "query/contact/contact_bins.h"
 #include "query/kernel/leaf_kernel.h"
+#include "query/kernel/node_kernel.h"
 #include "query/kernel/overlap.h"
-#include "query/kernel/subtree_kernel.h"
 #include "query/scratch/workspace.h"
 
 namespace ist {

@@ -1,28 +1,160 @@
-#include "robots/covers/cover_descent.h"
+#include "robots/covers/cover_search.h"
 
+#include <ist/cover_spheres.h>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <unordered_set>
+#include <vector>
 
+#include "mesh/geometry/mesh_view.h"
 #include "robots/covers/cover_proof.h"
-#include "robots/covers/open_corners.h"
 #include "robots/covers/point_grid.h"
-#include "robots/covers/protrusion.h"
+#include "robots/covers/triangles.h"
 
 namespace ist {
 namespace {
+
+using Eigen::Vector3d;
+
+/// A place of the surface outside all balls.
+struct OpenCorner {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< unit frame
+  double gap = 0;                                   ///< unit frame, > 0: to the nearest ball
+};
+
+using Corners = std::array<Vector3d, 3>;
+using Polygon = std::vector<Vector3d>;
+
+template <class Points>
+bool holds(const CoverSphere& ball, const Points& points) {
+  const double within2 = ball.radius * ball.radius;
+  return std::all_of(points.begin(), points.end(),
+                     [&](const Vector3d& p) { return (p - ball.centre).squaredNorm() <= within2; });
+}
+
+class Cutter {
+ public:
+  /// Cuts triangles within a box.
+  Cutter(std::span<const CoverSphere> balls, const Eigen::AlignedBox3d& box) : balls_(balls) {
+    for (std::uint32_t i = 0; i < balls.size(); ++i)
+      if (box.squaredExteriorDistance(balls[i].centre) <= balls[i].radius * balls[i].radius)
+        touching_.push_back(i);
+  }
+
+  /// `holder`: tried first, and set to what contains the triangle whole.
+  void cut(const Corners& triangle, std::uint32_t& holder, std::vector<OpenCorner>& out) {
+    if (holder < balls_.size() && holds(balls_[holder], triangle)) return;
+    const Vector3d middle = (triangle[0] + triangle[1] + triangle[2]) / 3;
+    double reach2 = 0;
+    for (const Vector3d& corner : triangle)
+      reach2 = std::max(reach2, (corner - middle).squaredNorm());
+    const double reach = std::sqrt(reach2);
+    near_.clear();
+    for (const std::uint32_t i : touching_) {
+      const double d2 = (middle - balls_[i].centre).squaredNorm();
+      const double touching = balls_[i].radius + reach;
+      if (!(balls_[i].radius > 0) || d2 > touching * touching) continue;
+      if (d2 <= balls_[i].radius * balls_[i].radius && holds(balls_[i], triangle)) {
+        holder = i;
+        return;
+      }
+      near_.push_back(i);
+    }
+    if (near_.empty()) {
+      for (const Vector3d& corner : triangle) emit(corner, out);
+      return;
+    }
+    for (const std::uint32_t i : near_) {
+      piece_.assign(triangle.begin(), triangle.end());
+      if (!cut_to_cell(i)) continue;
+      for (const Vector3d& corner : piece_)
+        if ((corner - balls_[i].centre).squaredNorm() > balls_[i].radius * balls_[i].radius)
+          emit(corner, out);
+    }
+  }
+
+ private:
+  /// Clips the piece to the ball's cell; false if nothing is left, or the ball contains it.
+  bool cut_to_cell(std::uint32_t i) {
+    const CoverSphere& own = balls_[i];
+    const double own_power = own.centre.squaredNorm() - own.radius * own.radius;
+    for (const std::uint32_t j : near_) {
+      if (j == i) continue;
+      const CoverSphere& other = balls_[j];
+      const Vector3d across = 2 * (other.centre - own.centre);
+      const double bound = other.centre.squaredNorm() - other.radius * other.radius - own_power;
+      clipped_.clear();
+      double before = across.dot(piece_.back()) - bound;
+      for (std::size_t k = 0, last = piece_.size() - 1; k < piece_.size(); last = k++) {
+        const double here = across.dot(piece_[k]) - bound;
+        if ((before > 0) != (here > 0))
+          clipped_.push_back(piece_[last] + before / (before - here) * (piece_[k] - piece_[last]));
+        if (here <= 0) clipped_.push_back(piece_[k]);
+        before = here;
+      }
+      const bool cut = clipped_.size() != piece_.size();
+      piece_.swap(clipped_);
+      if (piece_.empty() || (cut && holds(own, piece_))) return false;
+    }
+    return !holds(own, piece_);
+  }
+
+  void emit(const Vector3d& place, std::vector<OpenCorner>& out) const {
+    double gap = std::numeric_limits<double>::infinity();
+    for (const CoverSphere& ball : balls_)
+      gap = std::min(gap, std::sqrt((place - ball.centre).squaredNorm()) - ball.radius);
+    if (gap > 0) out.push_back({place, gap});
+  }
+
+  const std::span<const CoverSphere> balls_;
+  std::vector<std::uint32_t> touching_, near_;  ///< balls that reach to the box, and to a triangle
+  Polygon piece_, clipped_;
+};
+
+/// Places of the surface outside the balls, unit frame; none where it is contained, but for
+/// rounding: this is for a search, open_surface() proves. Others may be further outside, between
+/// balls of unlike radii by a few times as far.
+///
+/// The balls' power diagram cuts each triangle into convex pieces, and of a piece the ball of its
+/// cell is that to which its points are nearest, by power. So the ball contains the piece if it
+/// contains its corners, and if it does not, no ball contains that corner.
+///
+/// `holders`: of each triangle a ball that may contain it whole, from an earlier call with balls
+/// that have moved little, or nothing; it takes those of this one.
+std::vector<OpenCorner> open_corners(const MeshView& mesh, std::span<const CoverSphere> balls,
+                                     std::vector<std::uint32_t>& holders) {
+  holders.resize(mesh.triangle_count, UINT32_MAX);
+  constexpr std::uint32_t kBlock = 32;  // triangles
+  const std::uint32_t blocks = (mesh.triangle_count + kBlock - 1) / kBlock;
+  std::vector<std::vector<OpenCorner>> found(blocks);
+  tbb::parallel_for(std::uint32_t{0}, blocks, [&](std::uint32_t block) {
+    const std::uint32_t end = std::min(mesh.triangle_count, (block + 1) * kBlock);
+    Eigen::AlignedBox3d box;
+    for (std::uint32_t t = block * kBlock; t < end; ++t)
+      for (const Vector3d& corner : triangle_corners(mesh, t)) box.extend(corner);
+    Cutter cutter(balls, box);
+    for (std::uint32_t t = block * kBlock; t < end; ++t)
+      cutter.cut(triangle_corners(mesh, t), holders[t], found[block]);
+  });
+  std::vector<OpenCorner> out;
+  for (const auto& corners : found) out.insert(out.end(), corners.begin(), corners.end());
+  return out;
+}
 
 /// A ball's centre, and by how much its farthest point is further than its nearest wall.
 struct Recentred {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double excess = 0;
 };
-
-using Eigen::Vector3d;
 
 struct Look {
   double farthest = 0, nearest = 0;
@@ -130,7 +262,7 @@ std::vector<CoverSphere> grown(std::vector<CoverSphere> balls, double by) {
 
 }  // namespace
 
-/// Where the balls are, and how far each may go at a time.
+/// The places of the balls, and how far each may go at a time.
 struct CoverDescent::Balls {
   Balls(const OffsetSurface& surface, std::vector<Vector3d> at)
       : centres(std::move(at)), trust(centres.size(), 0.5 * surface.level()) {

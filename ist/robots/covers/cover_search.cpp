@@ -9,11 +9,9 @@
 #include <utility>
 
 #include "base/hashing.h"
-#include "robots/covers/cover_descent.h"
 #include "robots/covers/cover_proof.h"
 #include "robots/covers/offset_surface.h"
 #include "robots/covers/point_grid.h"
-#include "robots/covers/protrusion.h"
 
 namespace ist {
 namespace {

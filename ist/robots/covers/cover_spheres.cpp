@@ -14,14 +14,11 @@
 #include <thread>
 #include <vector>
 
-#include "base/aside.h"
 #include "base/stage.h"
 #include "base/thread_arena.h"
 #include "mesh/mesh_solid.h"
 #include "robots/covers/cover_proof.h"
 #include "robots/covers/cover_search.h"
-#include "robots/covers/protrusion.h"
-#include "robots/covers/shared_count.h"
 
 namespace ist {
 namespace {

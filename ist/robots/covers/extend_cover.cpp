@@ -1,7 +1,6 @@
 #include <ist/cover_spheres.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <map>

@@ -1,4 +1,4 @@
-#include "robots/covers/protrusion.h"
+#include "robots/covers/cover_proof.h"
 
 #include <tbb/parallel_for.h>
 

@@ -1,4 +1,4 @@
-#include "robots/covers/sampled_solid.h"
+#include "robots/covers/offset_surface.h"
 
 #include <tbb/parallel_for.h>
 
@@ -119,8 +119,8 @@ EdgeSamples sample_edges(const MeshView& mesh, const std::vector<Face>& faces, d
   return out;
 }
 
-/// How far the ray's foot stays the surface's nearest point: a ball that touches the foot and
-/// contains no other point of the mesh in the end.
+/// The distance at which the ray's foot is still the surface's nearest point: a ball that touches
+/// the foot and contains no other point of the mesh in the end.
 double reach_of(const MeshSolid& solid, const Sample& sample) {
   double radius = kLongestRay;
   for (int step = 0; step < 12; ++step) {

@@ -1,4 +1,4 @@
-#include "robots/covers/shared_count.h"
+#include "robots/covers/cover_search.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,9 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "mesh/mesh_solid.h"
 
 namespace ist {

@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
-#include <span>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "robots/description/robot_model.h"
@@ -34,5 +36,18 @@ std::vector<std::size_t> path_to(const RobotModel& robot, std::size_t link);
 
 /// Free joints of grippers: hands of at most two.
 std::vector<std::size_t> gripper_joints(const RobotModel& robot);
+
+/// Poses that an SRDF names (`group_state`), in its order: joints that a state does not mention
+/// stand as in default_positions(). Joints that the robot lacks are passed over. Throws Error.
+std::vector<std::pair<std::string, Positions>> group_states(const RobotModel& robot,
+                                                            const std::string& srdf);
+
+/// The pairs that an SRDF tells planners to ignore (`disable_collisions`).
+struct DisabledCollisions {
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;  ///< of links, by index
+  std::set<std::string> lacking;  ///< links that it names and the robot lacks
+};
+/// Throws Error.
+DisabledCollisions disabled_collisions(const RobotModel& robot, const std::string& srdf);
 
 }  // namespace ist

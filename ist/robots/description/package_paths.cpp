@@ -1,7 +1,6 @@
 #include "robots/description/package_paths.h"
 
 #include <algorithm>
-#include <charconv>
 #include <system_error>
 #include <utility>
 
@@ -17,23 +16,6 @@ namespace fs = std::filesystem;
 bool is_file(const fs::path& path) {
   std::error_code none;
   return fs::exists(path, none) && !fs::is_directory(path, none);
-}
-
-/// With %XX as the byte that it stands for.
-std::string decoded(const std::string& name) {
-  std::string out;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    unsigned byte = 0;
-    const char* const end = name.data() + std::min(name.size(), i + 3);
-    if (name[i] == '%' && end - name.data() == static_cast<std::ptrdiff_t>(i + 3) &&
-        std::from_chars(name.data() + i + 1, end, byte, 16).ptr == end) {
-      out += static_cast<char>(byte);
-      i += 2;
-    } else {
-      out += name[i];
-    }
-  }
-  return out;
 }
 
 }  // namespace
@@ -52,7 +34,7 @@ PackagePaths::PackagePaths(const fs::path& urdf, std::map<std::string, std::stri
 }
 
 std::string PackagePaths::find(const std::string& name) const {
-  const std::string meant = decoded(name);
+  const std::string meant = percent_decoded(name);
   if (meant == name) return find_as_written(name);
   try {
     return find_as_written(name);

@@ -1,4 +1,4 @@
-#include "robots/description/read_mjcf.h"
+#include "robots/description/robot_model.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,6 @@
 #include <map>
 #include <numbers>
 #include <optional>
-#include <set>
 #include <utility>
 
 #include <ist/types.h>
@@ -420,15 +419,11 @@ class MjcfReader {
   }
 
   void read_equality(const Node& node) {
-    const auto joint_named = [&](const std::string& name) {
-      const auto found = std::find_if(robot_.joints.begin(), robot_.joints.end(),
-                                      [&](const RobotJoint& one) { return one.name == name; });
-      return static_cast<std::size_t>(found - robot_.joints.begin());
-    };
     for (const Node& child : node.children) {
       const Attributes& a = child.attributes;
       if (child.name != "joint" || !a.contains("joint2") || value(a, "active") == "false") continue;
-      const std::size_t one = joint_named(value(a, "joint1")), by = joint_named(a.at("joint2"));
+      const std::size_t one = index_named(robot_.joints, value(a, "joint1")),
+                        by = index_named(robot_.joints, a.at("joint2"));
       if (one == robot_.joints.size() || by == robot_.joints.size() || one == by ||
           !robot_.joints[one].is_free() || !robot_.joints[by].is_free())
         continue;

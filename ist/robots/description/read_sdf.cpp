@@ -1,4 +1,4 @@
-#include "robots/description/read_sdf.h"
+#include "robots/description/robot_model.h"
 
 #include <numbers>
 #include <tuple>

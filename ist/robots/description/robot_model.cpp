@@ -3,8 +3,6 @@
 #include <tuple>
 #include <utility>
 
-#include "robots/description/read_mjcf.h"
-#include "robots/description/read_sdf.h"
 #include "robots/description/robot_xml.h"
 
 namespace ist {

@@ -2,10 +2,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -69,7 +70,7 @@ struct RobotLink {
 
 inline constexpr std::size_t kNone = SIZE_MAX;  ///< no link or joint
 
-/// How a link stands in its parent's frame. Joints of several axes and slides without limits are
+/// The joint of a link and its parent. Joints of several axes and slides without limits are
 /// taken as fixed.
 struct RobotJoint {
   enum class Motion { fixed, turning, sliding };
@@ -101,6 +102,13 @@ struct RobotModel {
   std::vector<std::pair<std::size_t, std::size_t>> excluded;  ///< links that the file ignores
 };
 
+/// The index of the link or joint of that name; their number if there is none.
+template <class Item>
+std::size_t index_named(const std::vector<Item>& items, std::string_view name) {
+  const auto is_it = [&](const Item& one) { return one.name == name; };
+  return static_cast<std::size_t>(std::find_if(items.begin(), items.end(), is_it) - items.begin());
+}
+
 /// Reads a URDF, or an MJCF or SDF as read_mjcf() and read_sdf() do. Strict where a mistake would
 /// move or lose a shape: numbers must be finite, lengths above 0, joints must make one tree of the
 /// links. A faulty visual shape becomes a LinkFault. Other elements are ignored. Document types are
@@ -118,5 +126,24 @@ inline Eigen::Quaterniond turn_from_z(const Eigen::Vector3d& direction) {
   const double s = std::sqrt(2 * (1 + to.z()));
   return {s / 2, -to.y() / s, to.x() / s, 0};
 }
+
+/// Reads the one model of an SDF: links, joints with limits and mimicry, and shapes of meshes,
+/// boxes, cylinders, spheres and capsules.
+///
+/// A joint whose frame is not its child's gets a link without shapes there, JOINT_frame. A joint to
+/// the world makes a link `world`. Balls, screws and joints of two axes are taken as fixed; planes
+/// and height maps are passed over, and other shapes become a LinkFault. Nested and included
+/// models, and poses relative to frames other than links, are errors. Throws Error.
+RobotModel read_sdf(SourceFile file);
+
+/// Reads a robot of MuJoCo (MJCF): bodies, joints, geoms of primitives and meshes, defaults,
+/// includes, excluded pairs, and joint equalities of first order, which become mimicry.
+///
+/// The world is the first link. A body with several joints gets a link without shapes for each but
+/// the last. Free joints and slides without a range are taken as fixed, balls as three hinges.
+/// Geoms that collide with nothing (contype and conaffinity 0) are visual; planes and height fields
+/// are passed over. Meshes are taken as they are, where MuJoCo collides their convex hull. Geoms of
+/// other kinds become a LinkFault. Throws Error.
+RobotModel read_mjcf(SourceFile file);
 
 }  // namespace ist

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <random>
 
 namespace ist {
@@ -99,9 +98,7 @@ SelfCollisionStudy::SelfCollisionStudy(const RobotModel& robot, std::vector<std:
       wanted_(std::move(wanted)) {
   std::vector<std::size_t> links, compared(robot.links.size(), kNone);
   for (const std::string& name : names_) {
-    const auto at = std::find_if(robot.links.begin(), robot.links.end(),
-                                 [&](const RobotLink& link) { return link.name == name; });
-    links.push_back(static_cast<std::size_t>(at - robot.links.begin()));
+    links.push_back(index_named(robot.links, name));
     compared[links.back()] = links.size() - 1;
   }
   // For each link, the compared link that it moves with or hangs from: itself, or the nearest

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/angle.h"
+#include "base/elementary.h"
 #include "base/raw_array.h"
 #include "mesh/connectivity/edge_table.h"
 

@@ -5,15 +5,15 @@
 #include <tbb/parallel_sort.h>
 #include <algorithm>
 #include <atomic>
-#include <bit>
 #include <limits>
 
+#include "base/bits.h"
 #include "base/hashing.h"
 #include "base/raw_array.h"
 #include "mesh/connectivity/fan_slabs.h"
 #include "mesh/connectivity/surface_reduction.h"
 #include "mesh/connectivity/usable_mesh.h"
-#include "mesh/geometry/slenderness.h"
+#include "mesh/geometry/exact_triangle.h"
 
 namespace ist {
 namespace {
@@ -79,7 +79,7 @@ class TriangleBoxes {
       unsigned met = above[block].met_by(above[part / 8], part % 8);
       if (block == part / 8) met &= ~1u << part % 8;
       met &= wanted(start_ + 1, part, block);
-      for (; met != 0; met &= met - 1) between(start_, part, 8 * block + lowest(met), visit);
+      for (const std::uint32_t k : set_bits(met)) between(start_, part, 8 * block + k, visit);
     }
   }
 
@@ -90,10 +90,6 @@ class TriangleBoxes {
     return wanted_[level][node];
   }
 
-  static std::size_t lowest(unsigned bits) {
-    return static_cast<std::size_t>(std::countr_zero(bits));
-  }
-
   template <class Visit>
   void within(std::size_t level, std::size_t node, Visit& visit) const {
     if (!slabs_.empty() && slabs_[level][node].spread) return;
@@ -102,9 +98,8 @@ class TriangleBoxes {
     const std::size_t below = level == 0 ? order_.size() : levels_[level - 1].size();
     for (std::size_t k = 0; k < 8 && 8 * node + k < below; ++k) {
       if (level > 0) within(level - 1, 8 * node + k, visit);
-      for (unsigned met = boxes.met_by(boxes, k) & ~1u << k & wanted(level, 8 * node + k, node);
-           met != 0; met &= met - 1)
-        pair(level, 8 * node + k, 8 * node + lowest(met), visit);
+      const unsigned met = boxes.met_by(boxes, k) & ~1u << k & wanted(level, 8 * node + k, node);
+      for (const std::uint32_t l : set_bits(met)) pair(level, 8 * node + k, 8 * node + l, visit);
     }
   }
 
@@ -118,12 +113,10 @@ class TriangleBoxes {
       if (level == 0 && slices_[a].apart_from(slices_[b])) return;
     }
     const EightBoxes &of_a = levels_[level][a], &of_b = levels_[level][b];
-    unsigned near_b = of_a.met_by(levels_[level + 1][b / 8], b % 8);
-    for (; near_b != 0; near_b &= near_b - 1) {
-      const std::size_t child = 8 * a + lowest(near_b);
-      for (unsigned met = of_b.met_by(of_a, lowest(near_b)) & wanted(level, child, b); met != 0;
-           met &= met - 1)
-        pair(level, child, 8 * b + lowest(met), visit);
+    for (const std::uint32_t k : set_bits(of_a.met_by(levels_[level + 1][b / 8], b % 8))) {
+      const std::size_t child = 8 * a + k;
+      for (const std::uint32_t l : set_bits(of_b.met_by(of_a, k) & wanted(level, child, b)))
+        pair(level, child, 8 * b + l, visit);
     }
   }
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "mesh/geometry/closest_point.h"
 #include "mesh/geometry/triangle_frame.h"
 #include "mesh/hierarchy/bvh.h"

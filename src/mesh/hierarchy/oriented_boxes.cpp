@@ -2,7 +2,6 @@
 #include <vector>
 
 #include "mesh/geometry/exact_triangle.h"
-#include "mesh/geometry/slenderness.h"
 #include "mesh/hierarchy/bvh.h"
 #include "mesh/hierarchy/wide_build.h"
 

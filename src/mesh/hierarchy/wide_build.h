@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "mesh/geometry/exact_triangle.h"
 #include "mesh/hierarchy/wide_tree.h"
 

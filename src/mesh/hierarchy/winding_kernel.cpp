@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "base/angle.h"
+#include "base/elementary.h"
 #include "mesh/geometry/exact_triangle.h"
 
 #undef HWY_TARGET_INCLUDE

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -58,19 +57,6 @@ std::optional<std::string> decode_base64(std::string_view text) {
     bytes += static_cast<char>(bits >> held & 0xff);
   }
   return bytes;
-}
-
-/// "%20" and the like.
-std::string decode_percent(const std::string& uri) {
-  std::string text;
-  for (std::size_t i = 0; i < uri.size(); ++i) {
-    const bool escaped = uri[i] == '%' && i + 2 < uri.size() &&
-                         std::isxdigit(static_cast<unsigned char>(uri[i + 1])) &&
-                         std::isxdigit(static_cast<unsigned char>(uri[i + 2]));
-    text += escaped ? static_cast<char>(std::stoi(uri.substr(i + 1, 2), nullptr, 16)) : uri[i];
-    if (escaped) i += 2;
-  }
-  return text;
 }
 
 struct ComponentType {
@@ -204,7 +190,7 @@ std::string_view GltfDocument::external_buffer(const std::string& uri, const std
     if (!bytes) fail(name + " is a data URI that is not base64");
     return decoded_.emplace_back(std::move(*bytes));
   }
-  const std::filesystem::path relative = decode_percent(uri);
+  const std::filesystem::path relative = percent_decoded(uri);
   const bool leaves_folder =
       relative.is_absolute() || uri.find(':') != std::string::npos ||
       uri.find('\\') != std::string::npos || uri.find('\0') != std::string::npos ||

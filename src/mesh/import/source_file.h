@@ -36,4 +36,7 @@ std::string ending_of(const std::string& path);
 /// Words of a file as they may appear in a message: printable, short, in quotes.
 std::string in_quotes(std::string_view word);
 
+/// A URI with "%20" and the like replaced by the bytes that they stand for.
+std::string percent_decoded(const std::string& uri);
+
 }  // namespace ist

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "mesh/level_set/polygonise.h"
-#include "mesh/level_set/surface_cells.h"
 
 namespace ist {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/level_set/surface_cells.h"
+#include "mesh/level_set/polygonise.h"
 
 #include <ist/types.h>
 #include <tbb/parallel_for.h>

@@ -6,7 +6,6 @@
 
 #include "mesh/connectivity/disjoint_sets.h"
 #include "mesh/connectivity/surface_reduction.h"
-#include "mesh/resolve/planar_triangulation.h"
 
 namespace ist {
 namespace {

@@ -4,12 +4,77 @@
 #include <tbb/parallel_for.h>
 #include <atomic>
 #include <cstddef>
+#include <unordered_map>
 
-#include "base/aside.h"
+#include "base/thread_arena.h"
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/resolve/exact_points.h"
 
 namespace ist {
+
+/// A triangulation of points of a plane, seen against a coordinate axis, that contains given
+/// segments. Exact, whatever lies on one line.
+class PlanarTriangulation {
+ public:
+  /// `frame`: three points around all others. `inner`: the points, none twice.
+  PlanarTriangulation(const ExactPoints& points, int axis,
+                      const std::array<std::uint32_t, 3>& frame,
+                      const std::vector<std::uint32_t>& inner);
+
+  /// Makes a segment between two of the points part of it. Nothing else may lie on the segment or
+  /// cross it. The winding number of one of two kinds of curves, whichever `of` says, steps up by
+  /// `step` from its right to its left.
+  void insert(std::uint32_t from, std::uint32_t to, int step, std::size_t of);
+
+  /// Turns edges that are no segments where that makes triangles rounder.
+  void make_round();
+
+  struct Covered {
+    Triangle triangle;           ///< counter-clockwise
+    std::array<int, 2> winding;  ///< not both 0
+  };
+  /// Triangles about which either kind of segments winds.
+  std::vector<Covered> covered() const;
+
+ private:
+  struct Cell {
+    std::array<std::uint32_t, 3> corner;  ///< counter-clockwise
+    std::array<std::uint32_t, 3> beyond;  ///< the cell across from each corner
+  };
+  struct Place {
+    std::uint32_t cell, corner;
+  };
+
+  int turn(std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
+    return points_.turn(axis_, a, b, c);
+  }
+  bool is_frame(std::uint32_t p) const {
+    return p == frame_[0] || p == frame_[1] || p == frame_[2];
+  }
+  void insert_point(std::uint32_t p);
+  std::uint32_t cell_of(std::uint32_t p);
+  void flip(Place edge);
+  bool can_flip(Place edge) const;
+  bool is_sharp(Place edge) const;
+  Place place_of(std::uint32_t corner) const;
+  Place next_about(Place place) const;
+  Place edge_between(std::uint32_t a, std::uint32_t b) const;
+  void set(std::uint32_t cell, const Cell& value);
+  void hand_over(std::uint32_t cell, std::uint32_t from, std::uint32_t to);
+  static std::uint64_t key(std::uint32_t from, std::uint32_t to) {
+    return std::uint64_t{from} << 32 | to;
+  }
+  bool is_segment(Place edge) const;
+
+  const ExactPoints& points_;
+  int axis_;
+  std::array<std::uint32_t, 3> frame_;
+  std::vector<Cell> cells_;
+  std::unordered_map<std::uint32_t, std::uint32_t> cell_at_;  ///< [point]
+  /// Steps along segments, keyed by the smaller number.
+  std::unordered_map<std::uint64_t, std::array<int, 2>> steps_;
+  std::uint64_t random_ = 1;
+};
 
 /// Work that another thread watches and may end.
 class WatchedWork : public WorkStop {

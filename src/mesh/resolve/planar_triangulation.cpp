@@ -1,4 +1,4 @@
-#include "mesh/resolve/planar_triangulation.h"
+#include "mesh/resolve/arrangement.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,9 +1,8 @@
 #pragma once
 
+#include "base/elementary.h"
 #include "base/hashing.h"
-#include "base/roots.h"
 #include "packing/base/certificate.h"
-#include "packing/base/packing_limits.h"
 
 namespace ist::packing {
 

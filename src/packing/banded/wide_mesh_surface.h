@@ -1,7 +1,6 @@
 #pragma once
 
-#include "mesh/hierarchy/wide_nearest.h"
-#include "mesh/hierarchy/wide_rays.h"
+#include "mesh/hierarchy/wide_searches.h"
 #include "packing/banded/surface_triangle.h"
 
 namespace ist::packing {

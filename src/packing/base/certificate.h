@@ -2,11 +2,23 @@
 
 #include <ist/types.h>
 #include <cmath>
+#include <cstdint>
 
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "base/vec3.h"
 
 namespace ist::packing {
+
+/// Where a packing stops and what it is measured by; unit frame.
+struct PackingLimits {
+  double volume = 0;           ///< of the solid
+  double target_coverage = 1;  ///< of the volume
+  double min_radius = 0;
+  double epsilon = 0;             ///< 0 = automatic
+  std::uint64_t max_spheres = 0;  ///< 0 = no limit
+  std::uint64_t seed = 0;
+  double length_unit = 1;  ///< [u] of one unit-frame unit, for progress reports
+};
 
 /// Gap of a certified sphere to the surface and to others, unit frame (docs/design.md 3.2).
 constexpr double kClearance = 1e-12;

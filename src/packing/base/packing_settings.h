@@ -2,7 +2,7 @@
 
 #include <ist/bake.h>
 
-#include "packing/base/packing_limits.h"
+#include "packing/base/certificate.h"
 
 namespace ist::packing {
 

@@ -1,5 +1,7 @@
 #include "packing/calibrate/power_kernel.h"
 
+#include "base/bits.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "packing/calibrate/power_kernel.cpp"
 #include <hwy/foreach_target.h>
@@ -66,7 +68,7 @@ std::size_t keep_sites(const PowerBox& box, const SiteArrays& sites, std::size_t
     const auto wins = hn::LoadU(d, powers + i) - hn::Set(d, smallest) - swing < hn::Zero(d);
     std::uint32_t left = mask_bits(hn::And(wins, hn::FirstN(d, count - i)));
     if (best - i < lanes) left |= 1u << (best - i);
-    for (; left != 0; left &= left - 1) keep(i + hwy::Num0BitsBelowLS1Bit_Nonzero32(left));
+    for (const std::uint32_t k : set_bits(left)) keep(i + k);
   }
   return size;
 }

@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "base/roots.h"
+#include "base/elementary.h"
 #include "packing/backend/tasks.h"
 #include "packing/calibrate/power_grid.h"
 

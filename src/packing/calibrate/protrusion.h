@@ -1,6 +1,6 @@
 #pragma once
 
-#include "base/rounding.h"
+#include "base/elementary.h"
 
 namespace ist {
 

@@ -8,8 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-#include "base/roots.h"
-#include "base/rounding.h"
+#include "base/elementary.h"
 #include "base/stage.h"
 #include "mesh/geometry/closest_point.h"
 #include "mesh/geometry/exact_triangle.h"

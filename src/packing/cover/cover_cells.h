@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/elementary.h"
 #include "base/host_device.h"
-#include "base/rounding.h"
 #include "packing/backend/tasks.h"
 
 // The subdivision that proves cover radii (cover.h), cell by cell, for host and device. It goes

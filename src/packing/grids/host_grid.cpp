@@ -5,7 +5,7 @@
 #include <atomic>
 
 #include "base/thread_arena.h"
-#include "packing/grids/discrete_distance.h"
+#include "packing/grids/distance_grid.h"
 #include "packing/grids/local_winding.h"
 
 namespace ist::packing {
