@@ -8,29 +8,9 @@
 
 #include "mesh/connectivity/edge_table.h"
 #include "mesh/connectivity/item_groups.h"
+#include "mesh/geometry/triangle_strip.h"
 
 namespace ist {
-
-/// The strip of a plane along a triangle's edge from its lowest to its highest corner that contains
-/// the triangle: narrow where its box is wide, if it is a needle.
-struct TriangleStrip {
-  double at0, slope;   ///< the edge's x at y = 0, and how it grows with y
-  double left, right;  ///< the strip's sides along x, from the edge
-
-  /// Corners; their y are not all the same.
-  TriangleStrip(const std::array<double, 3>& x, const std::array<double, 3>& y) {
-    const auto [first, last] = std::minmax_element(y.begin(), y.end());
-    const auto low = static_cast<std::size_t>(first - y.begin()),
-               high = static_cast<std::size_t>(last - y.begin()), middle = 3 - low - high;
-    slope = (x[high] - x[low]) / (y[high] - y[low]);
-    at0 = x[low] - slope * y[low];
-    const double off = x[middle] - at(y[middle]);
-    left = std::min(off, 0.0);
-    right = std::max(off, 0.0);
-  }
-
-  double at(double y) const { return at0 + slope * y; }
-};
 
 /// Triangles by the cells of a grid that they may cover, seen along an axis.
 class TriangleColumns {

@@ -4,9 +4,9 @@
 
 #include "base/host_device.h"
 #include "mesh/connectivity/item_groups.h"
-#include "mesh/connectivity/triangle_columns.h"
 #include "mesh/geometry/mesh_view.h"
 #include "mesh/geometry/ray_crossing.h"
+#include "mesh/geometry/triangle_strip.h"
 
 namespace ist {
 

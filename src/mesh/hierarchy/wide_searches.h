@@ -8,13 +8,11 @@
 #include "mesh/geometry/ray_crossing.h"
 #include "mesh/hierarchy/wide_tree.h"
 
-// Distance queries of a WideTree, by a team (base/team.h), whose lanes all ask and get the same.
-// The answers are those of closest_point.h and exact_triangle.h, bit for bit.
+// Distances, winding numbers and line crossings of a WideTree, by a team (base/team.h), whose lanes
+// all ask and get the same. The answers are those of closest_point.h, exact_triangle.h and
+// winding.h, bit for bit.
 
 namespace ist {
-
-// Winding numbers and line crossings of a WideTree, by a team (base/team.h); the answers are
-// those of winding.h. All lanes ask the same and get the same.
 
 /// Closest triangle by the float formula.
 struct WideNearest {
