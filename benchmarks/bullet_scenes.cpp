@@ -108,7 +108,7 @@ void keep_faster(std::optional<Json>& best, const std::optional<Json>& other) {
 }
 
 std::string said(const std::optional<Json>& run, unsigned limit) {
-  if (!run) return "not done in " + std::to_string(limit) + " s";
+  if (!run) return "failed, or not done in " + std::to_string(limit) + " s";
   if (run->at("works")) return "yes";
   for (const Json& truth : run->at("truths")) {
     if (!truth.at("holds")) return "no: " + truth.at("what").get<std::string>();
