@@ -6,6 +6,7 @@
 #include "cuda/query/answers.h"
 #include "cuda/query/batch_steps.h"
 #include "cuda/query/exact_contact.h"
+#include "cuda/query/exact_crossings.h"
 #include "cuda/query/exact_insides.h"
 #include "cuda/query/exact_search.h"
 #include "query/exact/exact_sums.h"

@@ -45,7 +45,7 @@ constexpr std::uint32_t kGapEntryCapacity = 1 << 20;  ///< of separations, whose
 }  // namespace
 
 GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settings)
-    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
+    : impl_(new Impl) {
   gpu::check_gpu(settings.device);
   gpu::Queue queue(settings);
   std::vector<gpu::SolidRef> refs(solids.size());
@@ -196,8 +196,7 @@ std::size_t place(std::byte* from, GpuWorkspace::Impl& work) {
 
 }  // namespace
 
-GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
-    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
+GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings) : impl_(new Impl) {
   gpu::check_gpu(settings.device);
   if (most_pairs > 0xFFFFFFFFu) throw Error("GPU: a batch holds up to 2^32 - 1 pairs: divide it");
   gpu::Queue queue(settings);
@@ -227,7 +226,7 @@ struct GpuKept::Impl {
 };
 
 GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettings& settings)
-    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
+    : impl_(new Impl) {
   gpu::check_gpu(settings.device);
   if (most_pairs > 0xFFFFFFFFu || bytes_each < 1024 || bytes_each > 1 << 24)
     throw Error("GPU: what is kept is for up to 2^32 - 1 pairs, with 1,024 to 2^24 bytes each");

@@ -15,7 +15,7 @@ struct GpuScene::Impl {
 
 GpuScene::GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
                    const GpuSceneSettings& settings, const GpuSettings& gpu)
-    : impl_(new Impl, [](Impl* impl) { delete impl; }) {
+    : impl_(new Impl) {
   const gpu::BroadScene scene = gpu::make_broad_scene(solids.impl().boxes, bodies, settings);
   if (solids.device() != gpu.device)
     throw Error("GPU scene: the solids are on device " + std::to_string(solids.device()) +

@@ -38,7 +38,10 @@ struct GpuSettings {
 
 /// Owns an object of a type that only the library defines.
 template <class Impl>
-using HiddenImpl = std::unique_ptr<Impl, void (*)(Impl*)>;
+struct HiddenImpl : std::unique_ptr<Impl, void (*)(Impl*)> {
+  explicit HiddenImpl(Impl* own)
+      : std::unique_ptr<Impl, void (*)(Impl*)>(own, [](Impl* impl) { delete impl; }) {}
+};
 
 /// A GPU that this build can use.
 struct GpuInfo {

@@ -16,7 +16,7 @@
 
 #include <ist/bullet/convert.h>
 
-#include "bullet/meeting.h"
+#include "bullet/points.h"
 
 namespace ist::bullet {
 

@@ -1,12 +1,9 @@
 #pragma once
 
-#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
-#include <BulletCollision/NarrowPhaseCollision/btPersistentManifold.h>
 #include <ist/bullet/contacts.h>
 #include <ist/time_of_impact.h>
 #include <array>
 #include <optional>
-#include <vector>
 
 #include "bullet/partner.h"
 
@@ -97,40 +94,5 @@ struct Spring {
 /// `step` [s]: the world's.
 Spring spring_of(const Meeting& meeting, const btCollisionObject& first,
                  const btCollisionObject& second, const Settings& settings, double step);
-
-/// The point at which a patch pushes. A force on the wrench's axis leaves no torque but that about
-/// the axis. If a patch pushes in both directions the axis may lie far away: the point stays within
-/// the patch's width of its middle.
-Eigen::Vector3d place_of(const ContactPatch& patch);
-
-/// The points of a pair in Bullet's manifolds.
-class Points {
- public:
-  /// To where the bodies have moved.
-  void move(const btCollisionObject& first, const btCollisionObject& second, double step);
-  /// A contact's points, in place of those there are. Reports where a contact begins or ends.
-  void fill(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b,
-            const Contact& contact, const Spring& spring, btDispatcher& dispatcher);
-  std::size_t count() const;
-  /// The first one; made if there is none.
-  btPersistentManifold* first_manifold(const btCollisionObject& first,
-                                       const btCollisionObject& second, btDispatcher& dispatcher);
-  void release(btDispatcher& dispatcher);
-
-  std::array<Unsaid, 2> unsaid;
-  std::vector<btPersistentManifold*> manifolds;  // the first ones are full
-
- private:
-  /// [u/s] At which the contact may part the bodies, in the direction in which all points push.
-  Eigen::Vector3d together(const btCollisionObject& first, const btCollisionObject& second,
-                           const Contact& contact, const Spring& spring);
-  void set_spring(btManifoldPoint& point, const ContactPatch& patch, const Spring& spring,
-                  const Eigen::Vector3d& together) const;
-  btVector3 unsaid_at(const btVector3& x) const { return unsaid[0].at(x) - unsaid[1].at(x); }
-
-  std::array<btVector3, Settings::kPatches> normals_;    // of all points, in the first's frame
-  std::array<btVector3, Settings::kPatches> frictions_;  // of all points in the step before
-  double closing_ = 0;  // [u/s] of an impact, forgotten as the bodies part
-};
 
 }  // namespace ist::bullet

@@ -1,4 +1,4 @@
-#include "bullet/meeting.h"
+#include "bullet/points.h"
 
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>

@@ -87,8 +87,7 @@ GpuSolids::GpuSolids(std::span<const GpuSolid> solids, const GpuSettings& settin
     : impl_(new Impl{{solids.begin(), solids.end()},
                      std::vector<GpuSolid>(solids.begin(), solids.end()),
                      settings.device,
-                     {}},
-            [](Impl* impl) { delete impl; }) {}
+                     {}}) {}
 std::size_t GpuSolids::size() const noexcept { return impl_->solids.refs().size(); }
 std::size_t GpuSolids::bytes() const noexcept { return impl_->solids.bytes(); }
 int GpuSolids::device() const noexcept { return impl_->device; }
@@ -99,7 +98,7 @@ struct GpuWorkspace::Impl {
   Alive alive;
 };
 GpuWorkspace::GpuWorkspace(std::size_t most_pairs, const GpuSettings& settings)
-    : impl_(new Impl{most_pairs, settings.device, {}}, [](Impl* impl) { delete impl; }) {}
+    : impl_(new Impl{most_pairs, settings.device, {}}) {}
 std::size_t GpuWorkspace::most_pairs() const noexcept { return impl_->most_pairs; }
 
 struct GpuKept::Impl {
@@ -108,7 +107,7 @@ struct GpuKept::Impl {
   mutable std::unique_ptr<testing::HostBatch> batch;  ///< made by the first launch
 };
 GpuKept::GpuKept(std::size_t most_pairs, std::size_t bytes_each, const GpuSettings&)
-    : impl_(new Impl{most_pairs, bytes_each, {}, {}}, [](Impl* impl) { delete impl; }) {}
+    : impl_(new Impl{most_pairs, bytes_each, {}, {}}) {}
 std::size_t GpuKept::most_pairs() const noexcept { return impl_->most_pairs; }
 
 namespace {
@@ -194,10 +193,8 @@ struct GpuScene::Impl {
 };
 GpuScene::GpuScene(const GpuSolids& solids, std::span<const GpuSceneBody> bodies,
                    const GpuSceneSettings& settings, const GpuSettings&)
-    : impl_(
-          new Impl{
-              testing::HostScene(solids.impl().given, bodies, settings), bodies.size(), {}, {}},
-          [](Impl* impl) { delete impl; }) {
+    : impl_(new Impl{
+          testing::HostScene(solids.impl().given, bodies, settings), bodies.size(), {}, {}}) {
   impl_->pairs = impl_->scene.pairs();
 }
 std::size_t GpuScene::size() const noexcept { return impl_->bodies; }
