@@ -7,6 +7,11 @@
 
 namespace ist {
 
+struct GpuSolids::Impl {};
+struct GpuWorkspace::Impl {};
+struct GpuKept::Impl {};
+struct GpuScene::Impl {};
+
 bool gpu_available(int, std::string* why) {
   if (why != nullptr) *why = "this build has no GPU backend";
   return false;
@@ -14,21 +19,20 @@ bool gpu_available(int, std::string* why) {
 
 GpuInfo gpu_info(int) { throw Error("GPU: this build has no GPU backend: use the CPU"); }
 
-GpuSolids::GpuSolids(std::span<const GpuSolid>, const GpuSettings& settings)
-    : impl_(nullptr, nullptr) {
+GpuSolids::GpuSolids(std::span<const GpuSolid>, const GpuSettings& settings) : impl_(nullptr) {
   gpu_info(settings.device);
 }
 std::size_t GpuSolids::size() const noexcept { return 0; }
 std::size_t GpuSolids::bytes() const noexcept { return 0; }
 int GpuSolids::device() const noexcept { return 0; }
 
-GpuWorkspace::GpuWorkspace(std::size_t, const GpuSettings& settings) : impl_(nullptr, nullptr) {
+GpuWorkspace::GpuWorkspace(std::size_t, const GpuSettings& settings) : impl_(nullptr) {
   gpu_info(settings.device);
 }
 std::size_t GpuWorkspace::most_pairs() const noexcept { return 0; }
 std::size_t GpuWorkspace::bytes() const noexcept { return 0; }
 
-GpuKept::GpuKept(std::size_t, std::size_t, const GpuSettings& settings) : impl_(nullptr, nullptr) {
+GpuKept::GpuKept(std::size_t, std::size_t, const GpuSettings& settings) : impl_(nullptr) {
   gpu_info(settings.device);
 }
 std::size_t GpuKept::most_pairs() const noexcept { return 0; }
@@ -51,7 +55,7 @@ void contact_patches_batch(const GpuSolids&, const GpuPairs&, Measure, GpuWorksp
 
 GpuScene::GpuScene(const GpuSolids&, std::span<const GpuSceneBody>, const GpuSceneSettings&,
                    const GpuSettings& settings)
-    : impl_(nullptr, nullptr) {
+    : impl_(nullptr) {
   gpu_info(settings.device);
 }
 std::size_t GpuScene::size() const noexcept { return 0; }
