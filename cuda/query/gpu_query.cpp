@@ -323,6 +323,7 @@ void separation_batch(const GpuSolids& solids, const GpuPairs& pairs,
   const GpuWorkspace::Impl& work = workspace.impl();
   const gpu::SolidPairs asked = asked_of(solids, pairs, work, Measure::inner, {});
   if (pairs.count == 0) return;
+  if (!(settings.max_distance >= 0)) throw Error("GPU: max_distance is not a number ≥ 0");
   gpu::SeparationArrays batch = work.separations;
   static_cast<gpu::SolidPairs&>(batch.pairs) = asked;
   batch.answers = answers;

@@ -46,7 +46,7 @@ enum {
    * more, or a pair budget or coincident copies left coarser spheres. */
   IST_ERROR_EXCEEDED = 2,
   /* A pose with NaN or Inf, a quaternion of length 0, a scale < 0, sizes or distances more than
-   * 1e60 : 1 apart, or a shape's number or an enum out of range. */
+   * 1e60 : 1 apart, a shape's number or an enum out of range, or a setting < 0 or NaN. */
   IST_INVALID_INPUT = -1,
   IST_NULL_POINTER = -2,
   IST_WRONG_SIZE = -3,    /* a struct's size that this library does not know */

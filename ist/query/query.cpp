@@ -33,7 +33,7 @@ Answer ask_pair(const PlacedSolid& a, const PlacedSolid& b, Workspace& workspace
 }
 
 bool are_known(const PenetrationSettings& settings) noexcept {
-  return settings.measure <= Measure::exact;
+  return settings.measure <= Measure::exact && settings.relative_error >= 0;
 }
 
 const Pose& pose_of(const PlacedSolid& solid) noexcept {
@@ -77,6 +77,7 @@ Penetration penetration(const PlacedSolid& a, const PlacedSolid& b,
 
 Separation separation(const PlacedSolid& a, const PlacedSolid& b,
                       const SeparationSettings& settings, Workspace& workspace) noexcept {
+  if (!(settings.max_distance >= 0)) return invalid_input<Separation>();
   return ask_pair(
       a, b, workspace, missing_data<Separation>(),
       [&](const auto& x, const PlacedAsset& y) {
@@ -148,6 +149,7 @@ YesNoAnswer overlap(const PlacedSolid& a, const PlacedSolid& b, double margin,
 
 TimeOfImpact time_of_impact(const PlacedSolid& a, const PlacedSolid& b, const Motions& motions,
                             const ImpactSettings& settings, Workspace& workspace) noexcept {
+  if (!(settings.tolerance >= 0)) return invalid_input<TimeOfImpact>();
   const bool turned = std::holds_alternative<PlacedShape>(b.placed);
   const Motions ordered = turned ? Motions{motions.b, motions.a} : motions;
   return ask_pair(

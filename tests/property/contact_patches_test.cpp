@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 #include <ist/query.h>
+#include <ist/time_of_impact.h>
 
 #include <cmath>
 #include <limits>
 #include <set>
 #include <thread>
 
+#include "support/float_traps.h"
 #include "support/query_settings.h"
 #include "support/random_assets.h"
 #include "support/reference_sum.h"
@@ -239,6 +241,19 @@ TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
   const ContactPatches none = contact_patches(placed, other, {}, workspace, {});
   EXPECT_EQ(none.penetration.status, QueryStatus::invalid_input);
   EXPECT_TRUE(std::isnan(none.penetration.volume));
+  const testing::NoFloatTraps not_trapped;
+  for (const double bad : {-1.0, -1e-300, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_EQ(penetration(placed, other, {.relative_error = bad}, workspace).status,
+              QueryStatus::invalid_input);
+    EXPECT_EQ(contact_patches(placed, other, {.relative_error = bad}, workspace, {&patch, 1})
+                  .penetration.status,
+              QueryStatus::invalid_input);
+    EXPECT_EQ(separation(placed, other, {.max_distance = bad}, workspace).status,
+              QueryStatus::invalid_input);
+    EXPECT_EQ(
+        time_of_impact(placed, other, {}, {.duration = 1, .tolerance = bad}, workspace).status,
+        QueryStatus::invalid_input);
+  }
 }
 
 #ifndef NDEBUG

@@ -13,7 +13,7 @@ const forgotten = new FinalizationRegistry((places) => places.forEach(give));
 class Owner {
   constructor(places, key) {
     if (key !== kInside)
-      throw new IstError(`ist: ${this.constructor.name}has no public constructor; use its static functions`);
+      throw new IstError(`ist: ${this.constructor.name} has no public constructor; use its static functions`);
     this._places = places;
     this._bodies = 0;  // of scenes
     forgotten.register(this, places, this);
@@ -202,6 +202,15 @@ function three(given, what) {
   return [given[0], given[1], given[2]];
 }
 
+/** Of each of `sizes`: throws unless it is a number > 0, or `least` says ≥ 0. */
+function atLeast(least, sizes) {
+  for (const what in sizes) {
+    const size = sizes[what];
+    if (!(typeof size === 'number' && (size > 0 || size === least) && size < Infinity))
+      throw new IstError(`ist: ${what} is ${size}; it must be ${least === 0 ? '≥' : '>'} 0`);
+  }
+}
+
 /** A copy of as many floats as a grid has points. */
 function copied(given, points, what) {
   for (const along of points)
@@ -211,7 +220,7 @@ function copied(given, points, what) {
   if (!(given instanceof Float32Array) || given.length !== wanted)
     throw new IstError(
         `ist: ${what} needs a Float32Array of ${points.join(' · ')} = ${wanted} numbers` +
-        (given?.length === undefined ? '' : `, not ${given.length}`));
+        (given instanceof Float32Array ? `, not ${given.length}` : ''));
   functions(what);
   const place = take(4 * wanted);
   u8().set(new Uint8Array(given.buffer, given.byteOffset, given.byteLength), place);
@@ -220,36 +229,48 @@ function copied(given, points, what) {
 
 export class Shape extends Owner {
   static halfSpace(normal, offset = 0) {
-    return made(kHalfSpace, [...three(normal, 'normal'), offset]);
+    const along = three(normal, 'normal'), length = Math.hypot(...along);
+    atLeast(undefined, {'the length of normal': length});
+    return made(kHalfSpace, [...along, offset]);
   }
   static box(halfExtents) {
-    return made(kBox, three(halfExtents, 'halfExtents'));
+    const sizes = three(halfExtents, 'halfExtents');
+    atLeast(undefined, {'halfExtents[0]': sizes[0], 'halfExtents[1]': sizes[1], 'halfExtents[2]': sizes[2]});
+    return made(kBox, sizes);
   }
   static ball(radius) {
+    atLeast(undefined, {radius});
     return made(kBall, [radius]);
   }
   static capsule(radius, halfHeight) {
+    atLeast(undefined, {radius});
+    atLeast(0, {halfHeight});
     return made(kCapsule, [radius, halfHeight]);
   }
   static cylinder(radius, halfHeight) {
+    atLeast(undefined, {radius, halfHeight});
     return made(kCylinder, [radius, halfHeight]);
   }
 
   static heights(heights, columns, rows, spacing) {
     if (spacing?.length !== 2)
       throw new IstError('ist: spacing must have two numbers, along x and y');
+    atLeast(undefined, {'spacing[0]': spacing[0], 'spacing[1]': spacing[1]});
     const data = copied(heights, [columns, rows], 'Shape.heights()');
     let lowest = Infinity, highest = -Infinity;
     for (const h of heights) {
       lowest = Math.min(lowest, h);
       highest = Math.max(highest, h);
     }
+    if (!(highest - lowest < Infinity)) throw new IstError('ist: a height is no finite number');
     // Both 0 is what says that nothing is known, which of a level ground at 0 is true enough.
     return made(kHeights, [spacing[0], spacing[1], lowest, highest], data, columns, rows);
   }
 
   static distanceGrid(distances, points, spacing, options) {
     checkOptions('Shape.distanceGrid()', options);
+    atLeast(undefined, {spacing});
+    atLeast(0, {error: options?.error ?? 0});
     const along = three(points, 'points');
     const origin = three(options?.origin ?? [0, 0, 0], 'origin');
     const data = copied(distances, along, 'Shape.distanceGrid()');

@@ -23,7 +23,7 @@ function writePairs(place, pairs, who) {
       writePoseAt(at + 72, pair.poseB, 'poseB');
     }
   } catch (error) {
-    if (error instanceof IstError) error.message = error.message.replace('ist:', `ist: pair ${i}:`);
+    if (error instanceof IstError || error instanceof TypeError) error.message = error.message.replace('ist:', `ist: pair ${i}:`);
     throw error;
   }
 }

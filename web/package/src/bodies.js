@@ -45,8 +45,8 @@ export function sizeMatch(a, b, options) {
   const wasm = functions('sizeMatch()');
   two(a, b, 'sizeMatch()');
   checkOptions('sizeMatch()', options);
-  writePose(0, {scale: options?.scaleA}, 'scaleA');
-  writePose(1, {scale: options?.scaleB}, 'scaleB');
+  writePose(0, {scale: options?.scaleA}, 'A');
+  writePose(1, {scale: options?.scaleB}, 'B');
   check(wasm.size_match(a._at, b._at), 'sizeMatch()');
   const numbers = f64(), integers = u32(), at = desk().fit / 8 + 1;
   return {

@@ -38,6 +38,16 @@ export function writeNumbers(out, at, given, absent, count, what, part) {
   for (let i = 0; i < count; ++i) out[at + i] = number(given[i], what, part);
 }
 
+/** Throws a TypeError for a member of `given` that is none of `members`: it is misspelt. */
+export function checkMembers(given, members, what) {
+  if (given === undefined || given === null) return;
+  if (typeof given !== 'object') throw new TypeError(`ist: ${what} is ${given}, not an object`);
+  for (const name in given)
+    if (!members.includes(name))
+      throw new TypeError(`ist: ${what}: no member is called ${name}; there are ${members.join(', ')}`);
+}
+
+export const kPose = ['rotation', 'translation', 'scale'];
 const kIdentity = [1, 0, 0, 0];
 const kOrigin = [0, 0, 0];
 
@@ -50,6 +60,7 @@ export function writePose(which, pose, what) {
 
 /** The same anywhere in memory. */
 export function writePoseAt(place, pose, what) {
+  checkMembers(pose, kPose, what);
   const out = f64(), at = place / 8;
   writeNumbers(out, at, pose?.rotation, kIdentity, 4, what, 'rotation');
   writeNumbers(out, at + 4, pose?.translation, kOrigin, 3, what, 'translation');
@@ -64,16 +75,24 @@ function choice(value, names, what) {
   return i;
 }
 
-export function count(value, absent, what) {
+export function count(value, absent, what, least = 0, most = 0xffffffff) {
   if (value === undefined) return absent;
-  if (!(Number.isInteger(value) && value >= 0 && value <= 0xffffffff))
-    throw new IstError(`ist: ${what} is ${value}; it must be a whole number from 0 to 2³² − 1`);
+  if (!(Number.isInteger(value) && value >= least && value <= most))
+    throw new IstError(
+        `ist: ${what} is ${value}; it must be a whole number from ${least} to ` +
+        (most === 0xffffffff ? '2³² − 1' : most));
   return value;
 }
 
 const kSphereMeasures = ['matched', 'inner'];
 const kMeasures = [...kSphereMeasures, 'exact'];
-const limit = (value, what) => (value === undefined ? 0 : number(value, what));
+
+/** A setting that is a number ≥ 0; 0 if it is omitted. */
+export function notNegative(value, what) {
+  if (value === undefined) return 0;
+  if (!(number(value, what) >= 0)) throw new IstError(`ist: ${what} is ${value}; it must be ≥ 0`);
+  return value;
+}
 
 /** Of what has spheres to show. */
 export function sphereMeasureOf(value) {
@@ -89,7 +108,7 @@ export function writeSettings(options) {
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
   integers[at + 5] = count(options?.pairId, 0, 'pairId');
-  f64()[at / 2 + 3] = limit(options?.relativeError, 'relativeError');
+  f64()[at / 2 + 3] = notNegative(options?.relativeError, 'relativeError');
 }
 
 /** Copies three numbers, which is shorter than set() and makes no view. */

@@ -123,11 +123,14 @@ EXPORT(penetration) ist_status_t penetration(solid_t a, solid_t b) {
   return ist_penetration(&first, &second, &desk.settings, &desk.workspace, &desk.penetration);
 }
 
+/* numbers[0]: the largest distance that matters, 0: any. */
 EXPORT(separation) ist_status_t separation(solid_t a, solid_t b, uint32_t inner_spheres) {
   const ist_placed_t first = placed(a, &desk.a), second = placed(b, &desk.b);
   const ist_separation_settings_t settings = {.size = sizeof settings,
                                               .max_visits = desk.settings.max_visits,
-                                              .inner_spheres = inner_spheres};
+                                              .inner_spheres = inner_spheres,
+                                              .max_distance = desk.numbers[0],
+                                              .pair_id = desk.settings.pair_id};
   return ist_separation(&first, &second, &settings, &desk.workspace, &desk.separation);
 }
 

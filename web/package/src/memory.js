@@ -32,7 +32,7 @@ const imports = {
       return 0;
     },
     proc_exit() {
-      throw new IstError('ist: the WebAssembly module aborted: out of memory');
+      throw new IstError('ist: the WebAssembly module aborted: out of memory, or a number out of range');
     },
   },
 };

@@ -10,7 +10,7 @@ const kNames = {
   'Asset.spheres()': ['measure', 'detail'],
   'Shape.distanceGrid()': ['origin', 'error'],
   'penetration()': kPenetration,
-  'separation()': [...kLimits, 'innerSpheres'],
+  'separation()': [...kLimits, 'innerSpheres', 'maxDistance', 'pairId'],
   'contactPatches()': kPatches,
   'overlap()': ['poseA'],
   'overlapOutline()': ['poseA', 'maxPatches', 'maxVisits', 'pairId', 'into'],

@@ -2,7 +2,7 @@
 
 import {newGap, newPatches, newPenetration, readGap, readPatches, readPenetration, statusOf} from './answers.js';
 import {Asset, Shape} from './asset.js';
-import {count, desk, kMostPatches, sphereMeasureOf, writePose, writeSettings} from './desk.js';
+import {count, desk, kMostPatches, notNegative, sphereMeasureOf, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -47,6 +47,8 @@ export function penetration(a, b, poseB, options) {
 export const newSeparation = () => ({status: 'ok', distance: 0, ...newGap(), spherePairs: 0});
 
 export function separation(a, b, poseB, options) {
+  functions('separation()');
+  f64()[desk().numbers / 8] = notNegative(options?.maxDistance, 'maxDistance');
   const status = ask('separation', 'separation()', a, b, poseB, options, options?.innerSpheres ? 1 : 0);
   return readSeparation(status, options?.into ?? newSeparation());
 }

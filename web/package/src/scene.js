@@ -1,7 +1,7 @@
 // Many bodies, and which of them meet.
 
 import {newPenetration, readPenetration} from './answers.js';
-import {count, desk, writeNumbers, writePose, writeSettings} from './desk.js';
+import {checkMembers, count, desk, kPose, notNegative, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -11,6 +11,7 @@ import {askRays, kHit, kSurfacePoint, placePoints, read} from './surfaces.js';
 const kAnswers = ['penetration', 'nothing', 'boxes', 'overlap'];  // as ist_scene_answer_t
 const kOverlapping = ['no', 'yes', 'unknown'];
 const kPairBytes = 24, kPoseBytes = 56, kTooMany = 1;  // IST_BUDGET_EXHAUSTED
+const kMost = 2 ** 30, kMostGroup = 7;  // of SceneSettings, and kSceneGroups − 1
 const room = new Room();
 const forgotten = new FinalizationRegistry((place) => functions('a Scene').scene_release(place));
 
@@ -31,8 +32,8 @@ export class Scene {
   constructor(options) {
     const wasm = functions('Scene()');
     checkOptions('Scene()', options);
-    const most = count(options?.maxBodies, 1024, 'maxBodies');
-    const pairs = count(options?.maxPairs, 8192, 'maxPairs');
+    const most = count(options?.maxBodies, 1024, 'maxBodies', 1, kMost);
+    const pairs = count(options?.maxPairs, 8192, 'maxPairs', 1, kMost);
     this._place = wasm.scene_make(most, pairs) >>> 0;
     if (this._place === 0) throw new IstError('ist: out of memory for a Scene');
     this._maxPairs = pairs;
@@ -68,7 +69,7 @@ export class Scene {
       for (const taken of this._solids.keys()) number = Math.max(number, taken + 1);
     }
     const status = wasm.scene_add(
-        this._at, at, number, (options?.moves ?? true) ? 0 : 1, count(options?.group, 0, 'group'),
+        this._at, at, number, (options?.moves ?? true) ? 0 : 1, count(options?.group, 0, 'group', 0, kMostGroup),
         count(options?.layers, 1, 'layers'), count(options?.meets, 0xffffffff, 'meets'));
     check(status, `Scene.add(), body ${number}`);
     this._solids.set(number, given);
@@ -89,6 +90,7 @@ export class Scene {
     const place = room.of((kPoseBytes + 4) * length), at = place + kPoseBytes * length;
     for (let i = 0; i < length; ++i) {
       u32()[at / 4 + i] = count(numbers[i], 0, 'number');
+      checkMembers(poses[i], kPose, 'pose');
       writeNumbers(f64(), (place + kPoseBytes * i) / 8, poses[i].rotation, [1, 0, 0, 0], 4, 'pose', 'rotation');
       writeNumbers(f64(), (place + kPoseBytes * i) / 8 + 4, poses[i].translation, [0, 0, 0], 3, 'pose', 'translation');
     }
@@ -102,7 +104,10 @@ export class Scene {
     if (answer < 0)
       throw new IstError(`ist: answer is ${options.answer}; use one of ${kAnswers.join(', ')}`);
     writeSettings(options);
-    check(wasm.scene_set_rule(this._at, groupA, groupB, answer, options?.margin ?? 0), 'Scene.setRule()');
+    const margin = notNegative(options?.margin, 'margin');
+    const status = wasm.scene_set_rule(
+        this._at, count(groupA, 0, 'groupA', 0, kMostGroup), count(groupB, 0, 'groupB', 0, kMostGroup), answer, margin);
+    check(status, 'Scene.setRule()');
   }
 
   exclude(a, b) {

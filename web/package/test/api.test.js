@@ -181,6 +181,9 @@ test('patches and lenses add up', () => {
   const apart = ist.separation(a, b, {translation: [100, 0, 0]});
   assert.ok(
       apart.distanceMin > 0 && apart.distanceMin <= apart.distanceMax && apart.normal[0] > 0.9);
+  const near = ist.separation(a, b, {translation: [100, 0, 0]}, {maxDistance: 1});
+  assert.ok(near.distance === 1 && near.distanceMax === Infinity && Number.isNaN(near.normal[0]));
+  assert.deepEqual(ist.separation(a, b, {translation: [100, 0, 0]}, {maxDistance: 100, pairId: 7}).pointA, apart.pointA);
   const spheresApart = ist.separation(a, b, {translation: [100, 0, 0]}, {innerSpheres: true});
   assert.ok(spheresApart.distance > apart.distance);  // they are inside
   assert.equal(ist.overlap(a, b, {translation: [100, 0, 0]}), 'no');
@@ -277,7 +280,7 @@ test('fields', () => {
   assert.match(sentence(() => ist.lenses(half, b, {})), /a shape has no spheres/);
   half.free();
   assert.match(sentence(() => ist.penetration(half, b, {})), /used after free/);
-  assert.match(sentence(() => ist.penetration(ist.Shape.ball(-1), b, {})), /out of range/);
+  assert.match(sentence(() => ist.penetration(ist.Shape.ball(-1), b, {})), /radius is -1; it must be > 0/);
   assert.match(
       sentence(() => ist.Shape.heights(new Float32Array(3), 2, 2, [1, 1])),
       /2 · 2 = 4 numbers, not 3/);
@@ -422,11 +425,41 @@ test('what is wrong is said', () => {
   assert.equal(ist.penetration(a, floor, {}).volume, ist.penetration(floor, a, {}).volume);
   assert.match(sentence(() => ist.lenses(a, floor, {})), /solid B must be an Asset: a shape/);
   assert.match(sentence(() => ist.contactPatches(a, b, {}, {maxPatches: 33})), /from 1 to 32/);
-  assert.match(sentence(() => new ist.Asset()), /static functions/);
+  assert.match(sentence(() => new ist.Asset()), /Asset has no public constructor; .*static functions/);
+  assert.match(sentence(ask({}, {relativeError: -1})), /relativeError is -1; it must be ≥ 0/);
+  assert.match(sentence(ask({}, {relativeError: NaN})), /relativeError is NaN/);
+  const asked = (options) => () => ist.separation(a, b, {}, options);
+  assert.match(sentence(asked({maxDistance: -1})), /maxDistance is -1; it must be ≥ 0/);
+  assert.match(sentence(() => ist.sizeMatch(a, b, {scaleA: 0})), /A\.scale is 0/);
+  assert.match(sentence(() => ist.Shape.ball()), /radius is undefined/);
+  assert.match(sentence(() => ist.Shape.box([1, 1, 0])), /halfExtents\[2\] is 0; it must be > 0/);
+  assert.match(sentence(() => ist.Shape.halfSpace([0, 0, 0])), /length of normal is 0/);
+  assert.match(sentence(() => ist.Shape.capsule(1, -1)), /halfHeight is -1; it must be ≥ 0/);
+  assert.match(sentence(() => ist.Shape.heights([1, 2, 3, 4], 2, 2, [1, 1])), /a Float32Array of 2 · 2 = 4 numbers$/);
+  assert.match(sentence(() => ist.Shape.heights(new Float32Array([0, NaN, 0, 0]), 2, 2, [1, 1])), /finite/);
   a.free();
   a.free();
   assert.match(sentence(ask({})), /bolt\.ist was used after free\(\)/);
   assert.match(sentence(() => a.info()), /used after free\(\)/);
+  b.free();
+});
+
+test('a member of a pose or a motion that is misspelt is refused by its name', () => {
+  const a = ist.Asset.from(bytesA), b = ist.Asset.from(bytesB), scene = new ist.Scene();
+  const refused = (call, words) =>
+      assert.throws(call, (error) => error instanceof TypeError && words.test(error.message));
+  refused(() => ist.penetration(a, b, {position: [0, 0, 9]}), /poseB: no member is called position; there are rotation,/);
+  refused(() => ist.penetration(a, b, {}, {poseA: {quaternion: [1, 0, 0, 0]}}), /poseA: .* quaternion/);
+  refused(() => ist.penetration(a, b, [1, 0, 0, 0, 0, 0, 9]), /poseB: no member is called 0/);
+  refused(() => ist.penetration(a, b, 9), /poseB is 9, not an object/);
+  refused(() => ist.penetrationBatch([{a, b, poseB: {at: [0, 0, 9]}}]), /pair 0: .*poseB: .* at;/);
+  refused(() => ist.timeOfImpact(a, b, {}, {motionB: {linear: [1, 0, 0]}}), /motionB: .* linear; there are velocity,/);
+  refused(() => scene.add(a, {place: [0, 0, 0]}), /pose: .* place/);
+  scene.add(a);
+  refused(() => scene.setPoses([0], [{place: [0, 0, 0]}]), /pose: .* place/);
+  scene.setPoses([0], [ist.moved({}, {velocity: [1, 0, 0]}, 1)]);
+  scene.free();
+  a.free();
   b.free();
 });
 
@@ -625,6 +658,10 @@ test('a scene: pairs, events and answers are those of single calls', () => {
   assert.match(sentence(() => scene.remove(9)), /body 9: /);
   assert.match(sentence(() => scene.setPoses([1, 2], [{}])), /2 numbers and 1 poses/);
   assert.match(sentence(() => scene.setRule(0, 0, {answer: 'all'})), /use one of penetration, nothing/);
+  assert.match(sentence(() => scene.setRule(0, 8)), /groupB is 8; it must be a whole number from 0 to 7/);
+  assert.match(sentence(() => scene.setRule(0, 0, {margin: -1})), /margin is -1; it must be ≥ 0/);
+  assert.match(sentence(() => scene.add(nut, {}, {group: 8})), /group is 8/);
+  assert.match(sentence(() => new ist.Scene({maxPairs: 0})), /maxPairs is 0; it must be a whole number from 1/);
   const small = new ist.Scene({maxBodies: 3, maxPairs: 1});
   small.setRule(0, 0, {answer: 'boxes'});
   for (let i = 0; i < 3; ++i) small.add(nut);
