@@ -204,12 +204,67 @@ std::uint32_t ExactParts::divide() noexcept {
   return finish();
 }
 
-template <class Query>
-Query query_of(const PlacedAsset& a, const MeshTree& mesh_a, const PlacedAsset& b,
-               const MeshTree& mesh_b, const RelativePose& pose, ExactScratch& scratch) {
-  const double moved_b =
-      moved_by_poses(a, b, mesh_b, pose) + pose.a_from_b.scale * moved_in_mesh(mesh_b);
-  return {mesh_a, moved_in_mesh(mesh_a), mesh_b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
+/// Two meshes and how far their surfaces are from their true places relative to each other, A's
+/// unit frame.
+struct PlacedMeshes {
+  MeshTree a, b;
+  double moved_a, moved_b;
+
+  PlacedMeshes(const PlacedAsset& from_a, const PlacedAsset& from_b, const RelativePose& pose)
+      : a(mesh_of(from_a)),
+        b(mesh_of(from_b)),
+        moved_a(moved_in_mesh(a)),
+        moved_b(moved_by_poses(from_a, from_b, b, pose) + pose.a_from_b.scale * moved_in_mesh(b)) {}
+
+  template <class Query>
+  Query query(const RelativePose& pose, ExactScratch& scratch) const {
+    return {a, moved_a, b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
+  }
+};
+
+/// True if the box of solid B is apart from that of A along an axis of A's, by more than `touch`
+/// (A's unit frame).
+bool apart_along_axes(const AssetHeader& a, const AssetHeader& b, const Similarity& a_from_b,
+                      double touch) noexcept {
+  struct Box {
+    double low[3], high[3], middle[3], half[3], rounding = 0;
+
+    explicit Box(const AssetHeader& of) {
+      const double to_unit = std::ldexp(1.0, -of.exponent);
+      for (int k = 0; k < 3; ++k) {
+        low[k] = (of.box_lower[k] - of.centre[k]) * to_unit;
+        high[k] = (of.box_upper[k] - of.centre[k]) * to_unit;
+        middle[k] = (low[k] + high[k]) / 2;
+        half[k] = (high[k] - low[k]) / 2;
+        rounding +=
+            exact::kHalfUnit * to_unit * (std::abs(of.box_lower[k]) + std::abs(of.box_upper[k]));
+      }
+    }
+  };
+  const Box box_a(a), box_b(b);
+  double at[3];
+  a_from_b.apply(box_b.middle, at);
+  for (int k = 0; k < 3; ++k) {
+    const double* const row = a_from_b.m + 3 * k;
+    const double reach = (std::abs(row[0]) * box_b.half[0] + std::abs(row[1]) * box_b.half[1]) +
+                         std::abs(row[2]) * box_b.half[2];
+    const double size = std::abs(at[k]) + std::abs(a_from_b.t[k]) + reach + box_a.half[k];
+    const double pad = 2 * touch + 2 * (box_a.rounding + a_from_b.scale * box_b.rounding) +
+                       32 * exact::kHalfUnit * size;
+    if (at[k] - reach > box_a.high[k] + pad || at[k] + reach < box_a.low[k] - pad) return true;
+  }
+  return false;
+}
+
+/// True if boxes around the solids show that they neither overlap nor touch. Parts that are moved
+/// out of a mate have many triangles that a search by boxes in float cannot tell apart.
+bool boxes_apart(const PlacedAsset& a, const PlacedAsset& b, const PlacedMeshes& meshes,
+                 const RelativePose& pose) noexcept {
+  const double touch =
+      touching_distance(meshes.moved_a + meshes.moved_b, meshes.a, meshes.b, pose.a_from_b);
+  const AssetHeader &of_a = a.asset.header(), &of_b = b.asset.header();
+  return apart_along_axes(of_a, of_b, pose.a_from_b, touch) ||
+         apart_along_axes(of_b, of_a, pose.b_from_a, touch * pose.b_from_a.scale);
 }
 
 ExactInWorld in_world(const ExactSums& sums, const exact::Point& origin, const PairPlace& place) {
@@ -284,8 +339,9 @@ Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               const PenetrationSettings& settings, const RelativePose& pose,
                               Workspace& workspace) noexcept {
   if (a.asset.header().mesh == 0 || b.asset.header().mesh == 0) return missing_data<Penetration>();
-  const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
-  auto query = query_of<ExactQuery>(a, mesh_a, b, mesh_b, pose, workspace.impl()->exact);
+  const PlacedMeshes meshes(a, b, pose);
+  if (boxes_apart(a, b, meshes, pose)) return whole_answer({}, a, b, pose);
+  auto query = meshes.query<ExactQuery>(pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (found.complete) return whole_answer(found, a, b, pose);
   return stopped(a, b,
@@ -302,9 +358,13 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
   if (a.asset.header().mesh == 0 || b.asset.header().mesh == 0)
     return missing_data<OverlapOutline>();
   OverlapOutline answer;
-  const MeshTree mesh_a = mesh_of(a), mesh_b = mesh_of(b);
+  const PlacedMeshes meshes(a, b, *pose);
+  if (boxes_apart(a, b, meshes, *pose)) {
+    answer.contact.penetration = whole_answer({}, a, b, *pose);
+    return answer;
+  }
   ExactScratch& scratch = workspace.impl()->exact;
-  auto query = query_of<ExactParts>(a, mesh_a, b, mesh_b, *pose, scratch);
+  auto query = meshes.query<ExactParts>(*pose, scratch);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (!found.complete || !query.holds_crossings()) {
     answer.contact = lack_spheres(a, b)

@@ -88,15 +88,20 @@ TEST(ExactMated, WhatMeetsAlongEdgesAllRoundTouches) {
   }
 }
 
-// Near faces that do not touch are told apart by planes, not by the distance of each two triangles.
+// Where no side of a solid's box is apart, near faces that do not touch are told apart by planes,
+// not by the distance of each two triangles.
 TEST(ExactMated, FacesNextToEachOtherCostWhatFacesOnEachOtherDo) {
-  const testing::Extrusion of = testing::Extrusion::tube(500, 1, 0.8, 0, 1);
-  const Asset tube = testing::surface(of.mesh(), "tube");
+  TriangleMesh askew = testing::Extrusion::tube(500, 1, 0.8, 0, 1).mesh();
+  const Eigen::Quaterniond turn = Eigen::Quaterniond(0.8, 0.4, 0.3, 0.2).normalized();
+  for (Eigen::Vector3d& v : askew.vertices) v = turn * v;
+  const Asset tube = testing::surface(std::move(askew), "tube");
   Workspace workspace;
   const auto seconds = [&](double z) {
     double least = 1e9;
     for (int i = 0; i < 5; ++i) {
-      const PlacedAsset a = {tube.view(), {}, 1}, b = {tube.view(), {{1, 0, 0, 0}, {0, 0, z}}, 1};
+      const Eigen::Vector3d t = turn * Eigen::Vector3d(0, 0, z);
+      const PlacedAsset a = {tube.view(), {}, 1},
+                        b = {tube.view(), {{1, 0, 0, 0}, {t.x(), t.y(), t.z()}}, 1};
       const std::clock_t begin = std::clock();
       const Penetration p = testing::exactly(a, b, workspace);
       least = std::min(least, double(std::clock() - begin));
@@ -108,6 +113,35 @@ TEST(ExactMated, FacesNextToEachOtherCostWhatFacesOnEachOtherDo) {
   const double on = seconds(1);
   for (const double gap : {1e-11, 1e-10, 1e-9, 1e-8, 1e-7})
     EXPECT_LT(seconds(1 + gap), 3 * on) << gap;
+}
+
+TEST(ExactMated, NothingIsSearchedWhereBoxesAreApart) {
+  const Asset tube = testing::surface(testing::Extrusion::tube(50, 1, 0.8, 0, 1).mesh(), "tube");
+  Workspace workspace;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> angle(0, 2 * std::numbers::pi);
+  for (const Eigen::Quaterniond& turn : testing::right_angled_turns()) {
+    for (const double gap : {-1e-9, 0.0, 1e-12, 1e-9, 1e-6, 1e-3, 1.0}) {
+      SCOPED_TRACE(gap);
+      const double half = angle(random) / 2;
+      const Pose pose = {{std::cos(half), 0, 0, std::sin(half)}, {0, 0, 1 + gap}};
+      const PlacedAsset a = {tube.view(), testing::turned(turn, {}), 1},
+                        b = {tube.view(), testing::turned(turn, pose), 1};
+      for (const bool exchanged : {false, true}) {
+        const PlacedAsset &first = exchanged ? b : a, &second = exchanged ? a : b;
+        const Penetration p = testing::exactly(first, second, workspace);
+        EXPECT_EQ(p.node_visits == 0, gap > 0);
+        EXPECT_EQ(p.touching, gap == 0);
+        EXPECT_EQ(p.volume > 0, gap < 0);
+        EXPECT_LE(p.volume_max, gap > 0 ? 0 : 1);
+        ContactPatch patch;
+        const ContactPatches found =
+            contact_patches(first, second, {.measure = Measure::exact}, workspace, {&patch, 1});
+        EXPECT_EQ(found.penetration.node_visits == 0, gap > 0);
+        EXPECT_EQ(found.count > 0, gap < 0);
+      }
+    }
+  }
 }
 
 }  // namespace
