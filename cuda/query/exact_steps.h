@@ -16,22 +16,28 @@
 
 namespace ist::gpu {
 
-/// True if the boxes of two meshes intersect in A's frame.
-IST_HD inline bool boxes_meet(const MeshTree& a, const MeshTree& b, const Similarity& a_from_b) {
-  double middle[3], half[3], at[3];
-  for (int k = 0; k < 3; ++k) {
-    middle[k] = 0.5 * (double{b.low[k]} + b.high[k]);
-    half[k] = 0.5 * (double{b.high[k]} - b.low[k]);
-  }
-  a_from_b.apply(middle, at);
-  for (int k = 0; k < 3; ++k) {
-    const double reach =
-        (std::abs(a_from_b.m[3 * k]) * half[0] + std::abs(a_from_b.m[3 * k + 1]) * half[1]) +
-        std::abs(a_from_b.m[3 * k + 2]) * half[2];
-    const double pad = 1e-12 * (reach + std::abs(at[k]) + a.extent());
-    if (at[k] - reach - pad > a.high[k] || at[k] + reach + pad < a.low[k]) return false;
-  }
-  return true;
+/// How far the surfaces of pair i are from their true places relative to each other, A's unit
+/// frame.
+IST_HD inline void moved_exactly(const ExactArrays& batch, std::uint32_t i, const PairPlace& place,
+                                 double (&moved)[2]) {
+  const MeshTree& b = solid_of(batch, batch.pairs.b, i).mesh;
+  const auto offset = [&](const GpuPlacedSolids& side) {
+    return scale_of(side, i) * norm(solid_of(batch, side, i).frame.centre);
+  };
+  moved[0] = moved_in_mesh(solid_of(batch, batch.pairs.a, i).mesh);
+  moved[1] = moved_by_poses(pose_of(batch.pairs.a, i).t, offset(batch.pairs.a),
+                            pose_of(batch.pairs.b, i).t, offset(batch.pairs.b), b.extent(), place) +
+             place.a_from_b.scale * moved_in_mesh(b);
+}
+
+/// True if boxes around pair i show that there is nothing to search for.
+IST_HD inline bool boxes_apart(const ExactArrays& batch, std::uint32_t i, const PairPlace& place) {
+  const SolidRef& a = solid_of(batch, batch.pairs.a, i);
+  const SolidRef& b = solid_of(batch, batch.pairs.b, i);
+  double moved[2];
+  moved_exactly(batch, i, place, moved);
+  const double touch = touching_distance(moved[0] + moved[1], a.mesh, b.mesh, place.a_from_b);
+  return ist::boxes_apart(a.box, b.box, place, touch);
 }
 
 /// True if pair i needs a search, and its place; else writes its answer. One thread per pair.
@@ -49,7 +55,7 @@ IST_HD inline bool sift_exact(const ExactArrays& batch, std::uint32_t i, PairPla
     const MeshTree& b = solid_of(batch, batch.pairs.b, i).mesh;
     if (a.header == nullptr || b.header == nullptr)
       status = QueryStatus::missing_data;
-    else if (boxes_meet(a, b, place.a_from_b) && boxes_meet(b, a, place.b_from_a))
+    else if (!boxes_apart(batch, i, place))
       return true;
   }
   write_nothing(batch.answers, i, status);
@@ -66,16 +72,9 @@ IST_HD inline void frame_exactly(const ExactArrays& batch, std::uint32_t i, Exac
   const PairPlace& place = frame.place;
   const MeshTree& a = solid_of(batch, batch.pairs.a, i).mesh;
   const MeshTree& b = solid_of(batch, batch.pairs.b, i).mesh;
-  const auto offset = [&](const GpuPlacedSolids& side) {
-    return scale_of(side, i) * norm(solid_of(batch, side, i).frame.centre);
-  };
   const MoveAside aside = aside_of(a, b, place.a_from_b);
   frame.aside = aside.by;
-  frame.moved[0] = moved_in_mesh(a);
-  frame.moved[1] =
-      moved_by_poses(pose_of(batch.pairs.a, i).t, offset(batch.pairs.a),
-                     pose_of(batch.pairs.b, i).t, offset(batch.pairs.b), b.extent(), place) +
-      place.a_from_b.scale * moved_in_mesh(b);
+  moved_exactly(batch, i, place, frame.moved);
   frame.touch = touching_distance(frame.moved[0] + frame.moved[1], a, b, place.a_from_b);
   frame.moved[1] += aside.far;
   frame.reach[0] = static_cast<float>(2 * (frame.moved[0] + frame.moved[1]) * (1 + 1e-6));

@@ -203,6 +203,7 @@ SolidRef solid_ref(std::span<const GpuSolid> solids, std::size_t i, const Put& p
     const MeshTree mesh(header, *at<MeshHeader>(header, header.mesh));
     ref.mesh = mesh.copied_to(bytes, header);
     ref.in_floats = put(float_blocks(mesh));
+    ref.box = MeshBox::of(header);
   }
   ref.volume = std::ldexp(header.volume + header.volume_error, 3 * header.exponent);
   ref.radius = header.ball_radius;

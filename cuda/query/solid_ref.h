@@ -10,6 +10,7 @@
 #include "cuda/query/lens_sums.h"
 #include "cuda/query/tree_ref.h"
 #include "query/base/pair_place.h"
+#include "query/exact/mesh_box.h"
 #include "query/exact/mesh_tree.h"
 #include "query/lod/level_pair.h"
 #include "query/shape/plain_shapes.h"
@@ -156,6 +157,7 @@ struct SolidRef {
   AssetDetails details;
   MeshTree mesh;                ///< without a header: none is kept
   const FloatBlock* in_floats;  ///< its blocks
+  MeshBox box;                  ///< around it
   double volume;                ///< [u³] at most
   double radius;                ///< [u] of a ball around it
 

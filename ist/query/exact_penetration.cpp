@@ -11,6 +11,7 @@
 #include "query/exact/exact_sums.h"
 #include "query/exact/keep_largest.h"
 #include "query/exact/kept_mesh.h"
+#include "query/exact/mesh_box.h"
 #include "query/exact/overlap_octants.h"
 #include "query/exact/overlap_terms.h"
 #include "query/scratch/workspace.h"
@@ -216,56 +217,17 @@ struct PlacedMeshes {
         moved_a(moved_in_mesh(a)),
         moved_b(moved_by_poses(from_a, from_b, b, pose) + pose.a_from_b.scale * moved_in_mesh(b)) {}
 
+  /// True if boxes show that there is nothing to search for.
+  bool apart(const PlacedAsset& from_a, const PlacedAsset& from_b,
+             const RelativePose& pose) const noexcept {
+    return boxes_apart(MeshBox::of(from_a.asset.header()), MeshBox::of(from_b.asset.header()), pose,
+                       touching_distance(moved_a + moved_b, a, b, pose.a_from_b));
+  }
   template <class Query>
   Query query(const RelativePose& pose, ExactScratch& scratch) const {
     return {a, moved_a, b, moved_b, pose.a_from_b, pose.b_from_a, scratch};
   }
 };
-
-/// True if the box of solid B is apart from that of A along an axis of A's, by more than `touch`
-/// (A's unit frame).
-bool apart_along_axes(const AssetHeader& a, const AssetHeader& b, const Similarity& a_from_b,
-                      double touch) noexcept {
-  struct Box {
-    double low[3], high[3], middle[3], half[3], rounding = 0;
-
-    explicit Box(const AssetHeader& of) {
-      const double to_unit = std::ldexp(1.0, -of.exponent);
-      for (int k = 0; k < 3; ++k) {
-        low[k] = (of.box_lower[k] - of.centre[k]) * to_unit;
-        high[k] = (of.box_upper[k] - of.centre[k]) * to_unit;
-        middle[k] = (low[k] + high[k]) / 2;
-        half[k] = (high[k] - low[k]) / 2;
-        rounding +=
-            exact::kHalfUnit * to_unit * (std::abs(of.box_lower[k]) + std::abs(of.box_upper[k]));
-      }
-    }
-  };
-  const Box box_a(a), box_b(b);
-  double at[3];
-  a_from_b.apply(box_b.middle, at);
-  for (int k = 0; k < 3; ++k) {
-    const double* const row = a_from_b.m + 3 * k;
-    const double reach = (std::abs(row[0]) * box_b.half[0] + std::abs(row[1]) * box_b.half[1]) +
-                         std::abs(row[2]) * box_b.half[2];
-    const double size = std::abs(at[k]) + std::abs(a_from_b.t[k]) + reach + box_a.half[k];
-    const double pad = 2 * touch + 2 * (box_a.rounding + a_from_b.scale * box_b.rounding) +
-                       32 * exact::kHalfUnit * size;
-    if (at[k] - reach > box_a.high[k] + pad || at[k] + reach < box_a.low[k] - pad) return true;
-  }
-  return false;
-}
-
-/// True if boxes around the solids show that they neither overlap nor touch. Parts that are moved
-/// out of a mate have many triangles that a search by boxes in float cannot tell apart.
-bool boxes_apart(const PlacedAsset& a, const PlacedAsset& b, const PlacedMeshes& meshes,
-                 const RelativePose& pose) noexcept {
-  const double touch =
-      touching_distance(meshes.moved_a + meshes.moved_b, meshes.a, meshes.b, pose.a_from_b);
-  const AssetHeader &of_a = a.asset.header(), &of_b = b.asset.header();
-  return apart_along_axes(of_a, of_b, pose.a_from_b, touch) ||
-         apart_along_axes(of_b, of_a, pose.b_from_a, touch * pose.b_from_a.scale);
-}
 
 ExactInWorld in_world(const ExactSums& sums, const exact::Point& origin, const PairPlace& place) {
   return {sums.volume(), sums.moment, sums.force, sums.torque, origin, place};
@@ -340,7 +302,7 @@ Penetration exact_penetration(const PlacedAsset& a, const PlacedAsset& b,
                               Workspace& workspace) noexcept {
   if (a.asset.header().mesh == 0 || b.asset.header().mesh == 0) return missing_data<Penetration>();
   const PlacedMeshes meshes(a, b, pose);
-  if (boxes_apart(a, b, meshes, pose)) return whole_answer({}, a, b, pose);
+  if (meshes.apart(a, b, pose)) return whole_answer({}, a, b, pose);
   auto query = meshes.query<ExactQuery>(pose, workspace.impl()->exact);
   const ExactOverlap found = query.run(settings.max_visits, settings.pair_id);
   if (found.complete) return whole_answer(found, a, b, pose);
@@ -359,7 +321,7 @@ OverlapOutline exact_patches(const PlacedAsset& a, const PlacedAsset& b,
     return missing_data<OverlapOutline>();
   OverlapOutline answer;
   const PlacedMeshes meshes(a, b, *pose);
-  if (boxes_apart(a, b, meshes, *pose)) {
+  if (meshes.apart(a, b, *pose)) {
     answer.contact.penetration = whole_answer({}, a, b, *pose);
     return answer;
   }
