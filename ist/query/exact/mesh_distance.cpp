@@ -160,8 +160,10 @@ class MeshGapSearch {
     measure_added();
   }
 
-  bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
-  double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
+  bool done() const {
+    const double enough = std::max(0.0, asked_.enough);
+    return out_.overlap || out_.stopped || best_.least <= enough * enough;
+  }
 
   void finish() {
     out_.overlap =
@@ -302,7 +304,7 @@ class MeshGapSearch {
   /// Returns a lower bound of the distance of those that are within `limit_`.
   double measure(std::uint32_t number_a, std::uint32_t number_b, double known) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
-    const double ahead = ahead_of(of_a, of_b);
+    const double ahead = gap_along(level_, of_a, of_b);
     const std::uint64_t first = std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b;
     if (cannot_answer(ahead, first)) return known;
     if (single_ && ahead - slack_ > limit_) return ahead - slack_;
@@ -315,9 +317,8 @@ class MeshGapSearch {
     const WayAxes axes = axes_between(number_a, number_b);
     if (!single_) {
       const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
-      for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a)) {
+      for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a))
         take(i, b.near(a, i, squared_limit_) & all_b);
-      }
       return known;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
@@ -327,25 +328,11 @@ class MeshGapSearch {
     std::optional<Meeting> meeting;
     for (const std::uint32_t i : set_bits(culls.rows(limit_) & all_a)) {
       const std::uint32_t near = culls.lanes(i, nearest_limit_, limit_, least) & all_b;
-      take(i, near != 0 && planes_pay() ? within_planes(first, i, near, meeting) : near);
+      if (near == 0) continue;
+      take(i, planes_pay() ? within_planes(first, i, near, meeting) : near);
+      if (done()) break;
     }
     return std::max(known, std::sqrt(double{least}));
-  }
-
-  /// The gap between the blocks of A and B along the normal of parallel faces, or along `toward`.
-  double ahead_of(const PlacedVertices& of_a, const PlacedVertices& of_b) const {
-    const D d;
-    const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
-    const auto along = [&](const PlacedVertices& of, std::size_t l) {
-      return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
-             z * hn::Load(d, of.at[2] + l);
-    };
-    V last = along(of_a, 0), next = along(of_b, 0);
-    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
-      last = hn::Max(last, along(of_a, l));
-      next = hn::Min(next, along(of_b, l));
-    }
-    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
   }
 
   /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they
@@ -362,9 +349,9 @@ class MeshGapSearch {
     const std::uint32_t vain = out_.tests - better_at_;
     return vain > kVain && vain < 2 * kVain + 4 * excluded_;
   }
-  /// The triangles of B among `lanes` that no plane of A's triangle i, or of theirs, proves to be
-  /// as far from it as the best pair is, up to rounding; or all, if they come before that pair.
-  /// Parts that fit have many that are as near, which floats cannot distinguish from nearer ones.
+  /// The triangles of B among `lanes` that no plane of A's triangle i or of theirs keeps as far
+  /// from it as the best pair is, up to rounding; or all, if they come before that pair. Parts that
+  /// fit have many that are as near, which floats cannot distinguish from nearer ones.
   HWY_NOINLINE std::uint32_t within_planes(std::uint64_t first, std::uint32_t i,
                                            std::uint32_t lanes, std::optional<Meeting>& meeting) {
     best_planes_.touch = std::sqrt(best_.least) - 0.5 * best_.rounding;
@@ -454,8 +441,7 @@ class MeshGapSearch {
   }
 
   const GapQuestion& asked_;
-  const MeshTree& a_;
-  const MeshTree& b_;
+  const MeshTree &a_, &b_;
   Budget& budget_;
   ExactScratch& scratch_;
   GapPair* const waiting_;  ///< a stack
@@ -469,6 +455,7 @@ class MeshGapSearch {
   double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;
   double squared_limit_ = 0;
   NearestTriangles best_;
+  /// The last direction of the best pair, and the normal if that is of parallel faces.
   exact::Point toward_, level_ = {0, 0, 0};
   WayAxes axes_;
   std::optional<BlockFaces> faces_;  ///< of a block, along the axes

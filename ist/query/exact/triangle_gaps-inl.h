@@ -207,6 +207,23 @@ class TriangleCulls {
   bool has_sides_ = false;
 };
 
+/// The gap between the vertices of a block of A and those of one of B, along a direction.
+inline double gap_along(const exact::Point& way, const PlacedVertices& of_a,
+                        const PlacedVertices& of_b) {
+  const D d;
+  const V x = hn::Set(d, way.x), y = hn::Set(d, way.y), z = hn::Set(d, way.z);
+  const auto along = [&](const PlacedVertices& of, std::size_t l) {
+    return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
+           z * hn::Load(d, of.at[2] + l);
+  };
+  V last = along(of_a, 0), next = along(of_b, 0);
+  for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
+    last = hn::Max(last, along(of_a, l));
+    next = hn::Min(next, along(of_b, l));
+  }
+  return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
+}
+
 /// A box, and its extents along three axes.
 struct PlacedBox {
   double low[3], high[3];
