@@ -1,7 +1,6 @@
 #include "query/exact/mesh_distance.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <hwy/foreach_target.h>
 
 #include "base/bits.h"
+#include "query/exact/block_meeting-inl.h"
 #include "query/exact/box_gaps-inl.h"
 #include "query/exact/mesh_gap.h"
 #include "query/exact/mesh_queries.h"
@@ -28,6 +28,8 @@ class MeshGapSearch {
   static constexpr std::uint64_t kFoundAgain = std::uint64_t{1} << 32;
   /// The number of pairs of triangles that wait for others. Eight are measured in the same time.
   static constexpr std::uint32_t kFew = 4;
+  /// After so many pairs without a better one, planes in double are tried.
+  static constexpr std::uint32_t kVain = 32;
   /// A block this many times as large as a node is bounded by its triangles, not by its box.
   static constexpr double kMuchLarger = 3;
 
@@ -48,7 +50,8 @@ class MeshGapSearch {
         single_b_(asked.b_from_a, blur_ / scale_),
         double_a_(asked.a_from_b, blur_),
         double_b_(asked.b_from_a, blur_ / scale_),
-        best_{gap_rounding(reach_)} {
+        best_{gap_rounding(reach_)},
+        best_planes_{&a_, &b_, asked.a_from_b, asked.b_from_a} {
     look_along(asked.toward);
     scratch.forget(a_.hash);
     scratch.pairs->count = 0;
@@ -157,11 +160,14 @@ class MeshGapSearch {
     measure_added();
   }
 
-  bool done() const { return out_.overlap || out_.stopped || best_.least <= enough(); }
-  double enough() const { return asked_.enough >= 0 ? asked_.enough * asked_.enough : 0; }
+  bool done() const {
+    const double enough = std::max(0.0, asked_.enough);
+    return out_.overlap || out_.stopped || best_.least <= enough * enough;
+  }
 
   void finish() {
-    out_.overlap = out_.overlap || (!asked_.outside && (holds(false) || holds(true)));
+    out_.overlap =
+        out_.overlap || (best_.least > 0 && !asked_.outside && (holds(false) || holds(true)));
     out_.farther = !out_.overlap && !out_.stopped && best_.least > most_ * most_;
     if (out_.overlap || out_.farther) return;
     out_.a = best_.on_a;
@@ -241,8 +247,8 @@ class MeshGapSearch {
       double gap = unit * double{squared[l]};
       if (gap > squared_limit_) continue;
       if (beside != nullptr)
-        gap = std::max(
-            gap, beside->squared_gap(placed_box(open_a, level - 1, kWidth * number + l), slack_));
+        gap =
+            std::max(gap, beside->squared_gap(box(open_a, level - 1, kWidth * number + l), slack_));
       if (gap > squared_limit_) continue;
       GapPair child = pair;
       child.squared = std::max(pair.squared, gap);
@@ -279,30 +285,14 @@ class MeshGapSearch {
     for (const bool of_a : {false, true}) {
       const BlockFaces* const larger = triangles_beside(blocks, of_a);
       if (larger == nullptr) continue;
-      const exact::Point way =
-          larger->way_to(placed_box(of_a, 0, of_a ? number_a : number_b).middle);
+      const exact::Point way = larger->way_to(box(of_a, 0, of_a ? number_a : number_b).middle);
       if (const double length = std::sqrt(dot(way, way)); length > 0)
         return axes_along((1 / length) * way);
     }
     return axes_;
   }
-  /// A node's box in A's frame, with its extents along the axes.
-  PlacedBox placed_box(bool of_a, int level, std::uint32_t number) const {
-    const MiddleBox<double> box = box_of<double>(of_a ? a_ : b_, level, number);
-    const double(&m)[9] = asked_.a_from_b.m;
-    PlacedBox out;
-    out.middle = {box.middle[0], box.middle[1], box.middle[2]};
-    if (!of_a) out.middle = map_point(asked_.a_from_b, out.middle);
-    for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < 3; ++i) out.side[k][i] = box.half[k] * (of_a ? i == k : m[3 * i + k]);
-    for (std::size_t j = 0; j < 3; ++j) {
-      const exact::Point& way = axes_.way[j];
-      double reach = 0;
-      for (const exact::Point& side : out.side) reach += std::abs(dot(way, side));
-      out.low[j] = dot(way, out.middle) - reach;
-      out.high[j] = dot(way, out.middle) + reach;
-    }
-    return out;
+  PlacedBox box(bool of_a, int level, std::uint32_t number) const {
+    return placed_box(of_a ? a_ : b_, level, number, of_a ? nullptr : &asked_.a_from_b, axes_);
   }
 
   const PlacedVertices& vertices(bool of_b, std::uint32_t number) {
@@ -314,9 +304,9 @@ class MeshGapSearch {
   /// Returns a lower bound of the distance of those that are within `limit_`.
   double measure(std::uint32_t number_a, std::uint32_t number_b, double known) {
     const PlacedVertices &of_a = vertices(false, number_a), &of_b = vertices(true, number_b);
-    const double ahead = ahead_of(of_a, of_b);
-    if (cannot_answer(ahead, std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b))
-      return known;
+    const double ahead = gap_along(level_, of_a, of_b);
+    const std::uint64_t first = std::uint64_t{kWidth * number_a} << 32 | kWidth * number_b;
+    if (cannot_answer(ahead, first)) return known;
     if (single_ && ahead - slack_ > limit_) return ahead - slack_;
     const std::uint32_t all_a = (1u << a_.blocks[number_a].triangles) - 1,
                         all_b = (1u << b_.blocks[number_b].triangles) - 1;
@@ -327,35 +317,22 @@ class MeshGapSearch {
     const WayAxes axes = axes_between(number_a, number_b);
     if (!single_) {
       const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
-      for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a)) {
+      for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a))
         take(i, b.near(a, i, squared_limit_) & all_b);
-      }
       return known;
     }
     const PlacedTriangles& a = placed_triangles(a_, number_a, nullptr, *scratch_.placed_a);
     const PlacedTriangles& b = placed_triangles(b_, number_b, &asked_.a_from_b, *scratch_.placed_b);
     TriangleCulls culls(a, b, axes, static_cast<float>(blur_));
     float least = HUGE_VALF;
+    std::optional<Meeting> meeting;
     for (const std::uint32_t i : set_bits(culls.rows(limit_) & all_a)) {
-      take(i, culls.lanes(i, nearest_limit_, limit_, least) & all_b);
+      const std::uint32_t near = culls.lanes(i, nearest_limit_, limit_, least) & all_b;
+      if (near == 0) continue;
+      take(i, planes_pay() ? within_planes(first, i, near, meeting) : near);
+      if (done()) break;
     }
     return std::max(known, std::sqrt(double{least}));
-  }
-
-  /// The gap between the blocks of A and B along the normal of parallel faces, or along `toward`.
-  double ahead_of(const PlacedVertices& of_a, const PlacedVertices& of_b) const {
-    const D d;
-    const V x = hn::Set(d, level_.x), y = hn::Set(d, level_.y), z = hn::Set(d, level_.z);
-    const auto along = [&](const PlacedVertices& of, std::size_t l) {
-      return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
-             z * hn::Load(d, of.at[2] + l);
-    };
-    V last = along(of_a, 0), next = along(of_b, 0);
-    for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
-      last = hn::Max(last, along(of_a, l));
-      next = hn::Min(next, along(of_b, l));
-    }
-    return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
   }
 
   /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they
@@ -365,6 +342,26 @@ class MeshGapSearch {
     const double distance = std::sqrt(best_.least);
     return best_.pair < first && distance >= 4 * best_.rounding &&
            ahead >= distance - 0.5 * best_.rounding;
+  }
+
+  /// True if many pairs were measured in vain, and planes have excluded some if they were asked.
+  bool planes_pay() const {
+    const std::uint32_t vain = out_.tests - better_at_;
+    return vain > kVain && vain < 2 * kVain + 4 * excluded_;
+  }
+  /// The triangles of B among `lanes` that no plane of A's triangle i or of theirs keeps as far
+  /// from it as the best pair is, up to rounding; or all, if they come before that pair. Parts that
+  /// fit have many that are as near, which floats cannot distinguish from nearer ones.
+  HWY_NOINLINE std::uint32_t within_planes(std::uint64_t first, std::uint32_t i,
+                                           std::uint32_t lanes, std::optional<Meeting>& meeting) {
+    best_planes_.touch = std::sqrt(best_.least) - 0.5 * best_.rounding;
+    if (best_.pair > first || best_planes_.touch < 3.5 * best_.rounding) return lanes;
+    if (!meeting)
+      meeting.emplace(best_planes_, scratch_, static_cast<std::uint32_t>(first >> 32) / kWidth,
+                      static_cast<std::uint32_t>(first) / kWidth, Margin::rounding, 0.0f);
+    const std::uint32_t left = meeting->within_touch(i, lanes);
+    excluded_ += static_cast<std::uint32_t>(std::popcount(lanes & ~left));
+    return left;
   }
 
   void add(std::uint64_t pair) {
@@ -398,9 +395,11 @@ class MeshGapSearch {
     out_.tests += count;
     PairGaps gaps;
     std::uint32_t unclear = measure_pairs(pairs, count, slack_, gaps);
+    // Where two share a point the answer is 0, whether triangles cross or not.
+    if (*std::min_element(gaps.squared, gaps.squared + count) <= 0) unclear = 0;
     for (; unclear != 0 && !out_.overlap; unclear &= unclear - 1) {
       const auto n = static_cast<std::uint32_t>(std::countr_zero(unclear));
-      out_.overlap = !apart_along(pairs, gaps, n) && crosses(pairs, n);
+      out_.overlap = crosses(pairs, gaps, n, slack_);
     }
     if (out_.overlap) return;
     const double before = best_.least;
@@ -413,16 +412,15 @@ class MeshGapSearch {
                   {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]});
     }
     if (!(best_.least < before)) return;
+    better_at_ = out_.tests;
     const double distance = std::sqrt(best_.least);
     limit_to(std::min(nearest_limit_, single_ ? distance + slack_ : (1 - kGapsAlike) * distance));
     if (distance > 0) {
       look_along((1 / distance) * best_.between);
       for (std::uint32_t n = 0; n < count; ++n)
         if (best_.pair == (std::uint64_t{pairs.triangle[0][n]} << 32 | pairs.triangle[1][n]))
-          for (int side = 0; side < 2; ++side) {
-            const Corners t = corners(pairs, side, n);
-            level_with({t[0], t[1], t[2]}, toward_, level_);
-          }
+          for (int side = 0; side < 2; ++side)
+            level_with(corners(pairs, side, n).at, toward_, level_);
     }
   }
 
@@ -442,32 +440,8 @@ class MeshGapSearch {
     ring.add(*keep_, bound);
   }
 
-  using Corners = std::array<exact::Point, 3>;
-  static Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
-    Corners at;
-    for (int c = 0; c < 3; ++c)
-      at[c] = {pairs.corner[side][c][0][n], pairs.corner[side][c][1][n],
-               pairs.corner[side][c][2][n]};
-    return at;
-  }
-
-  /// True if a plane perpendicular to the direction between the found points separates the
-  /// triangles. It does if these are the nearest points, except for rounding.
-  bool apart_along(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n) const {
-    const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
-    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
-    const double last = std::max({dot(way, a[0]), dot(way, a[1]), dot(way, a[2])}),
-                 next = std::min({dot(way, b[0]), dot(way, b[1]), dot(way, b[2])});
-    return next - last > 4 * slack_ * std::sqrt(gaps.squared[n]);
-  }
-  static bool crosses(const TrianglePairs& pairs, std::uint32_t n) {
-    const Corners a = corners(pairs, 0, n), b = corners(pairs, 1, n);
-    return exact::cross_exactly({a[0], a[1], a[2]}, {b[0], b[1], b[2]});
-  }
-
   const GapQuestion& asked_;
-  const MeshTree& a_;
-  const MeshTree& b_;
+  const MeshTree &a_, &b_;
   Budget& budget_;
   ExactScratch& scratch_;
   GapPair* const waiting_;  ///< a stack
@@ -481,11 +455,15 @@ class MeshGapSearch {
   double most_, nearest_limit_ = 0, ahead_ = 0, limit_ = 0;
   double squared_limit_ = 0;
   NearestTriangles best_;
+  /// The last direction of the best pair, and the normal if that is of parallel faces.
   exact::Point toward_, level_ = {0, 0, 0};
   WayAxes axes_;
   std::optional<BlockFaces> faces_;  ///< of a block, along the axes
   std::uint32_t faces_of_ = 0;
   bool faces_of_b_ = false;
+  CrossingSearch best_planes_;  ///< planes keep triangles as far as `touch`
+  std::uint32_t better_at_ = 0,
+                excluded_ = 0;  ///< pairs measured until the best; left out by planes
   KeptPairs* keep_ = nullptr;
   MeshGap out_;
 };

@@ -207,11 +207,48 @@ class TriangleCulls {
   bool has_sides_ = false;
 };
 
+/// The gap between the vertices of a block of A and those of one of B, along a direction.
+inline double gap_along(const exact::Point& way, const PlacedVertices& of_a,
+                        const PlacedVertices& of_b) {
+  const D d;
+  const V x = hn::Set(d, way.x), y = hn::Set(d, way.y), z = hn::Set(d, way.z);
+  const auto along = [&](const PlacedVertices& of, std::size_t l) {
+    return (x * hn::Load(d, of.at[0] + l) + y * hn::Load(d, of.at[1] + l)) +
+           z * hn::Load(d, of.at[2] + l);
+  };
+  V last = along(of_a, 0), next = along(of_b, 0);
+  for (std::size_t l = hn::Lanes(d); l < kWidth; l += hn::Lanes(d)) {
+    last = hn::Max(last, along(of_a, l));
+    next = hn::Min(next, along(of_b, l));
+  }
+  return hn::GetLane(hn::MinOfLanes(d, next)) - hn::GetLane(hn::MaxOfLanes(d, last));
+}
+
 /// A box, and its extents along three axes.
 struct PlacedBox {
   double low[3], high[3];
   exact::Point middle, side[3];  ///< half of each side, from the middle
 };
+
+/// A node's box in A's unit frame; `map` is null for A's own.
+inline PlacedBox placed_box(const MeshTree& mesh, int level, std::uint32_t number,
+                            const Similarity* map, const WayAxes& axes) {
+  const MiddleBox<double> box = box_of<double>(mesh, level, number);
+  PlacedBox out;
+  out.middle = {box.middle[0], box.middle[1], box.middle[2]};
+  if (map != nullptr) out.middle = map_point(*map, out.middle);
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 3; ++i)
+      out.side[k][i] = box.half[k] * (map == nullptr ? i == k : map->m[3 * i + k]);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const exact::Point& way = axes.way[j];
+    double reach = 0;
+    for (const exact::Point& side : out.side) reach += std::abs(dot(way, side));
+    out.low[j] = dot(way, out.middle) - reach;
+    out.high[j] = dot(way, out.middle) + reach;
+  }
+  return out;
+}
 
 /// The extents of a block's triangles along three axes, in double.
 class BlockExtents {
@@ -385,6 +422,29 @@ HWY_INLINE std::uint32_t measure_pairs(const TrianglePairs& pairs, std::uint32_t
     store(least.between, out.between);
   }
   return unclear & ((1u << count) - 1);
+}
+
+struct Corners {
+  exact::Point at[3];
+};
+inline Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
+  Corners out;
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 3; ++k) out.at[c][k] = pairs.corner[side][c][k][n];
+  return out;
+}
+
+/// True if the triangles of pair n cross. They do not if a plane perpendicular to the direction
+/// between the found points separates them. It does if these are the nearest points, except for
+/// rounding.
+inline bool crosses(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n,
+                    double slack) {
+  const exact::Point way = {gaps.between[0][n], gaps.between[1][n], gaps.between[2][n]};
+  const auto [a] = corners(pairs, 0, n);
+  const auto [b] = corners(pairs, 1, n);
+  const double last = std::max({dot(way, a[0]), dot(way, a[1]), dot(way, a[2])}),
+               next = std::min({dot(way, b[0]), dot(way, b[1]), dot(way, b[2])});
+  return !(next - last > 4 * slack * std::sqrt(gaps.squared[n])) && exact::cross_exactly(a, b);
 }
 
 }  // namespace ist::HWY_NAMESPACE
