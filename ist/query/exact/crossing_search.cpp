@@ -298,7 +298,7 @@ class TriangleSearch : PairSigns {
     heights.find_parts(parts);
     std::uint32_t left = round.undecided(all, parts, round.certain);
     if (left != 0) {
-      find_ways_closer(pairs, left, round);
+      find_ways_closer(pairs, parts, left, round);
       left = round.undecided(left, parts, round.certain);
     }
     for (const std::uint32_t i : set_bits(left)) find_round_exactly(pairs, parts, i, round);
