@@ -330,16 +330,21 @@ class TriangleSearch : PairSigns {
   /// have marked theirs.
   HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t fresh) {
     if (fresh == 0) return;
+    // The first often marks the blocks of all.
+    mark_if_near(pairs, static_cast<std::uint32_t>(std::countr_zero(fresh)));
+    fresh = not_marked(pairs, fresh & (fresh - 1));
+    if (fresh == 0) return;
     fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
                             double{search_.near});
-    for (const std::uint32_t n : set_bits(fresh)) {
-      const ExactCorners corners(pairs, n);
-      if (not_marked(pairs, 1u << n) == 0 ||
-          !exact::come_within(search_.near, corners.of[0], corners.of[1]))
-        continue;
-      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
-      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
-    }
+    for (const std::uint32_t n : set_bits(fresh))
+      if (not_marked(pairs, 1u << n) != 0) mark_if_near(pairs, n);
+  }
+
+  void mark_if_near(const TrianglePairs& pairs, std::uint32_t n) {
+    const ExactCorners corners(pairs, n);
+    if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
+    set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+    set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
   }
 
   /// Keeps the gathered pairs that no plane along a triangle, or along an edge of each, separates
