@@ -64,7 +64,7 @@ class PairSigns {
   /// `kAsks`: settled signs are wanted.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
-                                 PairHeights& out) const {
+                               PairHeights& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room}), filter = hn::Set(d, exact::kFilter);
     const V two = hn::Set(d, 2.0), six_rooms = hn::Set(d, 6.0) * room;
@@ -187,7 +187,7 @@ class PairSigns {
 
   template <bool kAsks>
   HWY_INLINE void find_ways_round(const TrianglePairs& pairs, std::uint32_t count,
-                                    WaysRound& out) const {
+                                  WaysRound& out) const {
     const D d;
     const V room = hn::Set(d, double{search_.room});
     const V filter = hn::Set(d, 6 * exact::kFilter), six_rooms = hn::Set(d, 6.0) * room;
