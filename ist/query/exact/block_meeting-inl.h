@@ -33,12 +33,17 @@ HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertic
   return out;
 }
 
-/// The plane of a triangle, and axes along it.
+HWY_INLINE Vec3 all_lanes(const exact::Point& x) {
+  const D d;
+  return {hn::Set(d, x.x), hn::Set(d, x.y), hn::Set(d, x.z)};
+}
+
+/// The plane of a triangle.
 struct SeenPlane {
   Vec3 at, normal;
 
   SeenPlane(const PlacedPlanes& planes, std::uint32_t t)
-      : at(one(planes.at, t)), normal(one(planes.normal, t)) {}
+      : at(all_lanes(planes.corner[t].point)), normal(all_lanes(planes.normal[t].point)) {}
 
   /// The heights of vertices l … of a block, times the length of the normal.
   HWY_INLINE V heights(const PlacedVertices& vertices, std::size_t l) const {
@@ -47,12 +52,6 @@ struct SeenPlane {
                     hn::Load(d, vertices.at[2] + l)} -
                    at,
                normal);
-  }
-
- private:
-  static Vec3 one(const double (&from)[3][kWidth], std::uint32_t t) {
-    const D d;
-    return {hn::Set(d, from[0][t]), hn::Set(d, from[1][t]), hn::Set(d, from[2][t])};
   }
 };
 
@@ -68,9 +67,9 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
                                std::uint32_t t, double low, double high, const exact::Point& aside,
                                double apart, Margin margin, double by) {
   const D d;
-  const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
-  const double shift = dot(aside, n), longest = planes.longest[t] + by;
-  double beyond = 1.1 * exact::kFilter * planes.size[t] * apart;
+  const exact::Point& n = planes.normal[t].point;
+  const double shift = dot(aside, n), longest = planes.normal[t].number + by;
+  double beyond = 1.1 * exact::kFilter * planes.corner[t].number * apart;
   if (margin == Margin::reach)
     beyond += by * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z));
   else if (margin == Margin::room)  // six products of three numbers
@@ -94,9 +93,9 @@ HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32
   const D d;
   std::uint32_t out = 0;
   for (int e = 0; e < 3; ++e) {
-    const exact::Point n = {planes.edge[e][0][t], planes.edge[e][1][t], planes.edge[e][2][t]};
-    const V least = hn::Set(d, (planes.edge_offset[e][t] - dot(aside, n)) + by);
-    const Vec3 away = {hn::Set(d, n.x), hn::Set(d, n.y), hn::Set(d, n.z)};
+    const PlacedPlanes::PointAnd& edge = planes.edge[e][t];
+    const V least = hn::Set(d, (edge.number - dot(aside, edge.point)) + by);
+    const Vec3 away = all_lanes(edge.point);
     std::uint32_t beyond = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
       const Vec3 at = {hn::Load(d, other.at[0] + l), hn::Load(d, other.at[1] + l),
@@ -134,22 +133,16 @@ inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t num
     const Vec3 normal = {ax - bx, ay - by, az - bz};
     const Vec3 size = {hn::Abs(ax) + hn::Abs(bx), hn::Abs(ay) + hn::Abs(by),
                        hn::Abs(az) + hn::Abs(bz)};
-    hn::Store((size.x + size.y) + size.z, d, out.size + l);
-    const auto store = [&](const Vec3& x, double(&to)[3][kWidth]) {
-      hn::Store(x.x, d, to[0] + l);
-      hn::Store(x.y, d, to[1] + l);
-      hn::Store(x.z, d, to[2] + l);
+    const auto store = [&](const Vec3& x, V number, PlacedPlanes::PointAnd* to) {
+      hn::StoreInterleaved4(x.x, x.y, x.z, number, d, &to[l].point.x);
     };
-    store(p[0], out.at);
-    store(normal, out.normal);
-    hn::Store(hn::Max(largest(u), largest(v)), d, out.longest + l);
+    store(p[0], (size.x + size.y) + size.z, out.corner);
+    store(normal, hn::Max(largest(u), largest(v)), out.normal);
     for (int e = 0; e < 3; ++e) {
       const Vec3 across = cross(p[(e + 1) % 3] - p[e], normal);
       const Vec3 out_of =
           (hn::Set(d, 1.0) / hn::Max(length_bound(across), hn::Set(d, 1e-300))) * across;
-      store(out_of, out.edge[e]);
-      hn::Store(max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2])), d,
-                out.edge_offset[e] + l);
+      store(out_of, max3(dot(out_of, p[0]), dot(out_of, p[1]), dot(out_of, p[2])), out.edge[e]);
     }
     hn::Store(length_bound(normal), d, length + l);
   }
@@ -233,12 +226,14 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
-/// The numbers of planes through edges that a search has tested, of A's triangles and of B's, and
-/// of pairs that they separated. Those pairs would cost three times as much otherwise.
-struct EdgeTally {
-  std::uint32_t asked[2] = {}, apart[2] = {};
-  bool pays(int side) const { return asked[side] <= 2 * apart[side] + 8; }
+/// How often a search has asked what may not pay, and how often that was of use.
+struct Tally {
+  std::uint32_t asked = 0, found = 0;
+  bool pays() const { return asked <= 2 * found + 8; }
 };
+/// Of planes through edges of A's triangles and of B's, and of the pairs that they separated. Those
+/// pairs would cost three times as much otherwise.
+using EdgeTally = Tally[2];
 
 /// Two blocks whose triangles are tested in double by the planes of both sides, and by planes
 /// through their edges.
@@ -270,7 +265,7 @@ class Meeting {
   std::uint32_t straddling_block(int side) {
     // Its own heights have the same error as the other's.
     const PlacedPlanes& planes = planes_of(side);
-    const double off = 1.1 * exact::kFilter * planes.size[planes.widest] * apart_;
+    const double off = 1.1 * exact::kFilter * planes.corner[planes.widest].number * apart_;
     flat_[side] = true;
     return ~kept_apart(side, sides(side, planes.widest, planes.low - off, planes.high + off,
                                    margin_ == Margin::room ? Margin::reach : margin_));
@@ -288,18 +283,18 @@ class Meeting {
   /// i.
   std::uint32_t within_edges(std::uint32_t i, std::uint32_t lanes, EdgeTally& tally) {
     const auto ask = [&](int side, std::uint32_t t) {
-      ++tally.asked[side];
+      ++tally[side].asked;
       return beyond(side, t);
     };
-    if (flat_[0] || ((lanes & (lanes - 1)) != 0 && tally.pays(0))) {
+    if (flat_[0] || ((lanes & (lanes - 1)) != 0 && tally[0].pays())) {
       const std::uint32_t apart = lanes & ask(0, i);
-      tally.apart[0] += static_cast<std::uint32_t>(std::popcount(apart));
+      tally[0].found += static_cast<std::uint32_t>(std::popcount(apart));
       lanes &= ~apart;
     }
-    if (lanes != 0 && (flat_[1] || tally.pays(1))) {
+    if (lanes != 0 && (flat_[1] || tally[1].pays())) {
       const std::uint32_t left =
           edges_.without(i, lanes, [&](std::uint32_t j) { return ask(1, j); });
-      tally.apart[1] += static_cast<std::uint32_t>(std::popcount(lanes & ~left));
+      tally[1].found += static_cast<std::uint32_t>(std::popcount(lanes & ~left));
       lanes = left;
     }
     return lanes;
@@ -336,14 +331,14 @@ class Meeting {
   }
   /// Classifies the other block's vertices by the plane of triangle t.
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
-    return sides_of(*vertices_[1 - side], planes_of(side), t, low, high,
-                    (side == 0 ? 1.0 : -1.0) * search_.aside, double{apart_}, margin,
+    return sides_of(*vertices_[1 - side], planes_of(side), t, low, high, aside_[side],
+                    double{apart_}, margin,
                     double{margin == Margin::reach ? reach_ : search_.room});
   }
   /// The other block's vertices that are farther from the plane of triangle t than `distance`.
   PlaneSides sides_by(int side, std::uint32_t t, double distance) const {
     const PlacedPlanes& planes = planes_of(side);
-    const exact::Point n = {planes.normal[0][t], planes.normal[1][t], planes.normal[2][t]};
+    const exact::Point& n = planes.normal[t].point;
     const double far = distance * std::sqrt(dot(n, n));
     return sides_of(*vertices_[1 - side], planes, t, -far, far, {0, 0, 0}, double{apart_},
                     Margin::rounding, 0);
@@ -358,9 +353,9 @@ class Meeting {
   }
   /// The same, and those beyond an edge of triangle t.
   std::uint32_t beyond(int side, std::uint32_t t) const {
-    const double moved = margin_ != Margin::rounding ? 0.0 : side == 0 ? 1.0 : -1.0;
-    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side], moved * search_.aside,
-                           beyond_);
+    const exact::Point still = {0, 0, 0};
+    return beyond_edges_of(planes_of(side), t, *vertices_[1 - side],
+                           margin_ == Margin::rounding ? aside_[side] : still, beyond_);
   }
   /// The triangles of A that planes of B separate, computed at the first use.
   class Columns {
@@ -397,6 +392,7 @@ class Meeting {
   const Margin margin_;
   const float reach_;
   const std::uint32_t number_[2];
+  const exact::Point aside_[2] = {search_.aside, -1 * search_.aside};  ///< of the other block
   const PlacedVertices* vertices_[2];
   mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
   float apart_ = 0;                             ///< no coordinates of both blocks differ by more

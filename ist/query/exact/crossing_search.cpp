@@ -241,8 +241,13 @@ class TriangleSearch : PairSigns {
                  both.margin() == Margin::room);
       // Once both blocks are marked, planes decide far more.
       if (!flush || both.margin() != Margin::room) continue;
-      if (!std::exchange(tried, true)) test_pairs();
-      if (!are_near(number_a, number_b)) continue;
+      const bool tries = !tried && marking_.pays();
+      if (tries) test_pairs();
+      tried |= tries;
+      const bool marked = are_near(number_a, number_b);
+      marking_.asked += tries;
+      marking_.found += tries && marked;
+      if (!marked) continue;
       made.reset();
       if (!straddle_blocks()) return;
     }
@@ -265,29 +270,35 @@ class TriangleSearch : PairSigns {
   /// Tests the gathered pairs by the planes of both triangles and by edges.
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
-    const std::uint32_t count = std::exchange(pairs.count, 0), asks = std::exchange(pairs.asks, 0);
+    const std::uint32_t count = std::exchange(pairs.count, 0);
+    const std::uint32_t asks = not_marked(pairs, std::exchange(pairs.asks, 0));
     const std::uint32_t all = (1u << count) - 1;
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     PairHeights heights;
-    find_heights<false>(pairs, count, heights);
+    WaysRound round;
+    asks != 0 ? find_heights<true>(pairs, count, heights)
+              : find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (const std::uint32_t i : set_bits(all & ~heights.apart(heights.certain) & ~certain))
       find_heights_exactly(pairs, i, heights);
     const std::uint32_t meet = all & ~heights.apart(heights.certain);
-    if (meet != 0) test_edges(pairs, heights, meet);
-    note_near(pairs, count, asks);
+    if (meet != 0) {
+      const auto lanes = static_cast<std::uint32_t>(std::bit_width(meet));
+      asks != 0 ? find_ways_round<true>(pairs, lanes, round)
+                : find_ways_round<false>(pairs, lanes, round);
+      test_edges(pairs, heights, meet, round);
+    }
+    if (asks != 0) note_near(pairs, not_marked(pairs, asks & ~settled(heights, round)));
   }
 
   /// Tests by edges the pairs that planes left.
   HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights,
-                             std::uint32_t all) {
-    WaysRound round;
-    find_ways_round<false>(pairs, static_cast<std::uint32_t>(std::bit_width(all)), round);
+                             std::uint32_t all, WaysRound& round) {
     std::uint32_t parts[2][3], pierced[2][3];
     heights.find_parts(parts);
     std::uint32_t left = round.undecided(all, parts, round.certain);
     if (left != 0) {
-      find_ways_closer(pairs, left, round);
+      find_ways_closer(pairs, parts, left, round);
       left = round.undecided(left, parts, round.certain);
     }
     for (const std::uint32_t i : set_bits(left)) find_round_exactly(pairs, parts, i, round);
@@ -317,21 +328,23 @@ class TriangleSearch : PairSigns {
   /// Marks the blocks of pairs whose signs might differ if points moved within the tolerance, if
   /// they are that near. So the marks do not depend on which search found the pairs. Crossing pairs
   /// have marked theirs.
-  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t count, std::uint32_t asks) {
-    asks = not_marked(pairs, asks);
-    if (asks == 0) return;
-    std::uint32_t fresh = asks & ~find_settled(pairs, count);
+  HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t fresh) {
+    if (fresh == 0) return;
+    // The first often marks the blocks of all.
+    mark_if_near(pairs, static_cast<std::uint32_t>(std::countr_zero(fresh)));
+    fresh = not_marked(pairs, fresh & (fresh - 1));
     if (fresh == 0) return;
     fresh &= ~far_by_planes(pairs, static_cast<std::uint32_t>(std::bit_width(fresh)),
                             double{search_.near});
-    for (const std::uint32_t n : set_bits(fresh)) {
-      const ExactCorners corners(pairs, n);
-      if (not_marked(pairs, 1u << n) == 0 ||
-          !exact::come_within(search_.near, corners.of[0], corners.of[1]))
-        continue;
-      set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
-      set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
-    }
+    for (const std::uint32_t n : set_bits(fresh))
+      if (not_marked(pairs, 1u << n) != 0) mark_if_near(pairs, n);
+  }
+
+  void mark_if_near(const TrianglePairs& pairs, std::uint32_t n) {
+    const ExactCorners corners(pairs, n);
+    if (!exact::come_within(search_.near, corners.of[0], corners.of[1])) return;
+    set(scratch_.a.near, pairs.triangle[0][n] / kWidth);
+    set(scratch_.b.near, pairs.triangle[1][n] / kWidth);
   }
 
   /// Keeps the gathered pairs that no plane along a triangle, or along an edge of each, separates
@@ -369,6 +382,7 @@ class TriangleSearch : PairSigns {
   PlacedMeshes placed_;
   float pad_b_, reach_, slack_;
   EdgeTally edges_;
+  Tally marking_;  ///< of tests at once, and of blocks that they marked
   PiercingEdges ends_;
   KeptPairs* keep_ = nullptr;   ///< near pairs are kept, and not tested yet
   std::uint32_t gathered_ = 0;  ///< for it

@@ -41,15 +41,18 @@ struct alignas(64) PlacedTriangles {
   float reach;  ///< no coordinate is larger
 };
 
-/// The planes of a block's triangles in A's unit frame.
+/// The planes of a block's triangles in A's unit frame. All of one triangle is in few cache lines.
 struct alignas(64) PlacedPlanes {
-  double at[3][kWidth];      ///< their first corners
-  double normal[3][kWidth];  ///< product of two sides
-  double size[kWidth];       ///< no sum of the absolute products in it is larger
-  double longest[kWidth];    ///< no coordinate of these sides is larger
-  /// [edge][axis]: along the plane out of the triangle, which lies below the offset; its absolute
-  /// coordinates add up to 1, but for rounding.
-  double edge[3][3][kWidth], edge_offset[3][kWidth];
+  struct PointAnd {
+    exact::Point point;
+    double number;
+  };
+  /// The first corner, and a bound of the sums of the absolute products in the normal.
+  PointAnd corner[kWidth];
+  PointAnd normal[kWidth];  ///< product of two sides, and a bound of the coordinates of these
+  /// Along the plane out of the triangle, which lies below the number; its absolute coordinates add
+  /// up to 1, but for rounding.
+  PointAnd edge[3][kWidth];
   /// The block's vertices are between these heights above the plane of `widest`, times the length
   /// of its normal.
   double low, high;

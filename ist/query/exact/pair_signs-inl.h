@@ -226,8 +226,8 @@ class PairSigns {
 
   /// Decides signs that are not certain by bounds as tight as those of exact::FilteredPlane, where
   /// products of zero coordinates have no rounding.
-  HWY_NOINLINE void find_ways_closer(const TrianglePairs& pairs, std::uint32_t which,
-                                     WaysRound& out) const {
+  HWY_NOINLINE void find_ways_closer(const TrianglePairs& pairs, const std::uint32_t (&parts)[2][3],
+                                     std::uint32_t which, WaysRound& out) const {
     const D d;
     const V filter = hn::Set(d, exact::kFilter);
     const Vec3 aside = {hn::Set(d, search_.aside.x), hn::Set(d, search_.aside.y),
@@ -236,6 +236,8 @@ class PairSigns {
       for (int i = 0; i < 3; ++i) {
         const Vec3 p = corner_of(pairs, 0, i, l), u = corner_of(pairs, 0, (i + 1) % 3, l) - p;
         for (int j = 0; j < 3; ++j) {
+          const std::uint32_t unsure = which & (parts[0][i] | parts[1][j]) & ~out.certain[i][j];
+          if ((unsure >> l & ((1u << hn::Lanes(d)) - 1)) == 0) continue;
           const Vec3 at = corner_of(pairs, 1, j, l), v = corner_of(pairs, 1, (j + 1) % 3, l) - at;
           const V ax = u.y * v.z, bx = u.z * v.y, ay = u.z * v.x, by = u.x * v.z, az = u.x * v.y,
                   bz = u.y * v.x;
@@ -273,11 +275,14 @@ class PairSigns {
   HWY_NOINLINE std::uint32_t find_settled(const TrianglePairs& pairs, std::uint32_t count) const {
     PairHeights heights;
     find_heights<true>(pairs, count, heights);
+    WaysRound round;
+    if ((each(heights.settled[0]) & each(heights.settled[1])) != 0)
+      find_ways_round<true>(pairs, count, round);
+    return settled(heights, round);
+  }
+  static std::uint32_t settled(const PairHeights& heights, const WaysRound& round) {
     const std::uint32_t apart = heights.apart(heights.settled);
     const std::uint32_t all = each(heights.settled[0]) & each(heights.settled[1]) & ~apart;
-    if (all == 0) return apart;
-    WaysRound round;
-    find_ways_round<true>(pairs, count, round);
     std::uint32_t parts[2][3];
     heights.find_parts(parts);
     return apart | (all & ~round.undecided(all, parts, round.settled));
