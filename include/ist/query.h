@@ -89,21 +89,21 @@ struct SeparationSettings {
 
 /// Limits of both halves of query().
 struct QuerySettings {
-  PenetrationSettings penetration;
-  SeparationSettings separation;
+  PenetrationSettings penetration = {};
+  SeparationSettings separation = {};
 };
 
 /// An asset at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
 struct PlacedAsset {
-  AssetView asset;
-  Pose pose;
+  AssetView asset = {};
+  Pose pose = {};
   double scale = 1;  ///< > 0, about the object's own origin, before the pose
 };
 
 /// A shape at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
 struct PlacedShape {
-  Shape shape;
-  Pose pose;
+  Shape shape = {};
+  Pose pose = {};
   double scale = 1;  ///< > 0
 };
 
