@@ -408,7 +408,7 @@ struct ParallelFor {
   void* pool = nullptr;  ///< passed to `run`
 };
 
-/// answers[i] = penetration(pairs[i]), bit for bit, for i < answers.size().
+/// answers[i] = penetration(pairs[i]), bit for bit, for i below both sizes; others stay.
 ///
 /// There is a worker for each workspace; without any, every answer is budget_exhausted with no
 /// upper bound. An atomic counter hands out pairs, so a pool need not balance them.
@@ -418,13 +418,13 @@ void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSetti
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = separation(pairs[i]), bit for bit, for i < answers.size(). Workspaces, pool and
+/// answers[i] = separation(pairs[i]), bit for bit, for i below both sizes. Workspaces, pool and
 /// limits as for penetration_batch(): without a workspace every interval is unbounded.
 void separation_batch(std::span<const PlacedPair> pairs, const SeparationSettings& settings,
                       std::span<Workspace> workspaces, std::span<Separation> answers,
                       const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = contact_patches(pairs[i]), bit for bit, for i < answers.size().
+/// answers[i] = contact_patches(pairs[i]), bit for bit, for i below both sizes.
 ///
 /// `patches` is divided evenly: with m = patches.size() / count, where count is the lesser of pairs
 /// and answers, those of pair i begin at patches[i · m], and answers[i].count of them are written.
