@@ -588,7 +588,7 @@ typedef struct ist_lenses {
 } ist_lenses_t;
 
 /* For pictures (lenses.h), of two assets. Needs no workspace. IST_INVALID_INPUT also for a level of
- * detail that a tree does not have. */
+ * detail that an asset does not have. */
 ist_status_t ist_overlap_lenses(const ist_placed_t* a, const ist_placed_t* b,
                                 const ist_lens_settings_t* settings, ist_lenses_t* lenses);
 

@@ -1,7 +1,7 @@
 #ifndef IST_C_BAKE_H
 #define IST_C_BAKE_H
 
-/* Bakes in C11: bake.h. Links ist::ist; the rules are those of ist.h. */
+/* Bakes in C11: bake.h. Links ist::ist; the rules are those of c.h. */
 
 #include <ist/c.h>
 

@@ -2,7 +2,7 @@
 #define IST_C_SCENE_H
 
 /* Scenes in C11: scene.h, with the same bits. Many solids, and which of them meet. Links
- * ist::query; the rules are those of ist.h. A scene belongs to one call at a time, but functions
+ * ist::query; the rules are those of c.h. A scene belongs to one call at a time, but functions
  * that take it as const may run on several threads. ist_scene_set_poses(), ist_scene_set_motions()
  * and ist_scene_take_step() neither allocate nor lock. */
 
@@ -34,7 +34,7 @@ typedef struct ist_scene_settings {
 ist_status_t ist_scene_make(const ist_scene_settings_t* settings, ist_scene_t* scene);
 ist_status_t ist_scene_release(ist_scene_t* scene);
 
-/* SceneBody. What `solid` points to, its tree, its field and what that points to, must outlive the
+/* SceneBody. What `solid` points to, its asset, its shape and what that points to, must outlive the
  * body; `solid` itself need not. */
 typedef struct ist_scene_body {
   uint32_t size;
@@ -132,14 +132,14 @@ ist_status_t ist_scene_get_patches(const ist_scene_t* scene, const ist_scene_pai
 
 /* The first body that each ray meets, where bodies stand now; equally near ones: the lowest number.
  * `numbers`, `hits`: [count]; a number is 0 where there is no hit. Bodies that rays do not support
- * are passed. `hit_size`: sizeof(ist_ray_hit_t). */
+ * are passed. `hit_size`: sizeof(ist_ray_hit_t). Returns the least of their statuses, as ist_raycast(). */
 ist_status_t ist_scene_raycast(const ist_scene_t* scene, const ist_ray_t* rays, size_t count,
                                uint32_t* numbers, ist_ray_hit_t* hits, size_t hit_size);
 /* The body nearest to each point, where bodies stand now: that of the least signed distance;
  * equally near ones: the lowest number. `points`: [3 · count]. `numbers`, `answers`: [count]; the
  * distance is infinite where no body is within `max_distance` [u], which may be infinite. Bodies
  * that ist_closest_point() does not support are passed. `answer_size`: sizeof(ist_surface_point_t).
- */
+ * Returns the least of their statuses. */
 ist_status_t ist_scene_nearest(const ist_scene_t* scene, const double* points, size_t count,
                                double max_distance, uint32_t* numbers, ist_surface_point_t* answers,
                                size_t answer_size);

@@ -43,8 +43,8 @@ struct GpuScenePairs {
   /// The pairs as a batch takes them: always max_pairs of them, since the host does not know their
   /// number. A batch answers those beyond `count` with invalid_input and NaN.
   GpuPairs pairs;
-  /// [bodies] invalid_input: the body is left out, since its pose or scale is not usable, its box
-  /// reaches beyond 1e37 [u], or its asset is empty.
+  /// [bodies] invalid_input: the body is left out, since its pose, scale or shape is not usable,
+  /// its box reaches beyond 1e37 [u], or its asset is empty.
   const QueryStatus* status = nullptr;
 };
 

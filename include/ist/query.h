@@ -89,21 +89,21 @@ struct SeparationSettings {
 
 /// Limits of both halves of query().
 struct QuerySettings {
-  PenetrationSettings penetration;
-  SeparationSettings separation;
+  PenetrationSettings penetration = {};
+  SeparationSettings separation = {};
 };
 
 /// An asset at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
 struct PlacedAsset {
-  AssetView asset;
-  Pose pose;
+  AssetView asset = {};
+  Pose pose = {};
   double scale = 1;  ///< > 0, about the object's own origin, before the pose
 };
 
 /// A shape at a pose, under an optional uniform scale: x_world = R (scale · x) + t.
 struct PlacedShape {
-  Shape shape;
-  Pose pose;
+  Shape shape = {};
+  Pose pose = {};
   double scale = 1;  ///< > 0
 };
 
@@ -408,7 +408,7 @@ struct ParallelFor {
   void* pool = nullptr;  ///< passed to `run`
 };
 
-/// answers[i] = penetration(pairs[i]), bit for bit, for i < answers.size().
+/// answers[i] = penetration(pairs[i]), bit for bit, for i below both sizes; others stay.
 ///
 /// There is a worker for each workspace; without any, every answer is budget_exhausted with no
 /// upper bound. An atomic counter hands out pairs, so a pool need not balance them.
@@ -418,13 +418,13 @@ void penetration_batch(std::span<const PlacedPair> pairs, const PenetrationSetti
                        std::span<Workspace> workspaces, std::span<Penetration> answers,
                        const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = separation(pairs[i]), bit for bit, for i < answers.size(). Workspaces, pool and
+/// answers[i] = separation(pairs[i]), bit for bit, for i below both sizes. Workspaces, pool and
 /// limits as for penetration_batch(): without a workspace every interval is unbounded.
 void separation_batch(std::span<const PlacedPair> pairs, const SeparationSettings& settings,
                       std::span<Workspace> workspaces, std::span<Separation> answers,
                       const ParallelFor& parallel = {}) noexcept;
 
-/// answers[i] = contact_patches(pairs[i]), bit for bit, for i < answers.size().
+/// answers[i] = contact_patches(pairs[i]), bit for bit, for i below both sizes.
 ///
 /// `patches` is divided evenly: with m = patches.size() / count, where count is the lesser of pairs
 /// and answers, those of pair i begin at patches[i · m], and answers[i].count of them are written.

@@ -62,7 +62,7 @@ SurfacePoint closest_point(const PlacedSolid& solid, const Eigen::Vector3d& poin
 /// Yes if a point is inside. On the surface the answer is yes or no, always the same one.
 YesNoAnswer contains(const PlacedSolid& solid, const Eigen::Vector3d& point) noexcept;
 
-/// answers[i] is that of rays[i] or points[i], bit for bit, for i < answers.size().
+/// answers[i] is that of rays[i] or points[i], bit for bit, for i below both sizes; others stay.
 void raycast(const PlacedSolid& solid, std::span<const Ray> rays,
              std::span<RayHit> answers) noexcept;
 void closest_point(const PlacedSolid& solid, std::span<const Eigen::Vector3d> points,

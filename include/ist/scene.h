@@ -29,7 +29,7 @@ enum class SceneAnswer : std::uint32_t {
 struct SceneRule {
   SceneAnswer answer = SceneAnswer::penetration;
   /// Measure and limits. The scene sets no pair_id.
-  PenetrationSettings penetration;
+  PenetrationSettings penetration = {};
   /// [u] ≥ 0: bodies that come as near are told too, with their separation.
   double margin = 0;
   ImpactSettings impact = {};  ///< SceneAnswer::impact
@@ -39,7 +39,7 @@ struct SceneRule {
 struct SceneBody {
   /// The caller's number, unique in its scene: bodies are named by it, and pairs are in its order.
   std::uint32_t number = 0;
-  PlacedSolid solid;
+  PlacedSolid solid = {};
   bool moves = true;          ///< two bodies that do not move are not asked, nor are two shapes
   std::uint32_t group = 0;    ///< < kSceneGroups: selects the rule of a pair
   std::uint32_t layers = 1;   ///< bits
@@ -79,7 +79,7 @@ struct SceneStep {
   std::span<const ScenePair> pairs;      ///< that meet, by (a, b)
   std::span<const ScenePairName> ended;  ///< met in the step before, by (a, b)
   std::span<const std::uint32_t>
-      refused;                ///< left out: pose, scale or motion not usable, or beyond 1e37 [u]
+      refused;  ///< left out: pose, scale, motion or shape not usable, or beyond 1e37 [u]
   std::size_t boxes_met = 0;  ///< pairs of bodies whose boxes meet
   /// Not all pairs had room (SceneSettings::max_pairs): nothing was asked, `pairs` is empty, and no
   /// pair ended.
@@ -134,8 +134,8 @@ class Scene {
   std::optional<SceneBody> body(std::uint32_t number) const;
 
   /// The rule for bodies of two groups, whichever is which. Asks all pairs again. Throws Error for
-  /// groups that are too large, a margin that is negative or NaN, or a duration that is not above
-  /// 0.
+  /// groups that are too large, an answer or measure without a name, a margin that is negative or
+  /// NaN, or a duration that is not above 0.
   void set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRule& rule);
   /// Bodies that are joined: as long as both are there they do not meet. Throws std::bad_alloc.
   void exclude(std::uint32_t a, std::uint32_t b);
@@ -163,12 +163,14 @@ class Scene {
                       std::size_t workers = 1);
 
   /// The first body that a ray meets, where bodies stand now; equally near ones: the lowest number.
-  /// Bodies that rays do not support (<ist/raycast.h>) and those that are refused are passed.
+  /// Bodies that rays do not support (<ist/raycast.h>) and those that are refused are passed. An
+  /// invalid ray: invalid_input, and NaN.
   SceneHit raycast(const Ray& ray) const noexcept;
   /// The body nearest to a point, where bodies stand now: that of the least signed distance, so of
   /// those that hold the point the one in which it lies deepest; equally near ones: the lowest
   /// number. Bodies beyond `max_distance` [u], those that closest_point() does not support and
-  /// those that are refused are passed.
+  /// those that are refused are passed. A point that is not finite, or a distance of NaN:
+  /// invalid_input, and NaN.
   SceneNearest nearest(
       const Eigen::Vector3d& point,
       double max_distance = std::numeric_limits<double>::infinity()) const noexcept;

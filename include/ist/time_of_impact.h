@@ -25,7 +25,7 @@ Pose moved(const Pose& start, const Motion& motion, double time, double scale = 
 
 /// The motions of two placed solids.
 struct Motions {
-  Motion a, b;
+  Motion a = {}, b = {};
 };
 
 /// The outcome for two moving solids. With a status other than ok it is no_impact.

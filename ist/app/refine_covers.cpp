@@ -88,7 +88,7 @@ class LinkRoom {
   void sort(const Eigen::AlignedBox3d& box) {
     root_ = {box.center(), box.sizes().maxCoeff() / 2, {}, {}};
     for (std::uint32_t i = 0; i < near_.size(); ++i) root_.near.push_back(i);
-    divide(root_);
+    divide();
   }
 
   /// Points between two links belong to that of which they are nearer, by shares.
@@ -134,18 +134,27 @@ class LinkRoom {
     });
   }
 
-  void divide(Cell& cell) {
-    constexpr std::size_t kFew = 8;
-    if (cell.near.size() <= kFew || cell.half < kSmallCell * root_.half) return;
-    for (int k = 0; k < 8; ++k) {
-      Cell part{middle_of_part(cell.middle, cell.half, k), cell.half / 2, {}, {}};
-      for (const std::uint32_t i : cell.near)
-        if (reaches(near_[i], near_[i].in_other * part.middle,
-                    (1 + near_[i].ratio()) * most_ + std::sqrt(3.0) * part.half))
-          part.near.push_back(i);
-      divide(cell.parts.emplace_back(std::move(part)));
+  /// The largest cells first, until the lists of all take 64 MB.
+  void divide() {
+    constexpr std::size_t kFew = 8, kMostListed = 1 << 24;
+    std::vector<Cell*> cells = {&root_};
+    std::size_t listed = near_.size();
+    for (std::size_t next = 0; next < cells.size() && listed < kMostListed; ++next) {
+      Cell& cell = *cells[next];
+      if (cell.near.size() <= kFew || cell.half < kSmallCell * root_.half) continue;
+      cell.parts.reserve(8);
+      for (int k = 0; k < 8; ++k) {
+        Cell part{middle_of_part(cell.middle, cell.half, k), cell.half / 2, {}, {}};
+        for (const std::uint32_t i : cell.near)
+          if (reaches(near_[i], near_[i].in_other * part.middle,
+                      (1 + near_[i].ratio()) * most_ + std::sqrt(3.0) * part.half))
+            part.near.push_back(i);
+        listed += part.near.size();
+        cells.push_back(&cell.parts.emplace_back(std::move(part)));
+      }
+      listed -= cell.near.size();
+      cell.near = {};
     }
-    cell.near.clear();
   }
 
   const Cell& cell_of(const Eigen::Vector3d& place) const {

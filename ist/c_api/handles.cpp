@@ -61,7 +61,7 @@ constexpr Sentence kSentences[] = {
     {IST_WRONG_VERSION,
      "this library does not support programs compiled with these headers; use headers and library "
      "of one version"},
-    {IST_NO_HANDLE, "a tree, workspace or scene is empty, released or was never created"},
+    {IST_NO_HANDLE, "an asset, workspace or scene is empty, released or was never created"},
     {IST_NO_MEMORY, "out of memory"},
     {IST_CANNOT_READ, "the file cannot be read"},
     {IST_NO_DURATION, "ist_impact_settings_t::duration is 0; set the duration of the motion"},

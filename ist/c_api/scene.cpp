@@ -274,12 +274,14 @@ ist_status_t ist_scene_raycast(const ist_scene_t* scene, const ist_ray_t* rays, 
   return with_scene(scene, [&](const OwnedScene& all) -> ist_status_t {
     if (count > 0 && (rays == nullptr || numbers == nullptr || hits == nullptr))
       return IST_NULL_POINTER;
+    ist_status_t least = IST_OK;
     for (std::size_t i = 0; i < count; ++i) {
       const ist::SceneHit found = all.scene.raycast(read(rays[i]));
       numbers[i] = found.number;
       write(found.hit, hits[i]);
+      least = std::min(least, hits[i].status);
     }
-    return IST_OK;
+    return least;
   });
 }
 
@@ -290,13 +292,15 @@ ist_status_t ist_scene_nearest(const ist_scene_t* scene, const double* points, s
   return with_scene(scene, [&](const OwnedScene& all) -> ist_status_t {
     if (count > 0 && (points == nullptr || numbers == nullptr || answers == nullptr))
       return IST_NULL_POINTER;
+    ist_status_t least = IST_OK;
     for (std::size_t i = 0; i < count; ++i) {
       const ist::SceneNearest found =
           all.scene.nearest(Eigen::Vector3d(points + 3 * i), max_distance);
       numbers[i] = found.number;
       write(found.surface, answers[i]);
+      least = std::min(least, answers[i].status);
     }
-    return IST_OK;
+    return least;
   });
 }
 

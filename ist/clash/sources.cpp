@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include "base/message_text.h"
 #include "library/settings/spelling.h"
 #include "mesh/import/source_file.h"
 #include "mesh/mesh_files.h"
@@ -282,8 +283,9 @@ void read_clash_robot(const std::string& path, const RobotOptions& options, Clas
     links.push_back(i);
   }
   if (round > 0)
-    out.notes.push_back(
-        fmt::format("{} round shapes are polyhedra around them, at most 0.5 % wider", round));
+    out.notes.push_back(counted(round, "round shape is a polyhedron around it",
+                                "round shapes are polyhedra around them") +
+                        ", at most 0.5 % wider");
   for (const auto& [a, b] : robot->excluded)
     out.ignored.push_back({{robot->links[a].name}, {robot->links[b].name}});
   out.posed = [robot, links, path](const std::map<std::string, double>& values) {

@@ -8,6 +8,7 @@
 
 #include "query/base/relative_pose.h"
 #include "query/base/solid_box.h"
+#include "query/shape/shapes.h"
 
 namespace ist {
 
@@ -22,7 +23,10 @@ inline SolidBox solid_box(const AssetView& asset) noexcept {
           asset.empty()};
 }
 
+/// Empty for a shape with a number out of range.
 inline SolidBox solid_box(const Shape& shape) noexcept {
+  if (!std::visit([](const auto& any) { return is_sound(any); }, shape))
+    return {.is_shape = true, .empty = true};
   const auto around = [](const Vec3& half, const Vec3& middle = {0, 0, 0}) {
     return SolidBox{.middle = middle, .half = half, .is_shape = true};
   };

@@ -120,6 +120,11 @@ void Scene::set_rule(std::uint32_t group_a, std::uint32_t group_b, const SceneRu
   if (group_a >= kSceneGroups || group_b >= kSceneGroups)
     throw Error("a rule's groups are " + std::to_string(group_a) + " and " +
                 std::to_string(group_b) + ": give numbers below " + std::to_string(kSceneGroups));
+  if (rule.answer > SceneAnswer::impact || rule.penetration.measure > Measure::exact)
+    throw Error("a rule's answer is " + std::to_string(static_cast<unsigned>(rule.answer)) +
+                " and its measure " +
+                std::to_string(static_cast<unsigned>(rule.penetration.measure)) +
+                ": give ones that have names");
   if (!(std::isfinite(rule.margin) && rule.margin >= 0))
     throw Error("a rule's margin is " + std::to_string(rule.margin) + ": give 0 or more");
   if (rule.answer == SceneAnswer::impact &&

@@ -1,5 +1,6 @@
 #include <ist/scene.h>
 #include <algorithm>
+#include <cmath>
 
 #include "scene/scene_impl.h"
 
@@ -7,8 +8,10 @@ namespace ist {
 
 SceneHit Scene::raycast(const Ray& ray) const noexcept {
   SceneHit best;
-  // (also for a ray that is not usable)
-  if (!ray.origin.allFinite() || !ray.direction.allFinite() || ray.direction.isZero(0)) return best;
+  const Eigen::Vector3d none = Eigen::Vector3d::Constant(NAN);
+  if (!ray.origin.allFinite() || !ray.direction.allFinite() || ray.direction.isZero(0) ||
+      std::isnan(ray.max_distance) || ray.max_distance <= 0)
+    return {0, {NAN, none, none, ~0u, QueryStatus::invalid_input}};
   const Eigen::Vector3d unit = ray.direction.stableNormalized();
   double longest = ray.max_distance;
   const auto enter = [&](const SceneBox& box) {
@@ -41,7 +44,9 @@ SceneHit Scene::raycast(const Ray& ray) const noexcept {
 
 SceneNearest Scene::nearest(const Eigen::Vector3d& point, double max_distance) const noexcept {
   SceneNearest best;
-  if (!point.allFinite()) return best;
+  const Eigen::Vector3d none = Eigen::Vector3d::Constant(NAN);
+  if (!point.allFinite() || std::isnan(max_distance))
+    return {0, {NAN, NAN, none, none, ~0u, QueryStatus::invalid_input}};
   double farthest = max_distance;
   const auto enter = [&](const SceneBox& box) {
     Eigen::Vector3d off;

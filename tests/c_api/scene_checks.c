@@ -164,6 +164,9 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   CHECK(ist_raycast(&s->a, &ray, 1, &alone, sizeof alone) >= IST_MISSING_DATA);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, sizeof hit) == IST_OK);
   if (alone.status == IST_OK) CHECK(number == 4 && hit.distance == alone.distance);
+  const ist_ray_t none = {{0, 0, 0}, {0, 0, 0}, 0};
+  CHECK(ist_scene_raycast(scene, &none, 1, &number, &hit, sizeof hit) == IST_INVALID_INPUT);
+  CHECK(hit.status == IST_INVALID_INPUT && hit.distance != hit.distance);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, 3) == IST_WRONG_SIZE);
   CHECK(ist_scene_raycast(scene, NULL, 1, &number, &hit, sizeof hit) == IST_NULL_POINTER);
   CHECK(ist_scene_raycast(NULL, &ray, 1, &number, &hit, sizeof hit) == IST_NULL_POINTER);
@@ -172,6 +175,8 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   if (foot.status == IST_OK) CHECK(number == 4 && near.distance == foot.distance);
   CHECK(ist_scene_nearest(scene, low, 1, 1, &number, &near, sizeof near) == IST_OK);
   CHECK(number == 0 && near.distance == HUGE_VAL);
+  CHECK(ist_scene_nearest(scene, low, 1, NAN, &number, &near, sizeof near) == IST_INVALID_INPUT);
+  CHECK(near.status == IST_INVALID_INPUT && near.distance != near.distance);
   CHECK(ist_scene_nearest(scene, low, 1, 1, &number, &near, 3) == IST_WRONG_SIZE);
   CHECK(ist_scene_nearest(scene, NULL, 1, 1, &number, &near, sizeof near) == IST_NULL_POINTER);
   CHECK(ist_scene_nearest(NULL, low, 1, 1, &number, &near, sizeof near) == IST_NULL_POINTER);

@@ -429,7 +429,7 @@ TEST_F(ClashFiles, RobotsStandWhereTheirJointsAre) {
   EXPECT_EQ(pairs(json("arm.xml", {}, 0)), Words{});
   const Json turned = json("arm.xml", {"--pose", "shoulder=3.14"}, 3);
   EXPECT_EQ(pairs(turned), Words{"world upper overlapping"});
-  EXPECT_NE(turned["notes"].dump().find("round shapes"), std::string::npos);
+  EXPECT_NE(turned["notes"].dump().find("1 round shape is a"), std::string::npos);
 
   write("egg.xml",
         "<mujoco><worldbody><geom type='box' pos='0 0 -5' size='5 5 5'/><body name='egg'>"

@@ -428,6 +428,10 @@ TEST_F(RobotCommands, SpheresAreFineWhereLinksPassClose) {
     EXPECT_TRUE(link["covered"].get<bool>());
   }
   EXPECT_LE(count, 96u);
+  // As many false meetings as there are poses take no more memory.
+  const Outcome coarse = ist({"spheres", "near.urdf", "-o", "n.json", "--count", "1"});
+  EXPECT_EQ(coarse.exit_code, 0) << coarse.err;
+  EXPECT_LT(coarse.peak_memory, 1'000'000'000u);
 }
 
 TEST_F(RobotCommands, AnSdfIsRead) {

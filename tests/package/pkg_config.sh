@@ -23,6 +23,17 @@ rpath="-Wl,-rpath,$(pkg-config --variable=libdir ist-query)"
 "$cc" -std=c11 -Wall -Wextra -pedantic -Werror "$source/examples/c/c.c" \
   $(pkg-config --cflags --libs ist-query) "$rpath" -o "$work/c"
 "$work/c" "$a" "$b"
+# The listing in C of the guide as it stands there.
+cp "$a" "$work/bolt.ist"
+{
+  echo '#include <ist/c.h>'
+  echo 'int main(void) {'
+  sed -n '/^```c$/,/^```$/p' "$source/docs/user_guide.md" | grep -v '^```'
+  echo 'return status != IST_OK || !(overlap.volume > 0); }'
+} >"$work/listing.c"
+"$cc" -std=c11 -Wall -Wextra -pedantic -Werror "$work/listing.c" \
+  $(pkg-config --cflags --libs ist-query) "$rpath" -o "$work/listing"
+(cd "$work" && ./listing)
 "$cxx" -std=c++20 -c "$source/examples/bake_and_query/bake_and_query.cpp" \
   $(pkg-config --cflags ist) -o "$work/bake_and_query.o"
 "$cxx" "$work/bake_and_query.o" $(pkg-config --libs ist) "$rpath" -o "$work/bake_and_query"

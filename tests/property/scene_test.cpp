@@ -17,6 +17,7 @@
 #include "scene/body_box.h"
 #include "support/answer_bits.h"
 #include "support/baked.h"
+#include "support/float_traps.h"
 #include "support/surface_queries.h"
 #include "support/test_meshes.h"
 
@@ -449,8 +450,40 @@ TEST(Scene, MistakesAreTold) {
   EXPECT_THROW(scene.add(block_at(3, 0)), Error);
   EXPECT_THROW(scene.set_rule(0, kSceneGroups, {}), Error);
   EXPECT_THROW(scene.set_rule(0, 0, exact_rule(-1)), Error);
+  EXPECT_THROW(scene.set_rule(0, 0, {.answer = static_cast<SceneAnswer>(6)}), Error);
+  EXPECT_THROW(scene.set_rule(0, 0, {.penetration = {.measure = static_cast<Measure>(3)}}), Error);
   EXPECT_FALSE(scene.set_pose(7, {}));
   EXPECT_EQ(scene.size(), 2u);
+  // What cannot be asked is no miss.
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Ray& ray : {Ray{.origin = {0, nan, 0}}, Ray{.direction = {0, 0, 0}},
+                         Ray{.max_distance = 0}, Ray{.max_distance = nan}}) {
+    const SceneHit found = scene.raycast(ray);
+    EXPECT_EQ(found.hit.status, QueryStatus::invalid_input);
+    EXPECT_TRUE(std::isnan(found.hit.distance));
+  }
+  for (const SceneNearest& found : {scene.nearest({0, 0, nan}), scene.nearest({0, 0, 0}, nan)}) {
+    EXPECT_EQ(found.surface.status, QueryStatus::invalid_input);
+    EXPECT_TRUE(std::isnan(found.surface.distance));
+  }
+}
+
+TEST(Scene, ShapesOutOfRangeAreRefused) {
+  const NoFloatTraps divided_by_zero;
+  Scene scene;
+  scene.add(block_at(0, 0));
+  const std::vector<Shape> shapes = {
+      HalfSpaceShape{{0, 0, 0}, 0}, BoxShape{{1, -1, 1}}, BallShape{-1},       CapsuleShape{-1, 1},
+      CylinderShape{1, 0},          HeightFieldShape{},   DistanceGridShape{}, FunctionShape{}};
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    SceneBody body;
+    body.number = static_cast<std::uint32_t>(i + 1);
+    body.solid = PlacedSolid(shapes[i], {});
+    scene.add(body);
+  }
+  const SceneStep step = scene.step();
+  EXPECT_TRUE(step.pairs.empty());
+  EXPECT_EQ(step.refused.size(), shapes.size());
 }
 
 TEST(Scene, RaysAndBoxesMeetTheSameBodiesAsOneByOne) {
@@ -503,7 +536,6 @@ TEST(Scene, RaysAndBoxesMeetTheSameBodiesAsOneByOne) {
     inside += found.surface.distance < 0 ? 1 : 0;
   }
   EXPECT_GT(inside, 5);
-  EXPECT_EQ(scene.nearest({NAN, 0, 0}).surface.distance, HUGE_VAL);
   std::vector<std::uint32_t> numbers(300);
   const std::size_t all = scene.in_box({-9, -9, -9}, {9, 9, 9}, numbers);
   EXPECT_GT(all, 200u);

@@ -228,13 +228,34 @@ def test_models_side_by_side_do_not_meet(folder):
         assert np.array_equal(run(model, alone, 60).qpos, data.qpos)
 
 
+def test_meshes_with_findings_share_a_warning(folder):
+    """Of two that are baked and two that are not, each kind is told at once."""
+    corners, faces = box((0, 0, 0), (1, 1, 1))
+    apart = [(x + .5, y, z) for x, y, z in corners]
+    twice = faces + [tuple(8 + i for i in face) for face in faces]
+    names = {}
+    for k in range(2):
+        write(folder / f"both{k}.obj", ([(x, y, z + k) for x, y, z in corners + apart], twice))
+        write(folder / f"open{k}.obj", (corners, faces[k + 1:]))
+        names |= {f"both{k}": k, f"open{k}": k}
+    (folder / "some.xml").write_text("<mujoco><asset>" + "".join(
+        f'<mesh name="{name}" file="{name}.obj" inertia="shell"/>' for name in names) + "</asset><worldbody>" + "".join(
+        f'<geom type="mesh" mesh="{name}"/>' for name in names) + "</worldbody></mujoco>")
+    with pytest.warns(UserWarning) as told:
+        assert ist.mujoco.attach(mujoco.MjSpec.from_file(str(folder / "some.xml")), cache=folder / "cache") == 2
+    hulls, findings = sorted((str(one.message) for one in told), key=lambda text: "hulls" not in text)
+    assert hulls.startswith("ist.mujoco: 2 of 4 meshes stay") and "open0: " in hulls and "open1: " in hulls
+    assert findings.startswith("ist.mujoco: 2 of 4 meshes became solids") and "both0: " in findings and "both1: " in findings
+
+
 OPEN = CUBE.format(ground=PLANE, height=.031).replace("0 2 1  1 2 3  ", "").replace('scale="', 'inertia="shell" scale="')
 
 
 def test_an_open_mesh_stays_a_hull_and_is_named(folder):
     spec = mujoco.MjSpec.from_string(OPEN)
-    with pytest.warns(UserWarning, match="mesh 'cube' stays the hull.*repair=True.*geoms="):
+    with pytest.warns(UserWarning, match="1 of 1 meshes stay.*repair=True.*geoms=.*: cube: .*not closed$") as told:
         assert ist.mujoco.attach(spec, cache=folder / "cache") == 0
+    assert len(told) == 1
     model = spec.compile()
     assert abs(run(model, mujoco.MjData(model), 500).qpos[2] - .03) < 2e-4
     before = spec.to_xml()

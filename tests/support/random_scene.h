@@ -17,7 +17,7 @@ namespace ist::testing {
 
 using NamedPairs = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
 
-/// A cube, a slab beside its frame's origin, and shapes, of which one has no end.
+/// A cube, a slab beside its frame's origin, and shapes, of which one has no end and one is none.
 inline std::vector<GpuSolid> some_solids() {
   static const Asset cube = baked(box_mesh({-1, -1, -1}, {1, 1, 1}), "cube", 60);
   static const Asset off_centre = baked(box_mesh({0.5, -1, 0}, {1, 3, 0.25}), "slab", 60);
@@ -26,7 +26,8 @@ inline std::vector<GpuSolid> some_solids() {
           Shape(BallShape{0.5}),
           Shape(BoxShape{{1, 0.5, 2}}),
           Shape(HalfSpaceShape{{0, 0, 1}, -0.75}),
-          Shape(CapsuleShape{0.5, 1})};
+          Shape(CapsuleShape{0.5, 1}),
+          Shape(BoxShape{{1, -0.5, 2}})};
 }
 
 /// Bodies of some solids in several worlds, moving and not, in random poses, flush on a lattice, in

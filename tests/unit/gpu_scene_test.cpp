@@ -76,7 +76,7 @@ TEST(GpuScene, RefusesWhatItCannotHold) {
     }
   };
   EXPECT_EQ(fault({{}}), "");
-  EXPECT_EQ(fault({{}, {.solid = 6}}), "GPU scene: body 1 is of solid 6; there are 6");
+  EXPECT_EQ(fault({{}, {.solid = 7}}), "GPU scene: body 1 is of solid 7; there are 7");
   EXPECT_EQ(fault({{.world = kGpuWorlds}}),
             "GPU scene: body 0 is of world 16777216; worlds are below 16777216");
   EXPECT_EQ(fault({}, {.margin = -1}), "GPU scene: a margin that is negative, infinite or NaN");

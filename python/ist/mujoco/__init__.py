@@ -83,7 +83,7 @@ def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = No
         "inner": by spheres.
     repair: close the holes of meshes that are not closed, as ist.close_mesh(…, repair=True).
 
-    Warns of each mesh that cannot be baked, which stays MuJoCo's hull, of findings of bakes (not of
+    Warns of the meshes that cannot be baked, which stay MuJoCo's hulls, of findings of bakes (not of
     those in the cache), of files that MuJoCo has read differently, and of flexes that solids do not
     meet. Raises
     ist.OpenMeshError for such a mesh of a geom that `geoms` names, and ValueError or TypeError for
@@ -113,18 +113,25 @@ def attach(spec: mujoco.MjSpec, geoms: collections.abc.Iterable[str] | None = No
         chosen = [geom for geom in meshes if geom.name in wanted]
     folder = _folder(cache)
     solids: dict[int, _solids.Solid | None] = {}
+    hulls, findings = [], []
     for geom in chosen:
         mesh = int(model.geom_dataid[geom.id])
         if mesh in solids:
             continue
         try:
-            solids[mesh] = _solids.of_mesh(spec, model, mesh, geom.meshname, folder, spheres, measure, repair)
+            solids[mesh] = _solids.of_mesh(spec, model, mesh, geom.meshname, folder, spheres, measure, repair,
+                                           findings)
         except ist.Error as error:
             if wanted is not None:
                 raise
             solids[mesh] = None
-            way = "" if repair else "attach(repair=True) may close it, "
-            _warn(f"mesh {geom.meshname!r} stays the hull that MuJoCo makes of it: {error}. {way}geoms= can leave it out")
+            hulls.append(str(error).split(". ")[0])  # without the remedies of other programs
+    if hulls:
+        way = "" if repair else "attach(repair=True) may close them, "
+        _warn(f"{len(hulls)} of {len(solids)} meshes stay the hulls that MuJoCo makes of them; {way}geoms= can leave "
+              f"them out: {' | '.join(hulls)}")
+    if findings:
+        _warn(f"{len(findings)} of {len(solids)} meshes became solids in spite of: {' | '.join(findings)}")
     for flex in spec.flexes:
         if chosen and flex.dim != 2 and (flex.contype or flex.conaffinity):
             _warn(f"flex {flex.name!r} does not meet solids: MuJoCo collides only flexes of dim 2 with geoms of type sdf")

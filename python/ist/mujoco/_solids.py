@@ -18,7 +18,7 @@ class Solid:
     asset: ist.Asset
 
 
-def of_mesh(spec, model, mesh, name, folder, spheres, measure, repair):
+def of_mesh(spec, model, mesh, name, folder, spheres, measure, repair, findings):
     vertices, faces = _from_file(spec, model, mesh, name)
     key = hashlib.sha256(f"{ist._core._bake_revision} {repair} ".encode() + vertices.tobytes() + faces.tobytes())
 
@@ -31,7 +31,7 @@ def of_mesh(spec, model, mesh, name, folder, spheres, measure, repair):
                 pass
         closed = ist.close_mesh(ist.Mesh(vertices, faces), name=name, repair=repair)
         if closed.report.notes:
-            _warn(f"mesh {name!r}: {'; '.join(closed.report.notes)}")
+            findings.append(f"{name}: {'; '.join(closed.report.notes)}")
         asset = ist.bake(closed, max_spheres=spheres) if spheres else ist.bake_mesh_only(closed)
         part = path.with_suffix(f".{os.getpid()}")
         asset.save(part)

@@ -6,7 +6,7 @@ import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
 import {newSeparation, readSeparation, solid} from './query.js';
-import {askRays, kHit, kSurfacePoint, placePoints, read} from './surfaces.js';
+import {askRays, checkRows, kHit, kSurfacePoint, placePoints, read} from './surfaces.js';
 
 const kAnswers = ['penetration', 'nothing', 'boxes', 'overlap'];  // as ist_scene_answer_t
 const kOverlapping = ['no', 'yes', 'unknown'];
@@ -147,7 +147,8 @@ export class Scene {
 
   raycast(origins, directions, options) {
     const {place, count: rays, hits, more} = askRays('Scene.raycast()', origins, directions, options, 4);
-    check(functions('Scene.raycast()').scene_raycast(this._at, place, rays, more, hits), 'Scene.raycast()');
+    const status = functions('Scene.raycast()').scene_raycast(this._at, place, rays, more, hits);
+    checkRows(status, rays, 'Scene.raycast()');
     const out = read(hits, rays, kHit, options?.into ?? {});
     out.number = copied(out.number, more, rays);
     return out;
@@ -156,7 +157,8 @@ export class Scene {
   nearest(points, options) {
     const {place, count: rows, answers} = placePoints('Scene.nearest()', points, options, 76);
     const far = positive(options?.maxDistance ?? Infinity, 'maxDistance'), more = answers + 72 * rows;
-    check(functions('Scene.nearest()').scene_nearest(this._at, place, rows, far, more, answers), 'Scene.nearest()');
+    const status = functions('Scene.nearest()').scene_nearest(this._at, place, rows, far, more, answers);
+    checkRows(status, rows, 'Scene.nearest()');
     const out = read(answers, rows, kSurfacePoint, options?.into ?? {});
     out.number = copied(out.number, more, rows);
     return out;

@@ -29,11 +29,14 @@ function writeRow(place, given, row, what) {
 }
 
 /** One alone that cannot be answered is an error; of many it is NaN. */
+export function checkRows(status, count, who) {
+  if (status !== kInvalidInput || count === 1) check(status, who);
+}
+
 function ask(question, who, given, pose, count, place, answers) {
   const wasm = functions(who), at = solid(given, 'A', who);
   writePose(0, pose, 'pose');
-  const status = wasm[question](at, place, count, answers);
-  if (status !== kInvalidInput || count === 1) check(status, who);
+  checkRows(wasm[question](at, place, count, answers), count, who);
 }
 
 export function read(place, count, columns, out) {

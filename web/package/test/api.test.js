@@ -652,6 +652,9 @@ test('a scene: pairs, events and answers are those of single calls', () => {
   const alone = ist.closestPoint(bolt, poses[3], [300, 0, 60]);
   assert.equal(near.number[0], alone.distance[0] < 60 ? 3 : 20);
   assert.ok(near.distance[1] === Infinity);
+  assert.ok(scene.nearest([NaN, 0, 0, 300, 0, 60]).distance.every((x, i) => isNaN(x) === (i === 0)));
+  assert.match(sentence(() => scene.nearest([NaN, 0, 0])), /Scene.nearest\(\): /);
+  assert.match(sentence(() => scene.raycast([0, 0, 0], [0, 0, 0])), /Scene.raycast\(\): /);
 
   assert.match(sentence(() => bolt.free()), /2 bodies of a Scene are made of it/);
   assert.match(sentence(() => scene.add(nut, {}, {number: 3})), /body 3: /);
