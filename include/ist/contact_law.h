@@ -386,7 +386,7 @@ class SupportPolygon {
   struct Plane {
     double height = 0, slope[2] = {0, 0};
     double at(const Corner& x) const { return height + x.u * slope[0] + x.v * slope[1]; }
-    bool is_along(const Plane& other) const;
+    bool is_along(const Plane& other, double most) const;  ///< slopes differ by less
   };
   struct Side {
     std::array<Face, kFaces> faces;

@@ -21,11 +21,12 @@ using Eigen::Vector3d;
 constexpr int kDirections = 32;
 constexpr std::uint64_t kName = std::uint64_t{1} << 63;
 
-/// The cosine of 1.1°: faces at a larger angle to the contact's normal do not belong to it.
-constexpr double kFacing = 0.9998;
-constexpr double kTurned = 0.021;  // the sine of that, with a margin
-/// The cosine of 8°: faces between the two angles are those of a round surface.
-constexpr double kRound = 0.99;
+/// The cosine and sine of 1.1°: faces at a larger angle to the contact's normal do not belong to
+/// it. By spheres, which push aslant where they reach over an edge, the normal is not known so
+/// well: faces may be turned by 8° from it, but by no more than 1.1° from each other.
+constexpr double kFacing = 0.9998, kTurned = 0.02;
+/// Of 8°: faces between the two angles are those of a round surface.
+constexpr double kRound = 0.99, kTurnedRound = 0.141;
 constexpr double kTurnedAgainst = 1e-3;  // [rad] two faces at a larger angle are not coplanar
 /// Faces further than this many depths from the middle of a contact do not belong to it.
 constexpr double kNearMiddle = 2;
@@ -148,17 +149,20 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
   const double radius = std::sqrt(std::max((q - p).squaredNorm(), (r - p).squaredNorm()));
   if ((p - middle_).squaredNorm() > (reach_ + radius) * (reach_ + radius)) return;
   const Face face = {corner(p), corner(of_b ? r : q), corner(of_b ? q : r)};
-  if (!(square > kFacing * kFacing)) {
-    const auto is_here = [&](const Corner& x) { return std::abs(x.z) <= near_; };
+  Side& side = sides_[of_b];
+  const Plane plane = plane_of(face);
+  const bool first = side.count == 0 && !side.has_middle;
+  if (blurred_ ? !first && !plane.is_along(side.plane, kTurned) : !(square > kFacing * kFacing)) {
+    const auto is_here = [&](const Corner& x) {
+      return std::abs(x.z - (blurred_ ? side.plane.at(x) : 0)) <= near_;
+    };
     flat_ = is_at_rim(face) || std::none_of(face.begin(), face.end(), is_here);
     return;
   }
   if (!(std::abs((p - middle_).dot(normal)) <= near_ * facing)) return;
-  Side& side = sides_[of_b];
-  const Plane plane = plane_of(face);
   const bool at_rim = is_at_rim(face);
-  if (side.count == 0 && !side.has_middle) side.plane = plane;
-  const bool fits = plane.is_along(side.plane) || is_near(face, side.plane);
+  if (first) side.plane = plane;
+  const bool fits = plane.is_along(side.plane, kTurnedAgainst) || is_near(face, side.plane);
   if (!at_rim && !side.has_middle) {
     side.plane = plane;
     side.has_middle = true;
@@ -174,7 +178,8 @@ void SupportPolygon::add_triangle(bool of_b, const Vector3d& p, const Vector3d& 
 void SupportPolygon::add_plane(bool of_b, const Vector3d& normal, const Vector3d& point) noexcept {
   const double facing = of_b ? -normal_.dot(normal) : normal_.dot(normal);
   const double height = normal.dot(point - middle_) / (of_b ? -facing : facing);
-  if (!(area_ > 0) || !(facing > kFacing) || !(std::abs(height) <= near_)) return;
+  if (!(area_ > 0) || !(facing > (blurred_ ? kRound : kFacing)) || !(std::abs(height) <= near_))
+    return;
   const double sign = of_b ? 1 / facing : -1 / facing;
   sides_[of_b].endless = true;
   sides_[of_b].plane = {height, {sign * normal.dot(axis_[0]), sign * normal.dot(axis_[1])}};
@@ -225,6 +230,7 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
   const Vector3d normal = turn.transpose() * normal_ / unit;
   const Vector3d middle = turn.transpose() * (middle_ - shift) / (unit * unit);
   const double near = near_ / unit;
+  const double turned = 1.05 * (blurred_ ? kTurnedRound : kTurned);
   struct Waiting {
     std::uint32_t level, block;
   };
@@ -256,7 +262,7 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
           furthest += std::abs(from) + half;
           apart = std::max(apart, std::abs(from) - half);
         }
-        if (apart > reach || std::abs(along) - half_along > near + kTurned * furthest) continue;
+        if (apart > reach || std::abs(along) - half_along > near + turned * furthest) continue;
         waiting[count++] = {level - 1, kWidth * block + lane};
       }
     }
@@ -267,9 +273,8 @@ void SupportPolygon::add_mesh(bool of_b, const PlacedAsset& solid) noexcept {
   visit(reach_ / unit);
 }
 
-bool SupportPolygon::Plane::is_along(const Plane& other) const {
-  return std::max(std::abs(slope[0] - other.slope[0]), std::abs(slope[1] - other.slope[1])) <
-         kTurnedAgainst;
+bool SupportPolygon::Plane::is_along(const Plane& other, double most) const {
+  return std::max(std::abs(slope[0] - other.slope[0]), std::abs(slope[1] - other.slope[1])) < most;
 }
 
 bool SupportPolygon::is_at_rim(const Face& face) const {
@@ -293,7 +298,7 @@ bool SupportPolygon::choose_plane(bool of_b, Plane& plane) const {
   plane = side.plane;
   for (std::size_t i = 0; i < side.count && !side.endless; ++i) {
     const Plane found = plane_of(side.faces[i]);
-    if (found.is_along(side.plane) &&
+    if (found.is_along(side.plane, kTurnedAgainst) &&
         (of_b ? found.height < plane.height : found.height > plane.height))
       plane = found;
   }
@@ -309,7 +314,8 @@ bool SupportPolygon::is_near(const Face& face, const Plane& plane) const {
 std::optional<std::size_t> SupportPolygon::corners(std::span<ContactPatch> patches) const noexcept {
   Plane plane[2];
   if (!flat_ || patches.size() < 3 || !choose_plane(false, plane[0]) ||
-      !choose_plane(true, plane[1]) || (sides_[0].endless && sides_[1].endless))
+      !choose_plane(true, plane[1]) || (sides_[0].endless && sides_[1].endless) ||
+      (blurred_ && !plane[0].is_along(plane[1], kTurned)))
     return std::nullopt;
   const auto depth = [&](const Corner& x) { return plane[0].at(x) - plane[1].at(x); };
   const bool first = sides_[0].endless;
