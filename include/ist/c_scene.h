@@ -144,7 +144,8 @@ ist_status_t ist_scene_nearest(const ist_scene_t* scene, const double* points, s
                                double max_distance, uint32_t* numbers, ist_surface_point_t* answers,
                                size_t answer_size);
 /* Bodies whose boxes meet a box [u], in no order. `count`: how many there are; the first `capacity`
- * of them are written. `numbers` may be null if that is 0. */
+ * of them are written. `numbers` may be null if that is 0. IST_INVALID_INPUT: lower > upper, or
+ * NaN. */
 ist_status_t ist_scene_in_box(const ist_scene_t* scene, const double lower[3],
                               const double upper[3], uint32_t* numbers, size_t capacity,
                               size_t* count);

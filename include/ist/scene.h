@@ -175,7 +175,7 @@ class Scene {
       const Eigen::Vector3d& point,
       double max_distance = std::numeric_limits<double>::infinity()) const noexcept;
   /// Bodies whose boxes meet a box [u], in no order: how many there are; as many as fit are
-  /// written.
+  /// written. A box of NaN, or whose `lower` is above `upper`, meets none but bodies without a box.
   std::size_t in_box(const Eigen::Vector3d& lower, const Eigen::Vector3d& upper,
                      std::span<std::uint32_t> numbers) const noexcept;
 

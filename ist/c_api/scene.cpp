@@ -312,6 +312,8 @@ ist_status_t ist_scene_in_box(const ist_scene_t* scene, const double lower[3],
   return with_scene(scene, [&](const OwnedScene& all) -> ist_status_t {
     if (lower == nullptr || upper == nullptr || (numbers == nullptr && capacity > 0))
       return IST_NULL_POINTER;
+    for (int k = 0; k < 3; ++k)
+      if (!(lower[k] <= upper[k])) return IST_INVALID_INPUT;
     *count = all.scene.in_box(Eigen::Vector3d(lower), Eigen::Vector3d(upper), {numbers, capacity});
     return IST_OK;
   });

@@ -361,8 +361,11 @@ void add_scenes(py::module_& module) {
       .def(
           "in_box",
           [](const PyScene& self, const py::object& lower, const py::object& upper) {
-            return in_box(self, take_vector(lower, "lower"), take_vector(upper, "upper"))
-                .handed_out();
+            const Eigen::Vector3d from = take_vector(lower, "lower"),
+                                  to = take_vector(upper, "upper");
+            if (!(from.array() <= to.array()).all())
+              throw std::invalid_argument("in_box: lower is above upper, or NaN");
+            return in_box(self, from, to).handed_out();
           },
           py::arg("lower"), py::arg("upper"),
           "(k,) uint32: bodies whose boxes meet the box from lower to upper (3,) [u].")

@@ -165,6 +165,7 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, sizeof hit) == IST_OK);
   if (alone.status == IST_OK) CHECK(number == 4 && hit.distance == alone.distance);
   const ist_ray_t none = {{0, 0, 0}, {0, 0, 0}, 0};
+  const double none_at[3] = {NAN, 0, 0};
   CHECK(ist_scene_raycast(scene, &none, 1, &number, &hit, sizeof hit) == IST_INVALID_INPUT);
   CHECK(hit.status == IST_INVALID_INPUT && hit.distance != hit.distance);
   CHECK(ist_scene_raycast(scene, &ray, 1, &number, &hit, 3) == IST_WRONG_SIZE);
@@ -184,6 +185,8 @@ static int rays_and_boxes_find_bodies(scene_t* s, ist_scene_t* scene) {
   CHECK(numbers[0] == 4);
   CHECK(ist_scene_in_box(scene, low, high, NULL, 0, &count) == IST_OK && count == 1);
   CHECK(ist_scene_in_box(scene, low, high, NULL, 1, &count) == IST_NULL_POINTER && count == 0);
+  CHECK(ist_scene_in_box(scene, high, low, numbers, 4, &count) == IST_INVALID_INPUT && count == 0);
+  CHECK(ist_scene_in_box(scene, none_at, high, numbers, 4, &count) == IST_INVALID_INPUT);
   CHECK(ist_scene_in_box(scene, NULL, high, numbers, 4, &count) == IST_NULL_POINTER);
   CHECK(ist_scene_in_box(NULL, low, high, numbers, 4, &count) == IST_NULL_POINTER);
   CHECK(ist_scene_in_box(scene, low, high, numbers, 4, NULL) == IST_NULL_POINTER);

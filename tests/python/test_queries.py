@@ -777,5 +777,7 @@ def test_a_scene_finds_bodies_by_rays_points_and_boxes(gear):
     rays = scene.raycast([-9 * side, 0.31 * side, 0.013], [[1, 0, 0], [0, 0, 1]])
     assert rays.number[0] == 10 and rays.hit.distance[1] == np.inf
     assert scene.in_box([2 * side, -side, -side], [7 * side, side, side]).tolist() == [11, 12]
+    with pytest.raises(ValueError, match="lower is above upper"):
+        scene.in_box([7 * side, -side, -side], [2 * side, side, side])
     with pytest.raises(ValueError, match="points: shape"):
         scene.nearest([1, 2])
