@@ -132,7 +132,8 @@ ist_status_t ist_scene_get_patches(const ist_scene_t* scene, const ist_scene_pai
 
 /* The first body that each ray meets, where bodies stand now; equally near ones: the lowest number.
  * `numbers`, `hits`: [count]; a number is 0 where there is no hit. Bodies that rays do not support
- * are passed. `hit_size`: sizeof(ist_ray_hit_t). Returns the least of their statuses, as ist_raycast(). */
+ * are passed. `hit_size`: sizeof(ist_ray_hit_t). Returns the least of their statuses, as
+ * ist_raycast(). */
 ist_status_t ist_scene_raycast(const ist_scene_t* scene, const ist_ray_t* rays, size_t count,
                                uint32_t* numbers, ist_ray_hit_t* hits, size_t hit_size);
 /* The body nearest to each point, where bodies stand now: that of the least signed distance;
