@@ -549,15 +549,19 @@ test('a loop that keeps its answers makes no garbage', () => {
       parts.into = ist.contactPatches(a, b, pose, parts);
     };
     for (let i = 0; i < 3000; ++i) step(i);
-    gc();
-    const before = process.memoryUsage().heapUsed;
-    for (let i = 0; i < 1000; ++i) step(i);
-    console.log((process.memoryUsage().heapUsed - before) / 1000);`;
+    let least = Infinity;  // the compiler's own memory comes once, garbage in every round
+    for (let round = 0; round < 5; ++round) {
+      gc();
+      const before = process.memoryUsage().heapUsed;
+      for (let i = 0; i < 1000; ++i) step(i);
+      least = Math.min(least, (process.memoryUsage().heapUsed - before) / 1000);
+    }
+    console.log(least);`;
   const told = execFileSync(
       process.execPath,
       ['--expose-gc', '--max-semi-space-size=64', '--input-type=module', '-e', script],
       {cwd: packageFolder, encoding: 'utf8'});
-  assert.ok(Number(told) < 100, `${told.trim()} bytes a step`);
+  assert.ok(Number(told) < 50, `${told.trim()} bytes a step`);
 });
 
 test('rays and points against one solid', () => {
