@@ -1,7 +1,7 @@
 // Assets and shapes: what lies in WebAssembly's memory and is given back.
 
 import {kMissingData} from './answers.js';
-import {count, desk, sphereMeasureOf, writeNumbers} from './desk.js';
+import {count, desk, notNegative, positive, sphereMeasureOf, writeNumbers} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, give, take, u32, u8, withRoom} from './memory.js';
 import {checkOptions} from './options.js';
@@ -202,15 +202,6 @@ function three(given, what) {
   return [given[0], given[1], given[2]];
 }
 
-/** Of each of `sizes`: throws unless it is a number > 0, or `least` says ≥ 0. */
-function atLeast(least, sizes) {
-  for (const what in sizes) {
-    const size = sizes[what];
-    if (!(typeof size === 'number' && (size > 0 || size === least) && size < Infinity))
-      throw new IstError(`ist: ${what} is ${size}; it must be ${least === 0 ? '≥' : '>'} 0`);
-  }
-}
-
 /** A copy of as many floats as a grid has points. */
 function copied(given, points, what) {
   for (const along of points)
@@ -229,33 +220,30 @@ function copied(given, points, what) {
 
 export class Shape extends Owner {
   static halfSpace(normal, offset = 0) {
-    const along = three(normal, 'normal'), length = Math.hypot(...along);
-    atLeast(undefined, {'the length of normal': length});
+    const along = three(normal, 'normal');
+    positive(Math.hypot(...along), 'the length of normal');
     return made(kHalfSpace, [...along, offset]);
   }
   static box(halfExtents) {
     const sizes = three(halfExtents, 'halfExtents');
-    atLeast(undefined, {'halfExtents[0]': sizes[0], 'halfExtents[1]': sizes[1], 'halfExtents[2]': sizes[2]});
+    sizes.forEach((size, k) => positive(size, `halfExtents[${k}]`));
     return made(kBox, sizes);
   }
   static ball(radius) {
-    atLeast(undefined, {radius});
-    return made(kBall, [radius]);
+    return made(kBall, [positive(radius, 'radius')]);
   }
   static capsule(radius, halfHeight) {
-    atLeast(undefined, {radius});
-    atLeast(0, {halfHeight});
-    return made(kCapsule, [radius, halfHeight]);
+    return made(kCapsule, [positive(radius, 'radius'), notNegative(halfHeight, 'halfHeight')]);
   }
   static cylinder(radius, halfHeight) {
-    atLeast(undefined, {radius, halfHeight});
-    return made(kCylinder, [radius, halfHeight]);
+    return made(kCylinder, [positive(radius, 'radius'), positive(halfHeight, 'halfHeight')]);
   }
 
   static heights(heights, columns, rows, spacing) {
     if (spacing?.length !== 2)
       throw new IstError('ist: spacing must have two numbers, along x and y');
-    atLeast(undefined, {'spacing[0]': spacing[0], 'spacing[1]': spacing[1]});
+    positive(spacing[0], 'spacing[0]');
+    positive(spacing[1], 'spacing[1]');
     const data = copied(heights, [columns, rows], 'Shape.heights()');
     let lowest = Infinity, highest = -Infinity;
     for (const h of heights) {
@@ -269,8 +257,8 @@ export class Shape extends Owner {
 
   static distanceGrid(distances, points, spacing, options) {
     checkOptions('Shape.distanceGrid()', options);
-    atLeast(undefined, {spacing});
-    atLeast(0, {error: options?.error ?? 0});
+    positive(spacing, 'spacing');
+    notNegative(options?.error ?? 0, 'error');
     const along = three(points, 'points');
     const origin = three(options?.origin ?? [0, 0, 0], 'origin');
     const data = copied(distances, along, 'Shape.distanceGrid()');

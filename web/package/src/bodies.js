@@ -2,7 +2,7 @@
 
 import {codeOf, kPatchBytes, kWrench, newPenetration, newVectors, readPatches, readPenetration, readVectors, writePatch, writePenetration} from './answers.js';
 import {Asset} from './asset.js';
-import {desk, kMostPatches, writeNumbers, writePose, writeSettings} from './desk.js';
+import {desk, kMostPatches, positive, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -45,8 +45,8 @@ export function sizeMatch(a, b, options) {
   const wasm = functions('sizeMatch()');
   two(a, b, 'sizeMatch()');
   checkOptions('sizeMatch()', options);
-  writePose(0, {scale: options?.scaleA}, 'A');
-  writePose(1, {scale: options?.scaleB}, 'B');
+  writePose(0, {scale: positive(options?.scaleA ?? 1, 'scaleA')}, 'A');
+  writePose(1, {scale: positive(options?.scaleB ?? 1, 'scaleB')}, 'B');
   check(wasm.size_match(a._at, b._at), 'sizeMatch()');
   const numbers = f64(), integers = u32(), at = desk().fit / 8 + 1;
   return {

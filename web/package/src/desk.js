@@ -87,9 +87,15 @@ export function count(value, absent, what, least = 0, most = 0xffffffff) {
 const kSphereMeasures = ['matched', 'inner'];
 const kMeasures = [...kSphereMeasures, 'exact'];
 
-/** A setting that is a number ≥ 0; 0 if it is omitted. */
+/** A number > 0 and, unless `most` is given, finite. */
+export function positive(value, what, most = Number.MAX_VALUE) {
+  if (!(typeof value === 'number' && value > 0 && value <= most))
+    throw new IstError(`ist: ${what} is ${value}; it must be > 0`);
+  return value;
+}
+
+/** A number ≥ 0. */
 export function notNegative(value, what) {
-  if (value === undefined) return 0;
   if (!(number(value, what) >= 0)) throw new IstError(`ist: ${what} is ${value}; it must be ≥ 0`);
   return value;
 }
@@ -108,7 +114,7 @@ export function writeSettings(options) {
   integers[at + 3] = count(options?.pairBudget, 0, 'pairBudget');
   integers[at + 4] = count(options?.maxVisits, 0, 'maxVisits');
   integers[at + 5] = count(options?.pairId, 0, 'pairId');
-  f64()[at / 2 + 3] = notNegative(options?.relativeError, 'relativeError');
+  f64()[at / 2 + 3] = notNegative(options?.relativeError ?? 0, 'relativeError');
 }
 
 /** Copies three numbers, which is shorter than set() and makes no view. */

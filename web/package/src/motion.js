@@ -1,8 +1,7 @@
 // Solids that move: from pose to pose, and when they meet.
 
 import {kMotion, newGap, newVectors, readGap, readVectors, statusOf} from './answers.js';
-import {checkMembers, copy3, count, desk, notNegative, writeNumbers, writePose} from './desk.js';
-import {IstError} from './error.js';
+import {checkMembers, copy3, count, desk, notNegative, positive, writeNumbers, writePose} from './desk.js';
 import {check, f64, functions, u32} from './memory.js';
 import {checkOptions} from './options.js';
 import {ask} from './query.js';
@@ -16,12 +15,6 @@ function writeMotion(place, motion, what) {
   checkMembers(motion, kMotionNames, what);
   for (const name in kMotion)
     writeNumbers(f64(), place / 8 + kMotion[name], motion?.[name], kOrigin, 3, what, name);
-}
-
-function positive(value, what) {
-  if (!(value > 0 && value < Infinity))
-    throw new IstError(`ist: ${what} is ${value}; it must be > 0`);
-  return value;
 }
 
 export function motionBetween(from, to, duration, about) {
@@ -61,7 +54,7 @@ export function timeOfImpact(a, b, poseB, options) {
   u32()[settings / 4 + 1] = count(options?.maxVisits, 0, 'maxVisits');
   const given = f64();
   given[settings / 8 + 1] = positive(options?.duration ?? 1, 'duration');
-  given[settings / 8 + 2] = notNegative(options?.tolerance, 'tolerance');
+  given[settings / 8 + 2] = notNegative(options?.tolerance ?? 0, 'tolerance');
   const status = ask('time_of_impact', 'timeOfImpact()', a, b, poseB, options, 0);
   const out = options?.into ?? newImpact();
   const integers = u32(), words = desk().impact / 4, at = words / 2 + 3;

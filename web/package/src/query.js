@@ -48,7 +48,7 @@ export const newSeparation = () => ({status: 'ok', distance: 0, ...newGap(), sph
 
 export function separation(a, b, poseB, options) {
   functions('separation()');
-  f64()[desk().numbers / 8] = notNegative(options?.maxDistance, 'maxDistance');
+  f64()[desk().numbers / 8] = notNegative(options?.maxDistance ?? 0, 'maxDistance');
   const status = ask('separation', 'separation()', a, b, poseB, options, options?.innerSpheres ? 1 : 0);
   return readSeparation(status, options?.into ?? newSeparation());
 }

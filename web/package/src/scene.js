@@ -1,7 +1,7 @@
 // Many bodies, and which of them meet.
 
 import {newPenetration, readPenetration} from './answers.js';
-import {checkMembers, count, desk, kPose, notNegative, writeNumbers, writePose, writeSettings} from './desk.js';
+import {checkMembers, count, desk, kPose, notNegative, positive, writeNumbers, writePose, writeSettings} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -14,11 +14,6 @@ const kPairBytes = 24, kPoseBytes = 56, kTooMany = 1;  // IST_BUDGET_EXHAUSTED
 const kMost = 2 ** 30, kMostGroup = 7;  // of SceneSettings, and kSceneGroups − 1
 const room = new Room();
 const forgotten = new FinalizationRegistry((place) => functions('a Scene').scene_release(place));
-
-function positive(value, what) {
-  if (!(typeof value === 'number' && value > 0)) throw new IstError(`ist: ${what} is ${value}; it must be > 0`);
-  return value;
-}
 
 /** `length` words from `place`, copied into `out` if that is long enough. */
 function copied(out, place, length) {
@@ -104,7 +99,7 @@ export class Scene {
     if (answer < 0)
       throw new IstError(`ist: answer is ${options.answer}; use one of ${kAnswers.join(', ')}`);
     writeSettings(options);
-    const margin = notNegative(options?.margin, 'margin');
+    const margin = notNegative(options?.margin ?? 0, 'margin');
     const status = wasm.scene_set_rule(
         this._at, count(groupA, 0, 'groupA', 0, kMostGroup), count(groupB, 0, 'groupB', 0, kMostGroup), answer, margin);
     check(status, 'Scene.setRule()');
@@ -156,7 +151,7 @@ export class Scene {
 
   nearest(points, options) {
     const {place, count: rows, answers} = placePoints('Scene.nearest()', points, options, 76);
-    const far = positive(options?.maxDistance ?? Infinity, 'maxDistance'), more = answers + 72 * rows;
+    const far = positive(options?.maxDistance ?? Infinity, 'maxDistance', Infinity), more = answers + 72 * rows;
     const status = functions('Scene.nearest()').scene_nearest(this._at, place, rows, far, more, answers);
     checkRows(status, rows, 'Scene.nearest()');
     const out = read(answers, rows, kSurfacePoint, options?.into ?? {});

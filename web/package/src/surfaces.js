@@ -1,7 +1,7 @@
 // Rays and points against one solid.
 
 import {kInvalidInput} from './answers.js';
-import {writePose} from './desk.js';
+import {positive, writePose} from './desk.js';
 import {IstError} from './error.js';
 import {check, f64, functions, Room, u32} from './memory.js';
 import {checkOptions} from './options.js';
@@ -64,8 +64,8 @@ export function askRays(who, origins, directions, options, more) {
   const from = rows(origins, 'origins'), along = rows(directions, 'directions');
   if (from !== along && from !== 1 && along !== 1)
     throw new IstError(`ist: directions has ${along} rows; origins has ${from}`);
-  const count = from === 1 ? along : from, maxDistance = options?.maxDistance ?? Infinity;
-  if (!(maxDistance > 0)) throw new IstError(`ist: maxDistance is ${maxDistance}; it must be > 0`);
+  const count = from === 1 ? along : from;
+  const maxDistance = positive(options?.maxDistance ?? Infinity, 'maxDistance', Infinity);
   const place = room.of(count * (kRayBytes + 64 + more)), hits = place + count * kRayBytes;
   for (let i = 0; i < count; ++i) {
     const ray = place + i * kRayBytes;

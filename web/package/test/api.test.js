@@ -430,10 +430,11 @@ test('what is wrong is said', () => {
   assert.match(sentence(ask({}, {relativeError: NaN})), /relativeError is NaN/);
   const asked = (options) => () => ist.separation(a, b, {}, options);
   assert.match(sentence(asked({maxDistance: -1})), /maxDistance is -1; it must be ≥ 0/);
-  assert.match(sentence(() => ist.sizeMatch(a, b, {scaleA: 0})), /A\.scale is 0/);
-  assert.match(sentence(() => ist.Shape.ball()), /radius is undefined/);
+  assert.match(sentence(() => ist.sizeMatch(a, b, {scaleA: 0})), /scaleA is 0; it must be > 0/);
+  assert.match(sentence(() => ist.Shape.ball()), /radius is undefined; it must be > 0/);
   assert.match(sentence(() => ist.Shape.box([1, 1, 0])), /halfExtents\[2\] is 0; it must be > 0/);
   assert.match(sentence(() => ist.Shape.halfSpace([0, 0, 0])), /length of normal is 0/);
+  assert.match(sentence(() => ist.Shape.capsule(1)), /halfHeight is undefined, not a number/);
   assert.match(sentence(() => ist.Shape.capsule(1, -1)), /halfHeight is -1; it must be ≥ 0/);
   assert.match(sentence(() => ist.Shape.heights([1, 2, 3, 4], 2, 2, [1, 1])), /a Float32Array of 2 · 2 = 4 numbers$/);
   assert.match(sentence(() => ist.Shape.heights(new Float32Array([0, NaN, 0, 0]), 2, 2, [1, 1])), /finite/);
