@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "mesh/connectivity/item_groups.h"
+#include "mesh/geometry/triangle_frame.h"
 
 namespace ist {
 namespace {
@@ -63,6 +64,12 @@ constexpr std::uint32_t kNone = ~0u;
 /// Patches are joined where the result is not larger than this, in radii of the larger.
 constexpr double kJoinedRadius = 1.5;
 
+double dot(const FloatPoint& a, const FloatPoint& b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) sum += double{a[k]} * double{b[k]};
+  return sum;
+}
+
 double distance2(const FloatPoint& a, const FloatPoint& b) {
   double sum = 0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -71,6 +78,10 @@ double distance2(const FloatPoint& a, const FloatPoint& b) {
   }
   return sum;
 }
+
+/// 1 − cos of an angle, 45°. Patches do not grow over sides where the surface turns by more, so
+/// that those of a thread's flanks and of a part's faces are thin along their normal.
+constexpr double kCrease = 0.3;
 
 /// A vertex of more triangles than this leads to no neighbour: each is found by its other corners,
 /// and looking at all of them for each patch would take the square of their number.
@@ -84,16 +95,22 @@ class Growth {
         left_(mesh.vertices.size()),
         taken_(mesh.triangles.size()),
         last_patch_(mesh.vertices.size()),
-        middle_(mesh.triangles.size()) {
+        middle_(mesh.triangles.size()),
+        normal_(mesh.triangles.size()) {
     for (std::size_t v = 0; v < left_.size(); ++v)
       left_[v] = static_cast<std::uint32_t>(stars_[v].size());
-    for (std::size_t t = 0; t < middle_.size(); ++t)
+    for (std::size_t t = 0; t < middle_.size(); ++t) {
+      double corner[3][3], normal[3];
+      for (std::size_t c = 0; c < 3; ++c)
+        std::copy_n(mesh.vertices[mesh.triangles[t][c]].begin(), 3, corner[c]);
+      area_normal(corner[0], corner[1], corner[2], normal);
+      const double length =
+          std::sqrt((normal[0] * normal[0] + normal[1] * normal[1]) + normal[2] * normal[2]);
       for (std::size_t k = 0; k < 3; ++k) {
-        const FloatMesh::Triangle& corners = mesh.triangles[t];
-        middle_[t][k] = (mesh.vertices[corners[0]][k] + mesh.vertices[corners[1]][k] +
-                         mesh.vertices[corners[2]][k]) /
-                        3;
+        middle_[t][k] = static_cast<float>(((corner[0][k] + corner[1][k]) + corner[2][k]) / 3);
+        normal_[t][k] = static_cast<float>(length > 0 ? normal[k] / length : 0);
       }
+    }
   }
 
   std::vector<BlockPatch> all() {
@@ -130,14 +147,32 @@ class Growth {
   /// In the one that grows.
   bool is_in_patch(std::uint32_t vertex) const { return last_patch_[vertex] == patches_; }
 
+  /// True if there is a crease at all sides that a triangle shares with the patch or, where it
+  /// touches in a corner only, between their normals.
+  bool is_over_crease(std::uint32_t triangle, const BlockPatch& patch, double turned) const {
+    double least_turned = 2;
+    for (const std::uint32_t other : patch.triangles) {
+      int shared = 0;
+      for (const std::uint32_t v : mesh_.triangles[triangle])
+        shared += std::ranges::count(mesh_.triangles[other], v) > 0 ? 1 : 0;
+      if (shared >= 2)
+        least_turned = std::min(least_turned, 1 - dot(normal_[triangle], normal_[other]));
+    }
+    return (least_turned < 2 ? least_turned : turned) > kCrease;
+  }
+
   /// Of the triangles that touch the patch and fit, the one that adds fewest vertices, with a bonus
-  /// for those that would be left alone; then the one nearest to the patch's middle.
+  /// for those that would be left alone; then the one nearest to the patch's middle, where a turned
+  /// normal counts as distance.
   std::uint32_t best_neighbour(const BlockPatch& patch) const {
     if (patch.triangles.size() == kWidth) return kNone;
-    FloatPoint middle = {};
+    FloatPoint middle = {}, normal = {};
     for (const std::uint32_t t : patch.triangles)
-      for (std::size_t k = 0; k < 3; ++k)
+      for (std::size_t k = 0; k < 3; ++k) {
         middle[k] += middle_[t][k] / static_cast<float>(patch.triangles.size());
+        normal[k] += normal_[t][k];
+      }
+    const double length = std::sqrt(dot(normal, normal)) + 1e-30;
     using Score = std::tuple<int, double, std::uint32_t>;
     Score best{4, 0, kNone};
     for (const std::uint32_t v : patch.vertices) {
@@ -150,7 +185,10 @@ class Growth {
           last |= left_[corner] == 1 ? 1 : 0;
         }
         if (patch.vertices.size() + static_cast<std::size_t>(added) > kWidth) continue;
-        best = std::min(best, Score{std::max(0, added - last), distance2(middle_[t], middle), t});
+        const double turned = 1 - dot(normal_[t], normal) / length;
+        if (is_over_crease(t, patch, turned)) continue;
+        best = std::min(best, Score{std::max(0, added - last),
+                                    distance2(middle_[t], middle) * (1 + turned), t});
       }
     }
     return std::get<2>(best);
@@ -180,7 +218,7 @@ class Growth {
   std::vector<std::uint8_t> taken_;
   std::vector<std::uint32_t> last_patch_;  ///< [vertex] the last that took it, from 1
   std::uint32_t patches_ = 0;
-  std::vector<FloatPoint> middle_;
+  std::vector<FloatPoint> middle_, normal_;  ///< of triangles
 };
 
 /// A ball around a patch: the middle of its box and the farthest vertex.

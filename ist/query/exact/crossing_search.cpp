@@ -197,7 +197,8 @@ class TriangleSearch : PairSigns {
     if (rows == 0) return;
     in_a &= in_slab(b, normal_a, box_a.slab_low[lane_a] - slack_, box_a.slab_high[lane_a] + slack_);
     if (in_a == 0) return;
-    std::optional<Meeting> made;
+    std::optional<Meeting>& made = made_;
+    made.reset();
     const auto now = [&]() -> Meeting& {
       if (made) return *made;
       const Margin margin = keep_ != nullptr               ? Margin::reach
@@ -381,6 +382,7 @@ class TriangleSearch : PairSigns {
   ExactScratch& scratch_;
   PlacedMeshes placed_;
   float pad_b_, reach_, slack_;
+  std::optional<Meeting> made_;  // a member, since GCC clears a local one
   EdgeTally edges_;
   Tally marking_;  ///< of tests at once, and of blocks that they marked
   PiercingEdges ends_;
