@@ -20,14 +20,14 @@ enum class PairSays : std::uint32_t {
   apart,
   crosses,
   unsure,  ///< the signs do not decide
-  wrong,   ///< signs contradict each other
+  wrong,   ///< signs are inconsistent
 };
 
 /// Arrays that lanes index differently. As local arrays they would be in slow memory.
 struct CornerMemory {
   double x[2][3][3][32];                    ///< A's, B's; of a corner
   double value[2][3][32], error[2][3][32];  ///< heights above the other's plane
-  std::uint32_t asked[9];                   ///< exact signs that lanes ask for, a bit for each lane
+  std::uint32_t asked[9];                   ///< exact signs that lanes need, a bit for each lane
 };
 
 /// A lane's part of CornerMemory.
@@ -168,8 +168,9 @@ IST_HD PairSays cross_pair(const CornerView& pair, const exact::Point& aside,
   return find_ends(above, through, ways_round<kBy>(pair, through, aside, tolerance), end);
 }
 
-/// Calls work(lane, item) → bool for each item whose bit is set in a lane's `asks`. All lanes share
-/// these calls, since few calls by single lanes take as long as many. Returns this lane's results.
+/// Calls work(lane, item) → bool for each item whose bit is set in a lane's `wanted`. All lanes
+/// share these calls, since a few calls by single lanes take as long as many. Returns this lane's
+/// results.
 template <int kItems, class Team, class Work>
 IST_HD std::uint32_t ask_together(const Team& team, CornerMemory& memory, std::uint32_t asks,
                                   const Work& work) {

@@ -254,9 +254,9 @@ IST_HD inline std::uint32_t end_of(const ExactRound& round) {
   return round.first + searched_of(round);
 }
 
-/// Estimates if round n has memory for one more pair. Each pair in progress may take as many chunks
-/// as one of the last round did or, in the first round, as one that is finished. Teams that begin
-/// at the same time do not see each other's chunks, so each counts the teams `before` it.
+/// Estimates whether round n has memory for one more pair. Each pair in progress may take as many
+/// chunks as one of the last round did or, in the first round, as one that is finished. Teams that
+/// begin at the same time do not see each other's chunks, so each counts the teams `before` it.
 IST_HD inline bool goes_on(const ExactArrays& batch, std::uint32_t n, std::uint32_t before) {
   constexpr std::uint32_t kLeastChunks = 4;
   const ExactRound &last = round_of(batch, n + 1), &round = round_of(batch, n);
@@ -280,7 +280,7 @@ IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& r
   const ExactPool& pool = memory.pool;
   const bool fits = all && held(pool, memory.crossing) && held(pool, memory.near);
   query.state = fits ? ExactState::ok : ExactState::out_of_memory;
-  // A pair for which others have left no chunks is listed again.
+  // A pair for which no chunks were left is listed again.
   if (!fits && round.chunks > batch.pool.capacity) {
     query.state = ExactState::later;
     batch.list[0][atomic_add(&batch.counters->listed[0], 1) % batch.pairs.count] = query.pair;

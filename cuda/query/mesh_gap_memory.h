@@ -38,7 +38,7 @@ constexpr int kMeshGapItems = kMeshGapPairs * static_cast<int>(kWidth);
 constexpr int kMeshGapStack = kMeshGapItems * (2 * (kMaxLevels - 1) + 1);
 constexpr std::uint32_t kMeshGapQueue = 96;  ///< pairs of triangles to be measured
 
-constexpr std::uint32_t kMeshGapLeft = 32;  ///< the most that a search leaves in the queue
+constexpr std::uint32_t kMeshGapLeft = 32;  ///< pairs that a search may leave in the queue
 
 /// The memory of a team that measures pairs of triangles.
 struct MeshGapPair {
@@ -46,7 +46,7 @@ struct MeshGapPair {
   MeshTree mesh[2];
   double reach;
   NearestTriangles best;
-  exact::Point level;  ///< along which level faces are apart
+  exact::Point level;  ///< the normal of parallel faces
   std::uint32_t crosses;
   std::uint32_t queue[kMeshGapQueue][2];  ///< pairs of triangles, 16 · block + lane
   float apart[kMeshGapQueue];             ///< a lower bound of their distance from floats
@@ -69,15 +69,15 @@ struct MeshGapMemory : MeshGapPair {
   const FloatBlock* in_floats[2];
   Quad row[3];  ///< of the map to A's frame, the translation last
   BoxLook<Real, Real> look[2];
-  float way[3][3];         ///< the axes of A's look
+  float way[3][3];         ///< the axes along which A's extents are compared
   double limit;            ///< pairs farther apart than this do not matter
-  Real squared_limit;      ///< with what rounds
+  Real squared_limit;      ///< including rounding
   Real limit_of_boxes[2];  ///< the same in the frames of A and B
   /// Pending pairs of nodes (MeshNode). A's has a further bit that is set if it is opened next.
   std::uint32_t stack_a[kMeshGapStack], stack_b[kMeshGapStack];
-  Real stack_squared[kMeshGapStack];  ///< no nearer than that
+  Real stack_squared[kMeshGapStack];  ///< squared lower bounds
   Real key[kMeshGapItems];
-  ExactTriangle triangles[2][kWidth];  ///< their boxes along the axes of A's look
+  ExactTriangle triangles[2][kWidth];  ///< their boxes along the axes of comparison
   float vertices[3][2][kWidth];        ///< of two blocks, A's frame
   std::uint8_t near[2][kWidth];        ///< triangles that may be near enough
   std::uint8_t met[kWidth * kWidth];   ///< pairs of them, 16 · A's + B's
@@ -103,7 +103,7 @@ struct MeshGapMemory : MeshGapPair {
   }
 
   /// Computes a triangle's plane. Returns the height above it, times the normal's length, beyond
-  /// which all is too far.
+  /// which everything is too far.
   IST_HD float place_plane(const float (&t)[3][3], float far, float size, Quad& n) const {
     float u[3], v[3], longest = 0;
     for (int k = 0; k < 3; ++k) {
@@ -241,8 +241,8 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   team.sync();
   return next.least < before && !any_crosses;
 }
-/// Measures the last pairs of a queue and returns the number left. Rare code is in functions of its
-/// own, since the search needs its registers and the device its instruction cache.
+/// Measures the last pairs of a queue and returns the number left. Rare code is in separate
+/// functions, since the search needs its registers and the device its instruction cache.
 template <class Real, class Team>
 IST_HD_COLD std::uint32_t measure_last(const Team& team, MeshGapMemory<Real>& memory,
                                        std::uint32_t queued) {
@@ -295,8 +295,8 @@ IST_HD_COLD std::uint32_t cull(const Team& team, MeshGapPair& memory, std::uint3
 }
 
 /// True if no triangles of two blocks are nearer than the best pair, up to rounding, and they come
-/// after it. So are most pairs of parallel faces, which floats cannot distinguish from nearer ones.
-/// `squared`: the blocks are no nearer.
+/// after it. This excludes most pairs of parallel faces, which floats cannot distinguish from
+/// nearer ones. `squared`: a lower bound for the blocks.
 template <class Team>
 IST_HD_COLD bool cannot_answer(const Team& team, const MeshGapPair& m, std::uint32_t a,
                                std::uint32_t b, double squared) {

@@ -12,7 +12,7 @@
 #include "query/base/precision.h"
 #include "query/exact/inside_search.h"
 
-// The steps of a batch of separations, as batch_steps.h has penetrations.
+// The steps of a batch of separations; batch_steps.h has those of penetrations.
 
 namespace ist::gpu {
 
@@ -150,7 +150,7 @@ IST_HD void search_mesh_gap(const Team& team, const SeparationArrays& batch, std
   const std::uint32_t visits = batch.max_visits == ~0u ? ~0u : batch.max_visits - query.visits;
   MeshGapSearch<Team, Real> search(team, memory, query.toward);
   if (batch.max_visits != ~0u) search.begin();
-  // If nothing is as near as is likely, one solid contains the other, or rounding decides.
+  // If nothing is as near as `likely`, one solid contains the other, or rounding decides.
   double limit = std::fmin(most, query.likely + slack);
   IST_ROLLED
   for (;;) {
@@ -195,7 +195,7 @@ IST_HD void measure_mesh_gap(const Team& team, const SeparationArrays& batch, st
   if (team.lane() == 0 && memory.crosses != 0) query.overlap = 1;
 }
 
-/// True if a solid contains a shell of the other, B or A. Called by the whole team.
+/// True if a solid contains a shell of the other. Called by the whole team.
 template <class Team>
 IST_HD bool holds_shell(const Team& team, const SolidPairs& batch, const MeshGapQuery& query,
                         bool b_in_a, InsideStack& stack) {
@@ -233,8 +233,8 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
     // Spheres have no error of their own.
     row.distance_max = query.overlap == 2 ? 0 : unit * query.simplified;
   } else {
-    // From the pair that answers, since which of several equal pairs is the least depends on the
-    // search.
+    // Starts from the pair that answers, since which of several equal pairs is the least depends on
+    // the search.
     const double nearest = std::fmin(distance - best.rounding, std::sqrt(query.left));
     const double least = (1 - 1e-12) * nearest - slack;
     row.distance = unit * distance;
@@ -271,7 +271,7 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     const double rounding =
         ist::distance_error<double>(span(memory.root(0), memory.root(1), place.a_from_b));
     const double error = rounding + place.rounding_of_world();
-    // Cover gaps do not include yet what is too far apart for double (GapDescent).
+    // Cover gaps do not yet include pairs that are too far apart for double (GapDescent).
     const double least = totals.cover - rounding - error;
     row.distance = unit * totals.gap;
     row.distance_min = unit * (least > 0 ? least : 0);

@@ -90,7 +90,7 @@ struct DetailRef {
   LevelCost level;
 };
 
-/// A ball evenly filled with the spheres of a node, as a quick look sees it
+/// A ball evenly filled with the spheres of a node, for coarse estimates
 /// (query/kernel/look_kernel.cpp).
 struct FilledBall {
   double x[3], r;

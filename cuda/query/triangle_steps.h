@@ -14,8 +14,8 @@
 
 // Trees against the triangles of boxes and terrains. A round takes pairs through steps that each
 // fit the instruction cache: place them, find the balls that triangles intersect, sum these, write
-// answers. A round ends when its memory is used up. Pairs that are too large for a round, or that
-// come after the last one, go through all steps by one team, with the same bits.
+// answers. A round ends when its memory is full. Pairs that are too large for a round, or that come
+// after the last one, go through all steps by one team, with the same bits.
 
 namespace ist::gpu {
 
@@ -57,8 +57,8 @@ IST_HD inline void place_query(const FieldBatch& batch, std::uint32_t k, std::ui
   query.first_part = kNoPart;
 }
 
-/// Estimates if a round has memory for one more pair. `teams`: the number of teams that traverse
-/// trees; each may still need as many words as earlier pairs took.
+/// Estimates whether a round has memory for one more pair. `teams`: the number of teams that
+/// traverse trees; each may still need as many words as earlier pairs took.
 IST_HD inline bool goes_on(const FieldBatch& batch, const TriangleRound& round,
                            std::uint32_t teams) {
   constexpr std::uint32_t kLeastEach = 512;

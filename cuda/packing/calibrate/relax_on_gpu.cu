@@ -61,7 +61,7 @@ class BlockTeam {
   }
 
  private:
-  /// Every warp's value into shared memory.
+  /// Writes every warp's value to shared memory.
   __device__ void exchange(std::uint64_t value) const {
     if (threadIdx.x % 32 == 0) shared_.words[threadIdx.x / 32] = value;
     __syncthreads();
@@ -74,11 +74,11 @@ class BlockTeam {
 constexpr unsigned kWarps = 8;
 constexpr unsigned kThreads = 32 * kWarps;
 constexpr unsigned kBlocksEach = 6;  // blocks a multiprocessor
-// The coarsest levels, of few cells with long lists: a block a cell, of so many threads.
+// The coarsest levels have few cells with long lists: one block a cell, with this many threads.
 constexpr unsigned kLongThreads = 1024;
 constexpr int kLongLevels = 3, kBlockLevels = 5;
 
-/// A cell to look into, with its parent's list.
+/// A cell to examine, with its parent's list.
 struct PowerTask {
   PowerGridCell cell;
   std::uint32_t first, count;
@@ -118,8 +118,8 @@ __device__ unsigned long long wide_warp_sum(unsigned long long value) {
          (static_cast<unsigned long long>(high) << 2 * kBits);
 }
 
-/// Cuts a cell's columns, a lane a column, and adds up what each site has before it goes to memory
-/// that all share.
+/// Cuts a cell's columns, one lane a column, and combines each site's sums before they go to shared
+/// memory.
 __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const PowerBlock& block,
                            const std::uint32_t* list, std::uint32_t count) {
   PowerSums mine[kPowerLeafSites] = {};
@@ -143,15 +143,15 @@ __device__ void walk_short(const WarpTeam& team, const PowerRound& round, const 
   }
 }
 
-/// Examines one cell, all of the team together; `short_list`: kPowerLeafSites elements of memory
-/// that the team shares.
+/// Examines one cell with the whole team; `short_list`: kPowerLeafSites elements of memory that the
+/// team shares.
 template <class Team>
 __device__ void look_into(const Team& team, const PowerRound& round, const PowerTask& task,
                           std::uint32_t* short_list) {
   const PowerGrid& grid = round.grid;
   const std::uint32_t* parent_list = round.lists + task.first;
   const PowerFilter filter(team, grid, task.cell, round.sites, parent_list, task.count);
-  /// Writes the first `room` sites that pass, and returns how many pass.
+  /// Writes the first `capacity` sites that pass, and returns how many pass.
   const auto filtered = [&](std::uint32_t* out, std::uint32_t room) {
     std::uint32_t kept = 0;
     for (std::uint32_t base = 0; base < task.count; base += Team::kWidth) {
@@ -214,7 +214,7 @@ __global__ void start_round(PowerRound round, std::uint32_t site_count) {
   round.tasks[top % 2][0] = {{0, 0, 0, top}, 0, site_count};
 }
 
-/// A level of few cells: a block a cell.
+/// A level of few cells: one block a cell.
 template <unsigned kEach>
 __global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int level) {
   __shared__ typename BlockTeam<kEach>::Shared shared;
@@ -227,7 +227,7 @@ __global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int 
   }
 }
 
-/// A level of many cells: a warp a cell.
+/// A level of many cells: one warp a cell.
 __global__ void __launch_bounds__(kThreads) look_into_cells(PowerRound round, int level) {
   __shared__ std::uint32_t short_lists[kWarps][kPowerLeafSites];
   const WarpTeam team;
@@ -260,7 +260,7 @@ __global__ void __launch_bounds__(kThreads)
   sites[k] = site;
 }
 
-/// The rounds' memory, which grows where it must.
+/// The memory of the rounds, which grows as needed.
 class Relaxation {
  public:
   Relaxation(Queue& queue, const PowerGrid& grid, std::span<const PowerSite> sites)
@@ -330,7 +330,7 @@ class Relaxation {
     }
   }
 
-  /// Whether the last cut fitted; if not, enlarges the buffers.
+  /// True if the last cut fitted; if not, enlarges the buffers.
   bool fits() {
     const std::vector<std::uint32_t> used = counters_.to_host(counters_.size());
     std::uint32_t most = 0;

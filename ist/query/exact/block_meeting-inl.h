@@ -19,8 +19,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace ist::HWY_NAMESPACE {
 
-/// The margin by which a vertex is above or below: the rounding of doubles; or so much that it
-/// stays there wherever points move within the tolerance, or B within the search's reach.
+/// How far from a plane a vertex must be to count as above or below: more than rounding, or so far
+/// that it stays there while points move within the tolerance, or B within the search's reach.
 enum class Margin { rounding, room, reach };
 
 /// The triangles of a block whose corners are all among the given vertices, a bit each.
@@ -183,7 +183,7 @@ struct Straddling {
   std::uint32_t clear = 0, doubtful = 0;
 };
 
-/// The test is in float, with points that may move by `reach`.
+/// Tests in float, and allows for points that move by `reach`.
 HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
                                  const PlacedTriangles& b, std::uint32_t lanes, float reach) {
   const F d;
@@ -226,13 +226,13 @@ HWY_INLINE Straddling straddling(const PlacedTriangles& a, std::uint32_t i,
   return out;
 }
 
-/// How often a search has asked what may not pay, and how often that was of use.
+/// Counts how often a search tried an optional test, and how often the test helped.
 struct Tally {
   std::uint32_t asked = 0, found = 0;
   bool pays() const { return asked <= 2 * found + 8; }
 };
-/// Of planes through edges of A's triangles and of B's, and of the pairs that they separated. Those
-/// pairs would cost three times as much otherwise.
+/// Statistics of planes through edges of A's and of B's triangles. A pair that they separate would
+/// otherwise cost three times as much.
 using EdgeTally = Tally[2];
 
 /// Two blocks whose triangles are tested in double by the planes of both sides, and by planes
@@ -394,10 +394,10 @@ class Meeting {
   const std::uint32_t number_[2];
   const exact::Point aside_[2] = {search_.aside, -1 * search_.aside};  ///< of the other block
   const PlacedVertices* vertices_[2];
-  mutable const PlacedPlanes* planes_[2] = {};  ///< found when they are asked for first
-  float apart_ = 0;                             ///< no coordinates of both blocks differ by more
-  double beyond_;                               ///< what planes through edges keep apart by
-  bool flat_[2] = {};                           ///< whose edges are asked
+  mutable const PlacedPlanes* planes_[2] = {};  ///< computed at the first use
+  float apart_ = 0;    ///< bounds the differences of coordinates of both blocks
+  double beyond_;      ///< the separation that planes through edges must exceed
+  bool flat_[2] = {};  ///< whose edges are asked
   Columns columns_, edges_, touch_, flush_;
 };
 

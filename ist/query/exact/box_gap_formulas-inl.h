@@ -57,7 +57,7 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
     across = across + squared_gap(Of::magnitude(times(look.lane_axis[k], away)) -
                                   (times(look.abs_axis[k], half) + set(one.reach[k])));
   }
-  // n is `turn` times the other normal plus a rest, along which only boxes are known.
+  // n is `turn` times the other normal plus a remainder, along which only boxes are known.
   const V(&n)[3] = box.normal;
   const V turn =
       (n[0] * set(one.normal[0]) + n[1] * set(one.normal[1])) + n[2] * set(one.normal[2]);

@@ -39,7 +39,7 @@ IST_HD MiddleBox<S> box_of(const MeshTree& mesh, int level, std::uint32_t i) {
   return box;
 }
 
-/// The likely direction of the answer, and two axes perpendicular to it and each other.
+/// The likely direction of the gap, and two axes perpendicular to it and each other.
 struct WayAxes {
   exact::Point way[3];
 };
@@ -74,7 +74,7 @@ struct SeenBox {
   S middle[3], hull[3], reach[3], normal[3];
   S low, high;      ///< its slab
   S nearest;        ///< its extent backwards along the direction
-  S beside_way[2];  ///< and beside that
+  S beside_way[2];  ///< and across it
 };
 
 /// Compares boxes of one mesh with a box of the other: along their own axes, along the other's,

@@ -22,8 +22,8 @@ namespace ist::HWY_NAMESPACE {
 /// without a branch on which edge of which triangle pierces.
 class PiercingEdges {
  public:
-  /// Adds the crossing of pair n. `pierced`: its piercing edges [A's, B's], two if signs agree with
-  /// each other.
+  /// Adds the crossing of pair n. `pierced`: its piercing edges [A's, B's], exactly two if signs
+  /// are consistent.
   HWY_INLINE void add(const TrianglePairs& pairs, const PairHeights& heights,
                       const std::uint32_t (&pierced)[2][3], std::uint32_t n) {
     // The piercing edges, and those at the crossing's end. An edge that goes down enters the other
@@ -51,7 +51,7 @@ class PiercingEdges {
   }
   bool full() const { return count_ == 8; }
 
-  /// Writes what waits, as the last of `end` crossings.
+  /// Writes the pending edges as the last of `end` crossings.
   void write(std::uint32_t end, Crossings& out) {
     const std::uint32_t at = end - count_;
     for (std::uint32_t i = 0; i < count_; ++i)
@@ -102,7 +102,7 @@ class PiercingEdges {
         hn::IfThenElse(end.from_second, load(kEdge), load(kEdge) + hn::Set(d, 8.0)));
   }
 
-  alignas(64) double of_[2][kNumbers][8] = {};  // finite where none waits, computed too
+  alignas(64) double of_[2][kNumbers][8] = {};  // unused lanes are computed too, and must be finite
   std::uint32_t triangle_[2][8];
   std::uint32_t count_ = 0;
 };
@@ -128,7 +128,7 @@ class TriangleSearch : PairSigns {
     found_.crossings = first;
     std::uint32_t n = next;
     for (; n < count && found_.complete; ++n) {
-      // Two blocks add at most 256, and seven more wait.
+      // Two blocks add at most 256, and seven more may be pending.
       if (keep_ == nullptr && n > next && found_.crossings + 264 > scratch_.most_crossings) break;
       // If many more are near than cross, keeping them does not pay. Two blocks add at most 256.
       if (keep_ != nullptr && (gathered_ > 2 * n + 3 * keep->crossings + 512 ||
@@ -170,7 +170,7 @@ class TriangleSearch : PairSigns {
   CrossingsFound finish() {
     if (found_.complete) test_pairs();
     ends_.write(found_.crossings, scratch_.crossings);
-    // Sums take eight at a time.
+    // Sums process eight at a time.
     scratch_.crossings.clear(found_.crossings, (found_.crossings + 7) / 8 * 8);
     return found_;
   }
@@ -257,7 +257,7 @@ class TriangleSearch : PairSigns {
     return has(scratch_.a.near, block_a) && has(scratch_.b.near, block_b);
   }
 
-  /// `asks`: its blocks are not both marked as near.
+  /// `unmarked`: its blocks are not both marked as near.
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
                 std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
     TrianglePairs& pairs = *scratch_.pairs;
@@ -330,7 +330,7 @@ class TriangleSearch : PairSigns {
   /// have marked theirs.
   HWY_INLINE void note_near(const TrianglePairs& pairs, std::uint32_t fresh) {
     if (fresh == 0) return;
-    // The first often marks the blocks of all.
+    // The first pair often marks the blocks of all others.
     mark_if_near(pairs, static_cast<std::uint32_t>(std::countr_zero(fresh)));
     fresh = not_marked(pairs, fresh & (fresh - 1));
     if (fresh == 0) return;
@@ -385,11 +385,11 @@ class TriangleSearch : PairSigns {
   Tally marking_;  ///< of tests at once, and of blocks that they marked
   PiercingEdges ends_;
   KeptPairs* keep_ = nullptr;   ///< near pairs are kept, and not tested yet
-  std::uint32_t gathered_ = 0;  ///< for it
+  std::uint32_t gathered_ = 0;  ///< pairs gathered for `keep_`
   CrossingsFound found_;
 };
 
-/// Asks pairs that cross whether they do so wherever points move.
+/// Tests whether crossing pairs cross however points move within the tolerance.
 class SettledSearch : PairSigns {
  public:
   SettledSearch(const CrossingSearch& search, ExactScratch& scratch)

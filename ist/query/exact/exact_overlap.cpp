@@ -239,7 +239,7 @@ CrossingsFound ExactQuery::find_more(std::uint32_t first, std::uint32_t next) no
   if (serves_) {
     found = find_kept_crossings(search_, *kept_, scratch_);
     if (found.complete) return found;
-    serves_ = false;  // there is no room for all at once
+    serves_ = false;  // they do not all fit into memory
     kept_->margin = 0;
     if (!begin_search(0, 0)) return found;
   }
@@ -299,7 +299,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
   if (!out_.complete) return out_;
   for (Side& side : sides_) find_insides(side);
   for (Side& side : sides_) {
-    // The order is that of the mesh, whichever was found first.
+    // Mesh order, which does not depend on the order of discovery.
     for_each_block(side.marks.pierced, side.mesh.level[0].count, [&](std::uint32_t b) {
       sum_crossed_block(side, side.marks.blocks[side.marks.place[b]]);
     });

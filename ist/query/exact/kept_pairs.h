@@ -28,7 +28,7 @@ struct KeptPairs {
   std::uint64_t nearest = kNone;  ///< for distances: the pair that the last query found
   double apart = 0;  ///< for distances: a lower bound of the last query's; 0 if unknown
   double horizon =
-      0;  ///< for distances: pairs that are not kept were no nearer when the list was made
+      0;  ///< for distances: a lower bound for pairs that are not kept, when the list was made
   double gone = 0;  ///< for distances: the length of B's path since, step by step
   /// A hash of crossings that are all connected, and of what they surround (ExactParts); 0 if
   /// unknown.

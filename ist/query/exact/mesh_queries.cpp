@@ -18,7 +18,7 @@ struct WaitingNode {
   std::uint32_t number;
 };
 
-/// A depth-first stack. Of a node's sixteen children the one with the least key comes first.
+/// A depth-first stack. Among a node's sixteen children the one with the least key comes first.
 class NodeStack {
  public:
   explicit NodeStack(const MeshTree& mesh) noexcept { nodes_[size_++] = {0, mesh.top, 0}; }
@@ -107,7 +107,7 @@ class Way {
       if (exact::enters(p_, q_, corners, true, {0, 0, 0}) == 0) continue;
       const Point normal = cross(corners[1] - corners[0], corners[2] - corners[0]);
       const double climbed = dot(normal, corners[0] - p_), climb = dot(normal, q_ - p_);
-      // If it hardly climbs, the corners are more accurate.
+      // If the edge hardly climbs, the corners are more accurate.
       const double t_plane = climb != 0 && std::abs(climbed) <= 2 * std::abs(climb)
                                  ? climbed / climb
                                  : 0.5 * (first + last);
@@ -149,7 +149,7 @@ MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept
 }
 
 MeshFoot nearest_on(const MeshTree& mesh, const Point& p, double limit) noexcept {
-  // Points that are nearer by no more than rounding need no visit: far away all are equally near.
+  // Points that are nearer by rounding alone need no visit: far away all are equally near.
   constexpr double kNearer = 1 - 4e-15;
   MeshFoot best;
   best.squared = limit * limit;

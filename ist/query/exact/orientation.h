@@ -3,10 +3,10 @@
 #include "base/vec3.h"
 #include "query/exact/expansion.h"
 
-// Exact signs of determinants of four points, of which some belong to B. Signs are those of B moved
-// aside by a given tiny vector, and a tie is broken as if B were moved further by an infinitesimal
-// (ε, ε², ε³): then no vertex lies in a plane and no edge meets an edge, whatever the pose, and all
-// signs agree with each other as those of one geometry do. Values are those of B where it is.
+// Exact signs of determinants of four points, some of which belong to B. Signs are those after B
+// has moved by a given tiny vector. A tie is broken as if B moved further by an infinitesimal (ε,
+// ε², ε³). Then no vertex lies in a plane and no edge meets an edge, whatever the pose, and all
+// signs are consistent with one geometry. Values are those of B in place.
 
 namespace ist::exact {
 
@@ -20,8 +20,8 @@ struct Determinant {
   int sign;      ///< never 0
 };
 
-/// Rounded r · (u × v) of rounded differences is off by at most this times r · (u × v) of absolute
-/// values: eight roundings of each product, and some room.
+/// r · (u × v) of rounded differences is off by at most this times r · (u × v) of absolute values:
+/// eight roundings of each product, and some margin.
 inline constexpr double kFilter = 1e-15;
 
 IST_HD inline double absolute_dot(const Point& x, const Point& size) {
@@ -44,13 +44,13 @@ IST_HD_COLD int sign_of_minor(double a1, double a0, double b1, double b0, double
       .sign();
 }
 
-/// The sign of a tie, from the normal u × v along which the infinitesimal goes.
+/// The sign of a tie, from the normal u × v along which the infinitesimal moves.
 IST_HD_COLD int sign_of_tie(const Point& u1, const Point& u0, const Point& v1, const Point& v0,
                             int moved) {
   int sign = sign_of_minor(u1.y, u0.y, u1.z, u0.z, v1.y, v0.y, v1.z, v0.z);
   if (sign == 0) sign = sign_of_minor(u1.z, u0.z, u1.x, u0.x, v1.z, v0.z, v1.x, v0.x);
   if (sign == 0) sign = sign_of_minor(u1.x, u0.x, u1.y, u0.y, v1.x, v0.x, v1.y, v0.y);
-  // For a triangle without area, or parallel edges, any sign will do that is always the same.
+  // For a triangle without area, or parallel edges, any constant sign is correct.
   return sign != 0 ? moved * sign : 1;
 }
 
@@ -65,8 +65,8 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
                      uz = difference(u1.z, u0.z);
   const Expansion<2> vx = difference(v1.x, v0.x), vy = difference(v1.y, v0.y),
                      vz = difference(v1.z, v0.z);
-  // In steps, so that few expansions exist at a time: on a GPU they are in each thread's local
-  // memory.
+  // Computed in steps, so that few expansions exist at a time: on a GPU they are in each thread's
+  // local memory.
   Expansion<64> shift_xy;
   const auto xy = [&] {
     const Expansion<16> x = minor(uy, vz, uz, vy), y = minor(uz, vx, ux, vz);
@@ -79,7 +79,7 @@ IST_HD_COLD Determinant exact_determinant(const Point& r1, const Point& r0, cons
   return {det.value(), 0, sign != 0 ? sign : sign_of_tie(u1, u0, v1, v0, moved)};
 }
 
-/// r · (u × v) in doubles, of rounded differences, for many r: sign 0 where it is not certain.
+/// r · (u × v) in doubles, of rounded differences, for many r: sign 0 if it is not certain.
 struct FilteredPlane {
   Point normal, size;
   double shift, shift_error;  ///< the part of the symbolic translation
@@ -93,7 +93,7 @@ struct FilteredPlane {
     shift = dot(by, normal);
     shift_error = kFilter * absolute_dot(by, size);
   }
-  /// `moved`: how much moving points may change it.
+  /// `moved`: a bound of the change by moving points.
   IST_HD Determinant height(const Point& r, double moved = 0) const {
     const double value = dot(r, normal), error = kFilter * absolute_dot(r, size);
     const double signed_value = value + shift;
@@ -116,7 +116,7 @@ IST_HD inline Determinant filtered_determinant(const Point& r1, const Point& r0,
   return filtered_determinant(r.x, r.y, r.z, u.x, u.y, u.z, v.x, v.y, v.z, by.x, by.y, by.z);
 }
 
-/// The same, in doubles where these are certain.
+/// The same, in doubles if these are certain.
 IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Point& u1,
                                       const Point& u0, const Point& v1, const Point& v0, int moved,
                                       const Point& aside) {
@@ -124,7 +124,7 @@ IST_HD inline Determinant determinant(const Point& r1, const Point& r0, const Po
   return found.sign != 0 ? found : exact_determinant(r1, r0, u1, u0, v1, v0, moved, aside);
 }
 
-/// In doubles, with a sign that may be 0; or with `kExactly` exactly.
+/// Computed in doubles, with a sign that may be 0; or exactly, with `kExactly`.
 template <bool kExactly>
 IST_HD inline Determinant determinant_of(const Point& r1, const Point& r0, const Point& u1,
                                          const Point& u0, const Point& v1, const Point& v0,
@@ -200,7 +200,7 @@ IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bo
                  .sign;
     all = all && way[k] != 0;
   }
-  // Two different signs prove that the line misses the triangle, whatever the third is.
+  // Two different signs prove that the line misses the triangle, whatever the third sign is.
   const int least =
       way[0] < way[1] ? (way[0] < way[2] ? way[0] : way[2]) : (way[1] < way[2] ? way[1] : way[2]);
   const int most =

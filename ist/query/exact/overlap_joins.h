@@ -33,7 +33,7 @@ IST_HD void heap_sort(T* items, std::uint32_t count, const Less& less) {
   }
 }
 
-/// The number of bits of a triangle's name, so that eight times a pair's name fits into 64.
+/// The number of bits of a triangle's name: eight times a pair's name fits into 64.
 inline constexpr int kTriangleBits = 28;
 
 template <class Visit>
@@ -340,12 +340,11 @@ class OverlapJoins : public Overlap {
 
   /// Returns the element to which the middle of the edge belongs. `first`: of the list of its ends.
   ///
-  /// Where copies coincide ends lie nearer to each other than they are known, and their order may
-  /// say that nothing is inside in the middle: the nearest end stands for it, so that sums lose
-  /// nothing.
+  /// Where copies coincide, ends may be nearer to each other than their error, and their order may
+  /// show nothing inside in the middle. The nearest end then represents it, so sums lose nothing.
   IST_HD std::uint32_t join_edge(std::uint32_t r, std::uint32_t edge,
                                  std::uint32_t first) noexcept {
-    // The ends of edges are sorted where those of curves were, each lane's in a place of its own.
+    // The ends of edges are sorted in the memory of curves' ends, each lane's in its own part.
     PiercedEnd* ends = memory().ends;
     std::uint32_t count = 0;
     if (width() > 1) {
@@ -418,7 +417,7 @@ class OverlapJoins : public Overlap {
     }
   }
 
-  /// Joins blocks inside as a whole with each other and with vertices inside of crossed ones.
+  /// Joins blocks inside as a whole with each other and with the inside vertices of crossed blocks.
   IST_HD void join_blocks(int side) noexcept {
     const MeshTree& all = mesh(side);
     for_each_of_lane(side, [&](std::uint32_t b) {

@@ -41,9 +41,9 @@ inline std::uint32_t alike(const std::uint32_t (&bits)[3]) {
 struct alignas(64) PairHeights {
   double value[2][3][8], error[2][3][8];  ///< [of A's corners over B's plane, of B's over A's]
   double shift[2][8];                 ///< the part of the symbolic translation, its absolute value
-  std::uint32_t positive[2][3] = {};  ///< with B moved aside
+  std::uint32_t positive[2][3] = {};  ///< with the symbolic translation of B
   std::uint32_t certain[2][3] = {};   ///< certain in double
-  std::uint32_t settled[2][3] = {};   ///< wherever points move by the room
+  std::uint32_t settled[2][3] = {};   ///< certain wherever points move within the tolerance
 
   /// The pairs that a plane separates.
   std::uint32_t apart(const std::uint32_t (&known)[2][3]) const {
@@ -61,7 +61,7 @@ class PairSigns {
  protected:
   explicit PairSigns(const CrossingSearch& search) : search_(search) {}
 
-  /// `kAsks`: settled signs are wanted.
+  /// `kSettle`: settled signs are wanted.
   template <bool kAsks>
   HWY_INLINE void find_heights(const TrianglePairs& pairs, std::uint32_t count,
                                PairHeights& out) const {
@@ -349,7 +349,7 @@ class PairSigns {
         beyond = hn::Max(beyond, gap * hn::Abs(gap) - reach * reach * dot(axis, axis));
       };
       // Both ends of an edge coincide along its axis except for rounding. For parallel edges the
-      // axis is nothing but rounding.
+      // axis is rounding alone.
       const auto rounding = [&](const Vec3& u, const Vec3& v) {
         const V size_u = largest(u), size_v = largest(v);
         return filter * ((size_u * size_v) * (size_u + size_v));

@@ -58,7 +58,7 @@ class TriangleCulls {
       low[k] = of_a_[k].low[i] - blur_, high[k] = of_a_[k].high[i] + blur_;
     std::uint32_t bits = 0;
     for (std::size_t l = 0; l < kWidth; l += hn::Lanes(d)) {
-      // A lane's result must not depend on the lanes beside it, whose number depends on the
+      // A lane's result must not depend on the lanes beside it, since their number depends on the
       // processor.
       V squared = less * apart(of_b_, low, high, l);
       const auto is_far = squared > far_squared;
@@ -149,7 +149,7 @@ class TriangleCulls {
         }
         const V squared = (out[0] * out[0] + out[1] * out[1]) + out[2] * out[2],
                 side_squared = (side[0] * side[0] + side[1] * side[1]) + side[2] * side[2];
-        // Slivers, whose normals have no digits, decide nothing.
+        // Slivers, whose normals have no valid digits, decide nothing.
         const V inverse =
             hn::IfThenElseZero(squared > hn::Set(d, 0.9f) * side_squared,
                                inverse_of_length(hn::Sqrt(squared) * hn::Set(d, kLonger)));
@@ -309,7 +309,7 @@ class BlockExtents {
   alignas(64) double low_[3][kWidth], high_[3][kWidth];
 };
 
-/// The triangles of a block that is much larger than what they are measured from.
+/// The triangles of a block that is much larger than the other node.
 class BlockFaces : public BlockExtents {
  public:
   BlockFaces(const PlacedVertices& vertices, const MeshBlock& block, const WayAxes& axes)
@@ -435,7 +435,7 @@ inline Corners corners(const TrianglePairs& pairs, int side, std::uint32_t n) {
 }
 
 /// True if the triangles of pair n cross. They do not if a plane perpendicular to the direction
-/// between the found points separates them. It does if these are the nearest points, except for
+/// between the found points separates them, which it does for the nearest points, except for
 /// rounding.
 inline bool crosses(const TrianglePairs& pairs, const PairGaps& gaps, std::uint32_t n,
                     double slack) {

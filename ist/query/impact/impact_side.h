@@ -108,7 +108,7 @@ struct HullPlane {
 };
 
 /// Searches for a plane that shows most of the distance, from a guess of the direction from A to B.
-/// Finds none if they are no further apart than `least`.
+/// Finds none if the hulls are no further apart than `least`.
 HullPlane plane_between(const PointHull& a, const PointHull& b, const Eigen::Vector3d& guess,
                         double least) noexcept;
 

@@ -27,7 +27,7 @@ struct LevelQueries {
   const AssetHeader& a = placed_a.asset.header();
   const AssetHeader& b = placed_b.asset.header();
   const bool same_asset = are_one_asset(a, b);
-  /// The exact measure may answer: nothing limits sphere pairs, a limit that it does not obey.
+  /// The exact measure may answer if sphere pairs are not limited, a limit that it does not obey.
   const bool has_exact =
       by_error(settings) && settings.pair_budget == 0 && a.mesh != 0 && b.mesh != 0;
   std::uint32_t visits = 0, pairs = 0;
@@ -42,8 +42,8 @@ struct LevelQueries {
     return counted(sum(pair, limits));
   }
 
-  /// The sum of a pair of levels; for copies of one asset that nearly coincide that of unlike
-  /// levels, unless the exact measure answers there. `most`: its weight is the largest.
+  /// The sum of a pair of levels. For copies of one asset that nearly coincide, it is that of
+  /// unlike levels, unless the exact measure answers there. `most`: its weight is the largest.
   Penetration ask(const LevelPair& pair, bool most, bool keep_rounding = false) noexcept {
     const CoincidenceWeight coincidence = coincidence_weight_of(pair);
     if (coincidence.weight == 0 || has_exact) return descend(pair, most, keep_rounding);
@@ -221,8 +221,8 @@ struct BlendSum {
   Penetration sum = {};
   bool by_levels = false;         ///< a part of the sum is
   double largest = 0;             ///< weight of the largest level
-  Penetration exact_weight = {};  ///< as if it were a volume, with its gradients except those by …
-  double exact_slope = 0;         ///< … the coarse estimate
+  Penetration exact_weight = {};  ///< as if it were a volume; without its gradients by
+  double exact_slope = 0;         ///< the coarse estimate
   double slope = 0;               ///< of the sum by the coarse estimate
   double sure_slope = 0;          ///< of the sum by the quick look
   // Rounding of the sum, and of the exact measure's weight, which depends on volumes:

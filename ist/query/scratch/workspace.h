@@ -79,7 +79,7 @@ class GapStack {
   }
 
   /// Calls open(pair) while pairs are wanted and done() is false. Returns true if the limit of
-  /// visits stopped it; the pairs that wait bound the gap of covers then.
+  /// visits stopped it; then the pending pairs bound the gap of covers.
   template <class Open, class Done>
   bool search(const WaitingPair& root, const Open& open, const Done& done) noexcept {
     add(root);

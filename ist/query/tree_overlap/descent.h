@@ -22,7 +22,7 @@ bool opens_a(const SphereTree& a, int level_a, const SphereTree& b, int level_b,
 /// The staged traversal of docs/design.md 7: node pairs level by level, then pairs of leaf blocks.
 class Descent {
  public:
-  /// All arguments must outlive the traversal. `bins`: get the sums too.
+  /// All arguments must outlive the traversal. `bins`, unless null, get the sums too.
   Descent(const SphereTree& a, const SphereTree& b, const RelativePose& pose,
           const DescentLimits& limits, Workspace::Impl& scratch, ContactBins* bins = nullptr);
 
