@@ -69,7 +69,7 @@ struct MeshGapMemory : MeshGapPair {
   const FloatBlock* in_floats[2];
   Quad row[3];  ///< of the map to A's frame, the translation last
   BoxLook<Real, Real> look[2];
-  float way[3][3];         ///< the axes along which A's extents are compared
+  float axis[3][3];        ///< the axes along which A's extents are compared
   double limit;            ///< pairs farther apart than this do not matter
   Real squared_limit;      ///< including rounding
   Real limit_of_boxes[2];  ///< the same in the frames of A and B
@@ -81,7 +81,7 @@ struct MeshGapMemory : MeshGapPair {
   float vertices[3][2][kWidth];        ///< of two blocks, A's frame
   std::uint8_t near[2][kWidth];        ///< triangles that may be near enough
   std::uint8_t met[kWidth * kWidth];   ///< pairs of them, 16 · A's + B's
-  WayAxes axes[2];                     ///< for A's nodes, and for B's
+  GapAxes axes[2];                     ///< for A's nodes, and for B's
 
   // The error of a float coordinate in A's frame, relative to the reach.
   static constexpr float kPlacing = 1e-6f;
@@ -95,7 +95,7 @@ struct MeshGapMemory : MeshGapPair {
   }
 
   IST_HD float along(int k, const float (&x)[3]) const {
-    return std::fma(way[k][0], x[0], std::fma(way[k][1], x[1], way[k][2] * x[2]));
+    return std::fma(axis[k][0], x[0], std::fma(axis[k][1], x[1], axis[k][2] * x[2]));
   }
   IST_HD static float squared_gap(float low, float high, float other_low, float other_high) {
     const float gap = std::fmax(0.0f, std::fmax(low - other_high, other_low - high));
@@ -167,19 +167,19 @@ IST_HD void limit_to(MeshGapMemory<Real>& m, double distance) {
 
 /// Sets the direction from A to B along which extents are compared from now on, unless it is zero.
 template <class Real, class Team>
-IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact::Point way) {
+IST_HD_COLD void look_along(const Team& team, MeshGapMemory<Real>& memory, exact::Point direction) {
   MeshGapMemory<Real>& m = *team.memory(&memory);
-  const bool known = dot(way, way) > 0;
+  const bool known = dot(direction, direction) > 0;
   if (team.lane() == 0) {
-    m.axes[0] = known ? axes_along(way) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    m.axes[0] = known ? axes_along(direction) : GapAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     m.axes[1] = seen_back(m.axes[0], m.map[1], m.map[0].scale);
   }
   team.sync();
   for (int k = team.lane(); k < 18; k += Team::kWidth) {
     const int side = k / 9, j = k % 9 / 3, axis = k % 3;
-    const double along = (&m.axes[side].way[j].x)[axis];
-    if (side == 0) m.way[j][axis] = static_cast<float>(along);
-    if (known) m.look[side].turn(m.axes[side].way[j], along, j, axis);
+    const double along = (&m.axes[side].axis[j].x)[axis];
+    if (side == 0) m.axis[j][axis] = static_cast<float>(along);
+    if (known) m.look[side].turn(m.axes[side].axis[j], along, j, axis);
   }
   team.sync();
 }
@@ -231,10 +231,10 @@ IST_HD bool measure_triangles(const Team& team, MeshGapPair& memory, std::uint32
   if (wants && name == lowest) {
     m.best.set(squared, name, found.on_a, found.between);
     if (const double distance = std::sqrt(squared); distance > 0) {
-      const exact::Point way = (1 / distance) * found.between;
-      exact::Point level = way;
-      level_with(a.corner, way, level);
-      level_with(b.corner, way, level);
+      const exact::Point direction = (1 / distance) * found.between;
+      exact::Point level = direction;
+      level_with(a.corner, direction, level);
+      level_with(b.corner, direction, level);
       m.level = level;
     }
   }

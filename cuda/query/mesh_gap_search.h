@@ -233,12 +233,13 @@ class MeshGapSearch {
   /// True if triangles may be within the limit, by their extents along the axes.
   IST_HD bool may_be_near(std::uint32_t of_a, std::uint32_t of_b) const {
     double squared = 0;
-    for (const exact::Point& way : m_.axes[0].way) {
+    for (const exact::Point& axis : m_.axes[0].axis) {
       double low[2], high[2];
       for (int side = 0; side < 2; ++side) {
         const std::uint32_t name = side == 0 ? of_a : of_b;
-        const double p = dot(way, m_.corner(side, name, 0)), q = dot(way, m_.corner(side, name, 1)),
-                     r = dot(way, m_.corner(side, name, 2));
+        const double p = dot(axis, m_.corner(side, name, 0)),
+                     q = dot(axis, m_.corner(side, name, 1)),
+                     r = dot(axis, m_.corner(side, name, 2));
         low[side] = std::fmin(p, std::fmin(q, r));
         high[side] = std::fmax(p, std::fmax(q, r));
       }
@@ -423,12 +424,12 @@ class MeshGapSearch {
     }
     // Nothing is nearer between planes perpendicular to that direction, however the points were
     // found.
-    const single::Vec3 way = found.between;
-    const float length = std::sqrt(dot(way, way)) * (1 + 1e-6f);
+    const single::Vec3 between = found.between;
+    const float length = std::sqrt(dot(between, between)) * (1 + 1e-6f);
     float last = -1e30f, next = 1e30f;
     for (int c = 0; c < 3; ++c) {
-      last = std::fmax(last, dot(way, corner(0, name_a, c)));
-      next = std::fmin(next, dot(way, of_b[c]));
+      last = std::fmax(last, dot(between, corner(0, name_a, c)));
+      next = std::fmin(next, dot(between, of_b[c]));
     }
     const float apart = length > 0 ? (next - last) / length : 0;
     queued_ = append(team_, m_, queued_, k < met && apart <= m_.limit_in_floats(), kWidth * a + i,

@@ -112,8 +112,8 @@ IST_HD void glance_at_spheres(const Team& team, const SeparationArrays& batch, s
   query.likely = (found.gap > 0 ? found.gap : 0) + query.error + off;
   double moved[3];
   map.apply_fused(memory.tree[1].ball(kSphereLevel, found.b).centre, moved);
-  const Vec3 way = vec3(moved) - vec3(memory.tree[0].ball(kSphereLevel, found.a).centre);
-  if (const double far = norm(way); far > 0) query.toward = way / far;
+  const Vec3 toward = vec3(moved) - vec3(memory.tree[0].ball(kSphereLevel, found.a).centre);
+  if (const double far = norm(toward); far > 0) query.toward = toward / far;
 }
 
 /// Loads a pair into a team's memory.
@@ -243,8 +243,8 @@ IST_HD void finish_mesh_gap(const Team& team, const SeparationArrays& batch, std
     const Vec3 at_a = best.on_a, at_b = best.on_a + best.between;
     row.point_a = place.to_world(query.swapped == 0 ? at_a : at_b);
     row.point_b = place.to_world(query.swapped == 0 ? at_b : at_a);
-    const double way = query.swapped == 0 ? norm(best.between) : -norm(best.between);
-    row.normal = turned(place.rotation_a, best.between / way);
+    const double length = query.swapped == 0 ? norm(best.between) : -norm(best.between);
+    row.normal = turned(place.rotation_a, best.between / length);
   }
   if (query.stopped != 0) row.status = QueryStatus::budget_exhausted;
   row.node_visits = query.visits;
@@ -281,8 +281,8 @@ IST_HD void finish_separation(const SeparationArrays& batch, std::uint32_t i,
     const NodeBall b = memory.tree[1].ball(kSphereLevel, totals.b);
     double moved[3];
     place.a_from_b.apply_fused(b.centre, moved);
-    const Vec3 at_a = vec3(a.centre), at_b = vec3(moved), way = at_b - at_a;
-    const Vec3 axis = way / norm(way);
+    const Vec3 at_a = vec3(a.centre), at_b = vec3(moved), between = at_b - at_a;
+    const Vec3 axis = between / norm(between);
     row.point_a = place.to_world(at_a + a.r * axis);
     row.point_b = place.to_world(at_b - place.a_from_b.scale * b.r * axis);
     row.normal = turned(place.rotation_a, axis);

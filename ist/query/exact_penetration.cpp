@@ -69,7 +69,7 @@ class MeshOverlap : public ExactQuery {
   CrossingEnd end_of(std::uint32_t i, int e) const noexcept {
     return scratch_.crossings.end_of(i, e);
   }
-  double way_of(std::uint32_t i, int e) const noexcept {
+  double share_of_edge(std::uint32_t i, int e) const noexcept {
     return scratch_.crossings.end(e, Crossings::kT)[i];
   }
   exact::Point place_of(std::uint32_t i, int e) const noexcept {

@@ -33,15 +33,15 @@ IST_HD inline void to_work(const BandedArrays& a) {
   s.cell_class = 0;
   s.depth = 0;
   const std::uint64_t plateau = s.schedule.plateau();
-  const std::uint64_t room = std::uint64_t{a.cell_capacity} - s.slots +
-                             (s.free > s.free_taken ? s.free - s.free_taken : 0);
+  const std::uint64_t free_slots = std::uint64_t{a.cell_capacity} - s.slots +
+                                   (s.free > s.free_taken ? s.free - s.free_taken : 0);
   std::uint64_t cells = s.frontier, level = s.frontier;
   while (s.classes == 1 && s.depth < kDeepest) {
     level *= 8;
     cells += level;
     const std::uint64_t children = cells - s.frontier;
     if (s.active + cells > plateau || s.live + children > packing::BandSchedule::kMostCells ||
-        children > room || children > a.queue_capacity)
+        children > free_slots || children > a.queue_capacity)
       break;
     ++s.depth;
   }
@@ -211,7 +211,7 @@ IST_HD inline void after_step(const BandedArrays& a, Step step) {
       break;
     case Step::touch_all:
       return after_grid_pass(a, Step::count);
-    case Step::make_room:
+    case Step::reserve_lists:
       return after_grid_pass(a, Step::fill);
     case Step::fill:
       s.use.pairs = 0;

@@ -141,7 +141,7 @@ IST_HD void pass_over_pairs(CoopLaunch& coop, const BandedArrays& a, Step step) 
     const Sphere sphere = a.spheres[pair.sphere].sphere();
     const SphereLists::Share share{i % shares, shares};
     if (step == Step::count) grid.count_in_cells(coop.team(), pair, sphere, share);
-    if (step == Step::make_room) grid.make_room(coop.team(), pair, sphere, share);
+    if (step == Step::reserve_lists) grid.reserve_lists(coop.team(), pair, sphere, share);
     if (step == Step::fill) grid.fill_cells(coop.team(), pair, sphere, share);
   });
 }
@@ -172,7 +172,7 @@ IST_HD void pack_banded(CoopLaunch& coop, const BandedArrays& a, const Surface& 
         break;
       }
       case Step::count:
-      case Step::make_room:
+      case Step::reserve_lists:
       case Step::fill:
         pass_over_pairs(coop, a, step);
         break;

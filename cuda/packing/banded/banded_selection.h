@@ -117,9 +117,9 @@ IST_HD void certify_winners(CoopLaunch& coop, const BandedArrays& a, const Surfa
       double gap = me.radius;
       for_neighbours(team, a, me.centre, [&](std::uint32_t place, const Candidate& other) {
         if (a.won[place] != 0 && place != winner.node && packing::goes_before(other, me)) {
-          const double room = packing::gap_to_sphere(
+          const double to_sphere = packing::gap_to_sphere(
               me.centre, {other.centre.x, other.centre.y, other.centre.z, other.radius});
-          gap = room < gap ? room : gap;
+          gap = to_sphere < gap ? to_sphere : gap;
         }
         return true;
       });

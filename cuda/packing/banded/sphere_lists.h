@@ -138,7 +138,8 @@ struct SphereLists {
 
   /// Third pass: the first pair at a cell gives it a segment for the longer list.
   template <class Team>
-  IST_HD void make_room(const Team& team, const Pair& pair, const Sphere& s, Share share) const {
+  IST_HD void reserve_lists(const Team& team, const Pair& pair, const Sphere& s,
+                            Share share) const {
     for_cells(team, pair, s, share, [&](Cell& cell, packing::GridRelation) {
       if ((cell.size & kCovered) != 0) return;
       const std::uint32_t old = atomic_or(&cell.where, kInMaking);
@@ -204,7 +205,7 @@ enum class Step : std::uint32_t {
   clear_grid,  ///< lay the sphere grid out anew
   touch_all,   ///< list every sphere
   count,       ///< the sphere grid's passes over the listed pairs
-  make_room,
+  reserve_lists,
   fill,
   activate,  ///< cells that reach the margin become the frontier
   refresh,   ///< the frontier's cells of one class: settles many, leaves the rest open

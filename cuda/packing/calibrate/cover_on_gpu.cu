@@ -37,7 +37,7 @@ struct DeviceCoverSurface {
 struct Frontier {
   CoverCell* cells;
   std::uint32_t* lists;
-  std::uint32_t cell_room, list_room;
+  std::uint32_t cell_capacity, list_capacity;
 };
 
 /// Progress of a level. Counts continue beyond the capacities, so that the host learns the need.
@@ -69,7 +69,7 @@ __global__ void list_all(std::uint32_t* list, std::uint32_t count) {
 /// Divides every cell of `from` into children, one warp each.
 __global__ void __launch_bounds__(kThreads)
     divide(WideTree tree, CoverLevel level, Frontier from, std::uint32_t cell_count, Frontier to,
-           std::uint32_t* scratch, std::uint32_t scratch_room, unsigned long long* raised,
+           std::uint32_t* scratch, std::uint32_t scratch_capacity, unsigned long long* raised,
            Counters* counters) {
   __shared__ std::uint32_t short_lists[kWarps][kShortList];
   const WarpTeam team;
@@ -81,7 +81,7 @@ __global__ void __launch_bounds__(kThreads)
     std::uint32_t* keep = short_lists[threadIdx.x / 32];
     if (cell.count > kShortList) {
       const std::uint32_t at = take(team, &counters->scratch, cell.count);
-      if (at + cell.count > scratch_room) continue;  // the host sees it and tries again
+      if (at + cell.count > scratch_capacity) continue;  // the host sees it and tries again
       keep = scratch + at;
     }
     const CoverVerdict verdict =
@@ -92,7 +92,7 @@ __global__ void __launch_bounds__(kThreads)
     if (verdict.divide) {
       const std::uint32_t first = take(team, &counters->listed, verdict.count);
       const std::uint32_t place = take(team, &counters->cells, 1);
-      if (first + verdict.count <= to.list_room && place < to.cell_room) {
+      if (first + verdict.count <= to.list_capacity && place < to.cell_capacity) {
         for (std::uint32_t i = static_cast<std::uint32_t>(team.lane()); i < verdict.count; i += 32)
           to.lists[first + i] = keep[i];
         cell.inside = verdict.inside;
@@ -109,8 +109,8 @@ struct FrontierArrays {
   DeviceArray<CoverCell> cells;
   DeviceArray<std::uint32_t> lists;
 
-  FrontierArrays(Queue& queue, std::size_t cell_room, std::size_t list_room)
-      : cells(queue, cell_room), lists(queue, list_room) {}
+  FrontierArrays(Queue& queue, std::size_t cell_capacity, std::size_t list_capacity)
+      : cells(queue, cell_capacity), lists(queue, list_capacity) {}
   Frontier view() const {
     return {cells.data(), lists.data(), static_cast<std::uint32_t>(cells.size()),
             static_cast<std::uint32_t>(lists.size())};

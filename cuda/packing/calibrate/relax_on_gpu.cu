@@ -89,10 +89,10 @@ struct PowerRound {
   PowerGrid grid;
   const PowerSite* sites;
   PowerSums* sums;
-  PowerTask* tasks[2];      ///< of the levels in turn
-  std::uint32_t task_room;  ///< in each
+  PowerTask* tasks[2];          ///< of the levels in turn
+  std::uint32_t task_capacity;  ///< in each
   std::uint32_t* lists;
-  std::uint32_t list_room;
+  std::uint32_t list_capacity;
   std::uint32_t* task_counts;  ///< of every level; may exceed the capacity
   std::uint32_t* listed;       ///< likewise
 };
@@ -152,7 +152,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   const std::uint32_t* parent_list = round.lists + task.first;
   const PowerFilter filter(team, grid, task.cell, round.sites, parent_list, task.count);
   /// Writes the first `capacity` sites that pass, and returns how many pass.
-  const auto filtered = [&](std::uint32_t* out, std::uint32_t room) {
+  const auto filtered = [&](std::uint32_t* out, std::uint32_t capacity) {
     std::uint32_t kept = 0;
     for (std::uint32_t base = 0; base < task.count; base += Team::kWidth) {
       const std::uint32_t i = base + static_cast<std::uint32_t>(team.lane());
@@ -160,7 +160,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
       int total = 0;
       const std::uint32_t place =
           kept + static_cast<std::uint32_t>(team.exclusive_count(stays, total));
-      if (stays && place < room) out[place] = parent_list[i];
+      if (stays && place < capacity) out[place] = parent_list[i];
       kept += static_cast<std::uint32_t>(total);
     }
     team.sync();
@@ -171,7 +171,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   std::uint32_t first = 0;
   if (kept > kPowerLeafSites) {
     first = take(team, round.listed, kept);
-    if (first + kept > round.list_room) return;  // the host sees it and tries again
+    if (first + kept > round.list_capacity) return;  // the host sees it and tries again
     filtered(round.lists + first, kept);
     list = round.lists + first;
   }
@@ -195,7 +195,7 @@ __device__ void look_into(const Team& team, const PowerRound& round, const Power
   const PowerGridCell child = child_of(task.cell, static_cast<std::uint32_t>(octant) & 7);
   const bool needed = octant < 8 && !is_empty(grid, child);
   const std::uint32_t at = append(team, needed, round.task_counts + child.level);
-  if (needed && at < round.task_room) round.tasks[child.level % 2][at] = {child, first, kept};
+  if (needed && at < round.task_capacity) round.tasks[child.level % 2][at] = {child, first, kept};
 }
 
 __host__ __device__ std::uint32_t least(std::uint32_t a, std::uint32_t b) { return a < b ? a : b; }
@@ -220,7 +220,7 @@ __global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int 
   __shared__ typename BlockTeam<kEach>::Shared shared;
   __shared__ std::uint32_t short_list[kPowerLeafSites];
   const BlockTeam<kEach> team(shared);
-  const std::uint32_t count = least(round.task_counts[level], round.task_room);
+  const std::uint32_t count = least(round.task_counts[level], round.task_capacity);
   for (std::uint32_t k = blockIdx.x; k < count; k += gridDim.x) {
     look_into(team, round, round.tasks[level % 2][k], short_list);
     team.sync();
@@ -231,7 +231,7 @@ __global__ void __launch_bounds__(kEach) look_into_blocks(PowerRound round, int 
 __global__ void __launch_bounds__(kThreads) look_into_cells(PowerRound round, int level) {
   __shared__ std::uint32_t short_lists[kWarps][kPowerLeafSites];
   const WarpTeam team;
-  const std::uint32_t count = least(round.task_counts[level], round.task_room);
+  const std::uint32_t count = least(round.task_counts[level], round.task_capacity);
   for (std::uint32_t k = blockIdx.x * kWarps + threadIdx.x / 32; k < count;
        k += gridDim.x * kWarps) {
     look_into(team, round, round.tasks[level % 2][k], short_lists[threadIdx.x / 32]);

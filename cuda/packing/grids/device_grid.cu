@@ -199,12 +199,12 @@ GridScene DeviceGrid::scene() const {
 
 void DeviceGrid::append(const Sphere* spheres, std::size_t count) {
   if (sphere_count_ + count > spheres_.size()) {
-    const std::size_t room =
+    const std::size_t capacity =
         std::max<std::size_t>({1024, 2 * spheres_.size(), sphere_count_ + count});
     if (spheres_.size() == 0) {
-      spheres_ = DeviceArray<Sphere>(*queue_, room);
+      spheres_ = DeviceArray<Sphere>(*queue_, capacity);
     } else {
-      spheres_.grow(room, sphere_count_);
+      spheres_.grow(capacity, sphere_count_);
     }
   }
   check(cudaMemcpyAsync(spheres_.data() + sphere_count_, spheres, count * sizeof(Sphere),

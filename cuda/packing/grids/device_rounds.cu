@@ -184,8 +184,8 @@ __global__ void certify(const __grid_constant__ GridScene scene, const GridCandi
   if (n >= count) return;
   const WarpTeam team;
   const GridCandidate c = candidates[winners[n]];
-  const double room = packing::certified_room(team, scene, c);
-  if (team.lane() == 0) certified[n] = {c, room};
+  const double radius = packing::certified_clearance(team, scene, c);
+  if (team.lane() == 0) certified[n] = {c, radius};
 }
 
 /// Up to this many prototypes, a block works on each.

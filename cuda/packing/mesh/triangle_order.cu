@@ -160,7 +160,7 @@ __global__ void __launch_bounds__(kThreads)
   constexpr std::uint32_t kLastPlace = (1u << (32 - kIndexBits)) - 1;
   static_assert(kThreads == 1u << kIndexBits);
   __shared__ float middle[3][kThreads];
-  __shared__ std::uint32_t triangle[kThreads], room[kThreads];
+  __shared__ std::uint32_t triangle[kThreads], scratch[kThreads];
   __shared__ Extent of_warp[kWarps];
   const WarpTeam warp;
   const unsigned me = threadIdx.x;
@@ -187,7 +187,7 @@ __global__ void __launch_bounds__(kThreads)
     // Absent lanes are sorted behind the last triangle.
     const std::uint32_t place =
         present ? part.place(point[axis], axis, kLastPlace - 1) : kLastPlace;
-    index = sort_in_block(place << kIndexBits | index, size, room) & (kThreads - 1);
+    index = sort_in_block(place << kIndexBits | index, size, scratch) & (kThreads - 1);
     __syncthreads();
   }
   if (begin + me < count) order[begin + me] = triangle[index];

@@ -21,7 +21,7 @@ namespace ist::HWY_NAMESPACE {
 
 /// How far from a plane a vertex must be to count as above or below: more than rounding, or so far
 /// that it stays there while points move within the tolerance, or B within the search's reach.
-enum class Margin { rounding, room, reach };
+enum class Margin { rounding, tolerance, reach };
 
 /// The triangles of a block whose corners are all among the given vertices, a bit each.
 HWY_INLINE std::uint32_t triangles_of(std::uint32_t vertices, const PlacedVertices& block) {
@@ -72,7 +72,7 @@ HWY_INLINE PlaneSides sides_of(const PlacedVertices& vertices, const PlacedPlane
   double beyond = 1.1 * exact::kFilter * planes.corner[t].number * apart;
   if (margin == Margin::reach)
     beyond += by * ((std::abs(n.x) + std::abs(n.y)) + std::abs(n.z));
-  else if (margin == Margin::room)  // six products of three numbers
+  else if (margin == Margin::tolerance)  // six products of three numbers
     beyond += 6 * by * longest * (2 * apart + longest);
   const SeenPlane plane(planes, t);
   const V top = hn::Set(d, (high - shift) + beyond), bottom = hn::Set(d, (low - shift) - beyond);
@@ -251,7 +251,7 @@ class Meeting {
     for (int k = 0; k < 3; ++k)
       apart_ = std::max(apart_, std::max(of_a.all_high[k], of_b.all_high[k]) -
                                     std::min(of_a.all_low[k], of_b.all_low[k]));
-    apart_ += search.room;
+    apart_ += search.tolerance;
     // Four roundings each of a height, and of the offset that it is compared with.
     beyond_ = exact::kFilter * (double{of_a.reach} + double{of_b.reach}) +
               (margin == Margin::rounding ? 0.0 : (1 + 1e-6) * double{reach});
@@ -268,12 +268,12 @@ class Meeting {
     const double off = 1.1 * exact::kFilter * planes.corner[planes.widest].number * apart_;
     flat_[side] = true;
     return ~kept_apart(side, sides(side, planes.widest, planes.low - off, planes.high + off,
-                                   margin_ == Margin::room ? Margin::reach : margin_));
+                                   margin_ == Margin::tolerance ? Margin::reach : margin_));
   }
 
   /// The triangles of B among `lanes` that no plane separates from A's triangle i.
   std::uint32_t straddling(std::uint32_t i, std::uint32_t lanes) {
-    const bool told = margin_ != Margin::room;  // flat blocks' planes have decided
+    const bool told = margin_ != Margin::tolerance;  // flat blocks' planes have decided
     if (!told || !flat_[0]) lanes &= ~beside(0, i);
     if (!told || !flat_[1])
       lanes = columns_.without(i, lanes, [&](std::uint32_t j) { return beside(1, j); });
@@ -333,7 +333,7 @@ class Meeting {
   PlaneSides sides(int side, std::uint32_t t, double low, double high, Margin margin) const {
     return sides_of(*vertices_[1 - side], planes_of(side), t, low, high, aside_[side],
                     double{apart_}, margin,
-                    double{margin == Margin::reach ? reach_ : search_.room});
+                    double{margin == Margin::reach ? reach_ : search_.tolerance});
   }
   /// The other block's vertices that are farther from the plane of triangle t than `distance`.
   PlaneSides sides_by(int side, std::uint32_t t, double distance) const {

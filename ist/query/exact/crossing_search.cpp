@@ -119,7 +119,7 @@ class TriangleSearch : PairSigns {
         pad_b_(pad(search.a_from_b, b_)) {
     look_ahead(search.reach);
     scratch_.pairs->count = 0;
-    scratch_.pairs->asks = 0;
+    scratch_.pairs->unmarked = 0;
   }
 
   CrossingsFound run(std::uint32_t first, std::uint32_t next, std::uint32_t count,
@@ -202,7 +202,7 @@ class TriangleSearch : PairSigns {
       if (made) return *made;
       const Margin margin = keep_ != nullptr               ? Margin::reach
                             : are_near(number_a, number_b) ? Margin::rounding
-                                                           : Margin::room;
+                                                           : Margin::tolerance;
       return made.emplace(search_, scratch_, number_a, number_b, margin, reach_);
     };
     const auto thin = [&](const float* low, const float* high, std::uint32_t lane) {
@@ -238,9 +238,9 @@ class TriangleSearch : PairSigns {
       if (lanes == 0) continue;
       for (const std::uint32_t k : set_bits(lanes))
         add_pair(kWidth * number_a + i, both.vertices(0), kWidth * number_b + k, both.vertices(1),
-                 both.margin() == Margin::room);
+                 both.margin() == Margin::tolerance);
       // Once both blocks are marked, planes decide far more.
-      if (!flush || both.margin() != Margin::room) continue;
+      if (!flush || both.margin() != Margin::tolerance) continue;
       const bool tries = !tried && marking_.pays();
       if (tries) test_pairs();
       tried |= tries;
@@ -259,9 +259,9 @@ class TriangleSearch : PairSigns {
 
   /// `unmarked`: its blocks are not both marked as near.
   void add_pair(std::uint32_t triangle_a, const PlacedVertices& vertices_a,
-                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool asks) {
+                std::uint32_t triangle_b, const PlacedVertices& vertices_b, bool unmarked) {
     TrianglePairs& pairs = *scratch_.pairs;
-    pairs.asks |= static_cast<std::uint32_t>(asks) << pairs.count;
+    pairs.unmarked |= static_cast<std::uint32_t>(unmarked) << pairs.count;
     put_triangle(a_, triangle_a, vertices_a, 0, pairs);
     put_triangle(b_, triangle_b, vertices_b, 1, pairs);
     if (++pairs.count == 8) keep_ == nullptr ? test_pairs() : keep_pairs();
@@ -271,34 +271,34 @@ class TriangleSearch : PairSigns {
   HWY_NOINLINE void test_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0);
-    const std::uint32_t asks = not_marked(pairs, std::exchange(pairs.asks, 0));
+    const std::uint32_t unmarked = not_marked(pairs, std::exchange(pairs.unmarked, 0));
     const std::uint32_t all = (1u << count) - 1;
     if (count == 0 || !found_.complete) return;  // two blocks go on to their end
     PairHeights heights;
-    WaysRound round;
-    asks != 0 ? find_heights<true>(pairs, count, heights)
-              : find_heights<false>(pairs, count, heights);
+    EdgeOrientations round;
+    unmarked != 0 ? find_heights<true>(pairs, count, heights)
+                  : find_heights<false>(pairs, count, heights);
     const std::uint32_t certain = each(heights.certain[0]) & each(heights.certain[1]);
     for (const std::uint32_t i : set_bits(all & ~heights.apart(heights.certain) & ~certain))
       find_heights_exactly(pairs, i, heights);
     const std::uint32_t meet = all & ~heights.apart(heights.certain);
     if (meet != 0) {
       const auto lanes = static_cast<std::uint32_t>(std::bit_width(meet));
-      asks != 0 ? find_ways_round<true>(pairs, lanes, round)
-                : find_ways_round<false>(pairs, lanes, round);
+      unmarked != 0 ? find_orientations<true>(pairs, lanes, round)
+                    : find_orientations<false>(pairs, lanes, round);
       test_edges(pairs, heights, meet, round);
     }
-    if (asks != 0) note_near(pairs, not_marked(pairs, asks & ~settled(heights, round)));
+    if (unmarked != 0) note_near(pairs, not_marked(pairs, unmarked & ~settled(heights, round)));
   }
 
   /// Tests by edges the pairs that planes left.
   HWY_INLINE void test_edges(const TrianglePairs& pairs, const PairHeights& heights,
-                             std::uint32_t all, WaysRound& round) {
+                             std::uint32_t all, EdgeOrientations& round) {
     std::uint32_t parts[2][3], pierced[2][3];
     heights.find_parts(parts);
     std::uint32_t left = round.undecided(all, parts, round.certain);
     if (left != 0) {
-      find_ways_closer(pairs, parts, left, round);
+      refine_orientations(pairs, parts, left, round);
       left = round.undecided(left, parts, round.certain);
     }
     for (const std::uint32_t i : set_bits(left)) find_round_exactly(pairs, parts, i, round);
@@ -352,7 +352,7 @@ class TriangleSearch : PairSigns {
   void keep_pairs() {
     TrianglePairs& pairs = *scratch_.pairs;
     const std::uint32_t count = std::exchange(pairs.count, 0);
-    pairs.asks = 0;
+    pairs.unmarked = 0;
     gathered_ += count;
     for (const std::uint32_t n :
          set_bits(((1u << count) - 1) & ~apart_by_axes(pairs, count, double{reach_}))) {

@@ -15,7 +15,7 @@ struct CrossingSearch {
   Similarity a_from_b;  ///< unit frames
   Similarity b_from_a;
   exact::Point aside = {0, 0, 0};  ///< A's unit frame: signs are those of B moved by this
-  float room = 0;                  ///< A's unit frame: points may be off by this
+  float tolerance = 0;             ///< A's unit frame: points may be off by this
   float near = 0;                  ///< pairs within this distance are found, ≥ tolerance
   float reach = 0;  ///< pairs within this distance are kept for later queries, ≥ near
   std::uint32_t max_visits = 0;  ///< pairs of nodes; 0: no limit

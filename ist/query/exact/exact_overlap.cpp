@@ -209,20 +209,20 @@ void ExactQuery::bound_near(const Side& own) noexcept {
 
 /// Finds the pairs of blocks, or takes the kept ones, for find_more().
 bool ExactQuery::begin_search(std::uint32_t max_visits, std::uint32_t pair_id) noexcept {
-  const double room = 2 * (sides_[0].moved + sides_[1].moved);
+  const double tolerance = 2 * (sides_[0].moved + sides_[1].moved);
   const MeshTree &a = sides_[0].mesh, &b = sides_[1].mesh;
-  search_.room = static_cast<float>(room * (1 + 1e-6));
-  search_.near = static_cast<float>((room + nearness()) * (1 + 1e-6));
+  search_.tolerance = static_cast<float>(tolerance * (1 + 1e-6));
+  search_.near = static_cast<float>((tolerance + nearness()) * (1 + 1e-6));
   search_.reach = search_.near;
   search_.max_visits = max_visits;
   scratch_.forget(a.hash);
   if (pair_id != 0 && max_visits == 0) {
     kept_ = &scratch_.kept.of(pair_id, a, b, a_from_b_);
-    if (scratch_.kept.serves(*kept_, b, room)) {
+    if (scratch_.kept.serves(*kept_, b, tolerance)) {
       serves_ = true;
       return true;
     }
-    scratch_.kept.begin(*kept_, a, b, room);
+    scratch_.kept.begin(*kept_, a, b, tolerance);
     search_.reach += static_cast<float>(kept_->margin * (1 + 1e-6));
   }
   const BlockPairs pairs = find_block_pairs(search_, scratch_);

@@ -80,7 +80,7 @@ struct alignas(64) TrianglePairs {
   double corner[2][3][3][8] = {};
   std::uint32_t triangle[2][8] = {};
   std::uint32_t count = 0;
-  std::uint32_t asks = 0;  ///< a bit a pair: its blocks may have to be marked as near
+  std::uint32_t unmarked = 0;  ///< a bit a pair: its blocks may have to be marked as near
 };
 
 /// A pending pair of nodes.
@@ -123,9 +123,9 @@ class Crossings {
  public:
   /// Eight are loaded and stored at once, so up to seven more are touched.
   Crossings(std::uint32_t most, const MemoryHooks& hooks)
-      : room_((most + 15) / 8 * 8),
-        numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * room_)),
-        triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{room_})) {}
+      : capacity_((most + 15) / 8 * 8),
+        numbers_(hooked_array<double>(hooks, std::size_t{kNumbers} * capacity_)),
+        triangle_(hooked_array<std::uint32_t>(hooks, 2 * std::size_t{capacity_})) {}
 
   /// The numbers of an end, where an edge of one solid pierces a triangle of the other. All
   /// segments that end there have the same bits.
@@ -182,12 +182,12 @@ class Crossings {
 
  private:
   static constexpr int kNumbers = 2 * kEndNumbers + 8;
-  double* at(int number) noexcept { return numbers_.get() + std::size_t{room_} * number; }
+  double* at(int number) noexcept { return numbers_.get() + std::size_t{capacity_} * number; }
   const double* at(int number) const noexcept {
-    return numbers_.get() + std::size_t{room_} * number;
+    return numbers_.get() + std::size_t{capacity_} * number;
   }
 
-  std::uint32_t room_;
+  std::uint32_t capacity_;
   HookedArray<double> numbers_;
   HookedArray<std::uint32_t> triangle_;
 };

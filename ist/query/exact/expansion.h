@@ -56,11 +56,11 @@ class CarefulSum {
   double high_ = 0, low_ = 0;
 };
 
-/// A sum of at most kRoom doubles that do not overlap, without zeros. An empty one is 0.
-template <int kRoom>
+/// A sum of at most kCapacity doubles that do not overlap, without zeros. An empty one is 0.
+template <int kCapacity>
 struct Expansion {
   int count = 0;
-  double part[kRoom];
+  double part[kCapacity];
 
   IST_HD inline int sign() const { return count == 0 ? 0 : part[count - 1] > 0 ? 1 : -1; }
   /// The nearest double, or nearly.

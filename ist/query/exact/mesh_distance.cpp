@@ -104,9 +104,9 @@ class MeshGapSearch {
     toward_ = level_ = toward;
     faces_.reset();
     const bool known = dot(toward, toward) > 0;
-    axes_ = known ? axes_along(toward) : WayAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    axes_ = known ? axes_along(toward) : GapAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
     if (!known) return;
-    const WayAxes to_a = seen_back(axes_, asked_.b_from_a, scale_);
+    const GapAxes to_a = seen_back(axes_, asked_.b_from_a, scale_);
     single_ ? single_a_.turn(axes_) : double_a_.turn(axes_);
     single_ ? single_b_.turn(to_a) : double_b_.turn(to_a);
   }
@@ -280,14 +280,15 @@ class MeshGapSearch {
   }
   /// The axes along which two blocks' triangles are compared. If one block is much larger, they
   /// follow the direction from its nearest triangle to the other block.
-  WayAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
+  GapAxes axes_between(std::uint32_t number_a, std::uint32_t number_b) {
     const GapPair blocks{0, 0, number_a, number_b, 0, 0};
     for (const bool of_a : {false, true}) {
       const BlockFaces* const larger = triangles_beside(blocks, of_a);
       if (larger == nullptr) continue;
-      const exact::Point way = larger->way_to(box(of_a, 0, of_a ? number_a : number_b).middle);
-      if (const double length = std::sqrt(dot(way, way)); length > 0)
-        return axes_along((1 / length) * way);
+      const exact::Point between =
+          larger->vector_to(box(of_a, 0, of_a ? number_a : number_b).middle);
+      if (const double length = std::sqrt(dot(between, between)); length > 0)
+        return axes_along((1 / length) * between);
     }
     return axes_;
   }
@@ -314,7 +315,7 @@ class MeshGapSearch {
       for (const std::uint32_t k : set_bits(lanes))
         add(kWidth * number_a + i, of_a, kWidth * number_b + k, of_b);
     };
-    const WayAxes axes = axes_between(number_a, number_b);
+    const GapAxes axes = axes_between(number_a, number_b);
     if (!single_) {
       const BlockExtents a(of_a, a_.blocks[number_a], axes), b(of_b, b_.blocks[number_b], axes);
       for (const std::uint32_t i : set_bits(a.near(b, squared_limit_) & all_a))
@@ -457,7 +458,7 @@ class MeshGapSearch {
   NearestTriangles best_;
   /// The last direction of the best pair, and its normal if the faces are parallel.
   exact::Point toward_, level_ = {0, 0, 0};
-  WayAxes axes_;
+  GapAxes axes_;
   std::optional<BlockFaces> faces_;  ///< of a block, along the axes
   std::uint32_t faces_of_ = 0;
   bool faces_of_b_ = false;

@@ -42,10 +42,10 @@ inline constexpr double kGapsAlike = 1e-13;
 /// If faces are parallel, the direction between them is their normal, which a short difference
 /// gives with few digits. True if the direction is the normal of triangle t; then `level` is that
 /// normal, from A to B.
-IST_HD inline bool level_with(const exact::Point (&t)[3], const exact::Point& way,
+IST_HD inline bool level_with(const exact::Point (&t)[3], const exact::Point& direction,
                               exact::Point& level) {
   const exact::Point n = cross(t[1] - t[0], t[2] - t[0]);
-  const double length = std::sqrt(dot(n, n)), along = dot(n, way);
+  const double length = std::sqrt(dot(n, n)), along = dot(n, direction);
   constexpr double kLevel = 1 - 1e-10;
   if (!(length > 0 && std::abs(along) > kLevel * length)) return false;
   level = ((along > 0 ? 1 : -1) / length) * n;
@@ -76,11 +76,11 @@ struct NearestTriangles {
     return found <= alike && !(squared <= alike && pair < name);
   }
   IST_HD void set(double found, std::uint64_t name, const exact::Point& at,
-                  const exact::Point& way) {
+                  const exact::Point& vector) {
     squared = found;
     pair = name;
     on_a = at;
-    between = way;
+    between = vector;
   }
 };
 

@@ -50,9 +50,9 @@ void corners_of(const MeshTree& mesh, const MeshBlock& block, std::uint32_t t,
 }
 
 /// A segment from p to q, and the triangles that it may cross.
-class Way {
+class Segment {
  public:
-  Way(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
+  Segment(const Point& p, const Point& q) noexcept : p_(p), q_(q) {
     const double along[3] = {q.x - p.x, q.y - p.y, q.z - p.z};
     for (int k = 0; k < 3; ++k) {
       from_[k] = (&p.x)[k];
@@ -132,17 +132,17 @@ bool is_inside(const MeshOfPair& solid, const Point& p, const Point& aside) noex
 }
 
 MeshHit first_hit(const MeshTree& mesh, const Point& p, const Point& q) noexcept {
-  const Way way(p, q);
+  const Segment segment(p, q);
   MeshHit best;
   for (NodeStack stack(mesh); !stack.empty();) {
     const WaitingNode node = stack.pop();
     if (node.key > best.t + 4e-15) continue;
     if (node.level == 0) {
-      way.hit(mesh, node.number, best);
+      segment.hit(mesh, node.number, best);
       continue;
     }
     double key[kWidth];
-    way.enter(mesh.level[node.level].boxes[node.number], key);
+    segment.enter(mesh.level[node.level].boxes[node.number], key);
     stack.push(mesh, node, key, std::min(2.0, best.t + 4e-15));
   }
   return best;

@@ -92,7 +92,7 @@ IST_HD_COLD bool find_piece(std::uint32_t number, Corner (&at)[3]) noexcept {
 /// An octant with a smaller share of the part's sums is left to the others.
 inline constexpr double kRounding = 1e-9;
 
-/// From 1 at `low` to 0 at twice that, or the other way round.
+/// From 1 at `low` to 0 at twice that, or the reverse.
 IST_HD inline double falls(double x, double low) { return 1 - smooth_step(x / low - 1); }
 IST_HD inline double rises(double x, double low) { return smooth_step(x / low - 1); }
 

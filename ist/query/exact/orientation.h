@@ -149,8 +149,8 @@ IST_HD inline Determinant height_over_b(const Point (&b)[3], const Point& a, con
 
 /// The orientation of A's edge p → q about B's edge r → s.
 template <bool kExactly = true>
-IST_HD inline Determinant way_round(const Point& p, const Point& q, const Point& r, const Point& s,
-                                    const Point& aside) {
+IST_HD inline Determinant edge_orientation(const Point& p, const Point& q, const Point& r,
+                                           const Point& s, const Point& aside) {
   return determinant_of<kExactly>(r, p, q, p, s, r, 1, aside);
 }
 
@@ -167,7 +167,7 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
   for (int k = 0; k < 3; ++k) height[0][k] = height_over_b(b, a[k], still).sign;
   if (alike(height[0])) return false;
   const auto round = [&](int i, int j) {
-    return way_round(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], still).sign;
+    return edge_orientation(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3], still).sign;
   };
   for (int k = 0; k < 3; ++k) {
     if (height[0][k] != height[0][(k + 1) % 3] && round(k, 0) == round(k, 1) &&
@@ -185,7 +185,7 @@ IST_HD inline bool cross_exactly(const Point (&a)[3], const Point (&b)[3]) {
 template <bool kExactly = true>
 IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bool of_b,
                          const Point& aside, bool& unsure) {
-  int sign[2], way[3];
+  int sign[2], sense[3];
   bool all = true;
   for (int k = 0; k < 2; ++k) {
     sign[k] = (of_b ? height_over_a<kExactly>(t, k == 0 ? p : q, aside)
@@ -195,16 +195,16 @@ IST_HD inline int enters(const Point& p, const Point& q, const Point (&t)[3], bo
   }
   if (all && sign[0] == sign[1]) return 0;
   for (int k = 0; k < 3; ++k) {
-    way[k] = (of_b ? way_round<kExactly>(t[k], t[(k + 1) % 3], p, q, aside)
-                   : way_round<kExactly>(p, q, t[k], t[(k + 1) % 3], aside))
-                 .sign;
-    all = all && way[k] != 0;
+    sense[k] = (of_b ? edge_orientation<kExactly>(t[k], t[(k + 1) % 3], p, q, aside)
+                     : edge_orientation<kExactly>(p, q, t[k], t[(k + 1) % 3], aside))
+                   .sign;
+    all = all && sense[k] != 0;
   }
   // Two different signs prove that the line misses the triangle, whatever the third sign is.
-  const int least =
-      way[0] < way[1] ? (way[0] < way[2] ? way[0] : way[2]) : (way[1] < way[2] ? way[1] : way[2]);
-  const int most =
-      way[0] > way[1] ? (way[0] > way[2] ? way[0] : way[2]) : (way[1] > way[2] ? way[1] : way[2]);
+  const int least = sense[0] < sense[1] ? (sense[0] < sense[2] ? sense[0] : sense[2])
+                                        : (sense[1] < sense[2] ? sense[1] : sense[2]);
+  const int most = sense[0] > sense[1] ? (sense[0] > sense[2] ? sense[0] : sense[2])
+                                       : (sense[1] > sense[2] ? sense[1] : sense[2]);
   if (least < 0 && most > 0) return 0;
   unsure = unsure || !all;
   return all ? direction(sign[0]) : 0;

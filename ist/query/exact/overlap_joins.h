@@ -59,8 +59,9 @@ IST_HD inline std::uint32_t power_from(std::uint32_t n) {
 /// - load(at), store(at, to), add(at, by), exchange(at, to), replace(at, from, to), least(at, x),
 ///   most(at, x): atomic accesses. add(), exchange() and replace() return the value before
 /// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
-/// - crossings(), triangle(side, i), end_of(i, e), way_of(i, e), place_of(i, e): crossings in the
-///   order of the meshes; an end's share of the way along its edge, and its place from the origin
+/// - crossings(), triangle(side, i), end_of(i, e), share_of_edge(i, e), place_of(i, e): crossings
+/// in the
+///   order of the meshes; an end's position on its edge, 0 to 1, and its place from the origin
 /// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks,
 ///   those of a side among these numbers
 /// - block_of(r), inside_of(r), pierced_of(r), opposite_edge(r, triangle), at(r, vertex)
@@ -355,7 +356,7 @@ class OverlapJoins : public Overlap {
     }
     for (std::uint32_t i = first; i != kNoIndex;) {
       const std::uint64_t next = memory().other_keys[i];
-      ends[count++] = {next, this->way_of(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};
+      ends[count++] = {next, this->share_of_edge(i / 2, static_cast<int>(i % 2)), i / 2, 0, false};
       i = static_cast<std::uint32_t>(next);
     }
     by_names_ = by_names_ && count <= 2;

@@ -37,12 +37,12 @@ class OverlapOctants : public OverlapParts<Overlap> {
   /// PartMemory::octants, whose names are 8 times the part's plus the octant's number. `near`:
   /// octants that are no farther apart are one.
   IST_HD std::uint32_t split(std::uint32_t parts, bool by_b, double near,
-                             std::uint32_t room) noexcept {
+                             std::uint32_t wanted) noexcept {
     const Similarity& map = this->map();
     for (int k = 0; k < 3; ++k)
       axis_[k] = by_b ? (1 / map.scale) * Point{map.m[k], map.m[3 + k], map.m[6 + k]}
                       : Point{k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, k == 2 ? 1.0 : 0.0};
-    const double least = this->whole().volume() / static_cast<double>(room);
+    const double least = this->whole().volume() / static_cast<double>(wanted);
     meet();
     if (leads()) pieces().says = begin_octants(parts, least);
     meet();

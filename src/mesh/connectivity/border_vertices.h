@@ -99,15 +99,15 @@ class BorderVertices {
     const std::size_t middle = first + (last - first) / 2;
     const double plane = points_[middle].x[axis], slope = along[axis];
     const double from = a[axis] + slope * begin - plane, to = a[axis] + slope * end - plane;
-    const double room = 2 * tolerance;
-    const bool below = std::min(from, to) <= room, above = std::max(from, to) >= -room;
+    const double margin = 2 * tolerance;
+    const bool below = std::min(from, to) <= margin, above = std::max(from, to) >= -margin;
     Range parts[] = {{first, middle, (axis + 1) % 3, begin, end},
                      {middle + 1, last, (axis + 1) % 3, begin, end}};
     if (below && above) {
       visit(points_[middle]);
       // The line leaves one side and enters the other.
       for (const int side : {0, 1}) {
-        const double off = (side == 0 ? room : -room) - from;
+        const double off = (side == 0 ? margin : -margin) - from;
         if (!(std::abs(off) < std::abs(to - from))) continue;
         const double place = begin + off / (to - from) * (end - begin);
         if ((to > from) == (side == 0))

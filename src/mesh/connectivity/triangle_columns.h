@@ -51,10 +51,10 @@ class TriangleColumns {
         }
         const TriangleStrip strip(x, y);
         for (std::size_t r = from[1]; r <= to[1]; ++r) {
-          constexpr double kRoom = 1e-6;  // exceeds all rounding
+          constexpr double kMargin = 1e-6;  // exceeds all rounding
           const double one = strip.at(static_cast<double>(r)), next = one + strip.slope;
-          row(r, std::max(from[0], place(std::min(one, next) + strip.left - kRoom)),
-              std::min(to[0], place(std::max(one, next) + strip.right + kRoom)));
+          row(r, std::max(from[0], place(std::min(one, next) + strip.left - kMargin)),
+              std::min(to[0], place(std::max(one, next) + strip.right + kMargin)));
         }
       }
     });

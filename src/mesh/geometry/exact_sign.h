@@ -72,7 +72,7 @@ IST_HD inline double power_above(double x) {
 template <int kCount, class Terms>
 IST_HD int sign_of_sum(const Terms& terms) {
   static_assert(4 * kCount + 2 <= 128);
-  constexpr double kRoom = 128;  // ≥ number of terms + 2
+  constexpr double kHeadroom = 128;  // ≥ number of terms + 2
   double largest = 0;
   for (int i = 0; i < kCount; ++i) {
     const ProductTerms product = terms.product(i);
@@ -83,7 +83,7 @@ IST_HD int sign_of_sum(const Terms& terms) {
   // Every term is cut at multiples of σ 2^-53, its remainder at multiples of σ 2^-99, and so on.
   // The pieces of one level sum without error. `sum` stays exact while it is small; once it is not,
   // the remainders cannot change its sign.
-  const double first_sigma = power_above(largest) * kRoom;
+  const double first_sigma = power_above(largest) * kHeadroom;
   double sum = 0, sigma = first_sigma;
   for (int level = 0;; ++level) {
     double pieces = 0, most_left = 0;
@@ -94,16 +94,16 @@ IST_HD int sign_of_sum(const Terms& terms) {
         for (int k = 0; k <= level; ++k) {
           piece = (cut + left) - cut;
           left -= piece;
-          cut *= kRoom * kEpsilon;
+          cut *= kHeadroom * kEpsilon;
         }
         pieces += piece;
         most_left = magnitude_of(left) > most_left ? magnitude_of(left) : most_left;
       }
     }
     sum += pieces;
-    if (most_left == 0 || magnitude_of(sum) >= kRoom * kRoom * kEpsilon * sigma)
+    if (most_left == 0 || magnitude_of(sum) >= kHeadroom * kHeadroom * kEpsilon * sigma)
       return sign_of(sum);
-    sigma *= kRoom * kEpsilon;
+    sigma *= kHeadroom * kEpsilon;
   }
 }
 

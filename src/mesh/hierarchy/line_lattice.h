@@ -36,12 +36,12 @@ struct LatticeRange {
   std::uint32_t first, last;  ///< [first, last)
 
   IST_HD LatticeRange(double low, double high, std::uint32_t count) {
-    constexpr double kRoom = 1e-6;
+    constexpr double kMargin = 1e-6;
     const auto clamped = [count](double x) {
       return static_cast<std::uint32_t>(x > 0 ? (x < count ? x : count) : 0);
     };
-    first = clamped(std::ceil(low - kRoom));
-    last = clamped(std::floor(high + kRoom) + 1);
+    first = clamped(std::ceil(low - kMargin));
+    last = clamped(std::floor(high + kMargin) + 1);
   }
 };
 
@@ -54,7 +54,7 @@ IST_HD inline LatticeRange rows_of(const LineLattice& lattice, const Corners& t)
 
 /// Lines of row j that may pierce a triangle.
 IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t, std::uint32_t j) {
-  constexpr double kRoom = 1e-12;  // exceeds the rounding of the following steps
+  constexpr double kMargin = 1e-12;  // exceeds the rounding of the following steps
   const double z = lattice.z(j);
   double low = 1e300, high = -1e300;
   for (int k = 0; k < 3; ++k) {
@@ -62,8 +62,8 @@ IST_HD inline LatticeRange lines_of(const LineLattice& lattice, const Corners& t
     const double* q = t.p[(k + 1) % 3];
     if ((p[2] > z) == (q[2] > z)) continue;
     const double y = p[1] + (z - p[2]) / (q[2] - p[2]) * (q[1] - p[1]);
-    low = y - kRoom < low ? y - kRoom : low;
-    high = y + kRoom > high ? y + kRoom : high;
+    low = y - kMargin < low ? y - kMargin : low;
+    high = y + kMargin > high ? y + kMargin : high;
   }
   if (low > high) return {0, -3, lattice.ny};
   const double first = lattice.y(0, j);
@@ -83,10 +83,10 @@ inline TriangleStrip strip_of(const LineLattice& lattice, const Corners& t) {
 /// True if a line of row j may lie within; cheaper than lines_of() for needles, where most rows
 /// have none.
 inline bool may_meet(const TriangleStrip& strip, const LineLattice& lattice, std::uint32_t j) {
-  constexpr double kRoom = 2e-6;  // exceeds that of LatticeRange
+  constexpr double kMargin = 2e-6;  // exceeds that of LatticeRange
   const double at = strip.at(j) - lattice.turned(j);
-  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kRoom)) >=
-         at + strip.left - kRoom;
+  return static_cast<double>(static_cast<std::int64_t>(at + strip.right + kMargin)) >=
+         at + strip.left - kMargin;
 }
 
 /// Orders crossings along a line: by x; at equal x, +1 first.

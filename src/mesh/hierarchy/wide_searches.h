@@ -143,12 +143,12 @@ struct WideWithinQuery : WideBall {
   int count = 0;
 
   IST_HD WideWithinQuery(const Team& members, const WideTree& of, const float point[3],
-                         float within2, std::uint32_t* out, int room)
+                         float within2, std::uint32_t* out, int most)
       : WideBall(of, point, distance_error_at(point), within2),
         team(members),
         radius2(within2),
         slots(out),
-        capacity(room) {}
+        capacity(most) {}
 
   IST_HD void visit(std::uint32_t index) {
     const WideBlock& block = tree.block(index);
@@ -312,13 +312,13 @@ struct WideLineQuery : WideRay {
   int count = 0;
 
   IST_HD WideLineQuery(const Team& members, const WideTree& of, double y, double z, double* out_x,
-                       int* out_sign, int room)
+                       int* out_sign, int most)
       : WideRay{of, RayBox::line(y, z)},
         team(members),
         yz{y, z},
         x(out_x),
         sign(out_sign),
-        capacity(room) {}
+        capacity(most) {}
 
   IST_HD void visit(std::uint32_t index) {
     const WideBlock& block = tree.block(index);

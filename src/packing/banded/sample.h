@@ -153,12 +153,12 @@ IST_HD_ONCE Sample keep_near(const Team& team, float window, Sample s) {
 /// Adds one constraint to a full sample of `capacity` constraints, and drops the farthest by
 /// (distance, tag). All lanes know `c`.
 template <class Team>
-IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sample& s) {
+IST_HD void add_nearer(const Team& team, const Constraint& c, int capacity, const Sample& s) {
   const SampleMemory& memory = *team.memory(s.at);
   float least = kFarAway;  // of the negated distances
   std::uint32_t tag = 0xFFFFFFFFu;
   int index = 0;
-  IST_ROLLED for (int i = team.lane(); i < room; i += Team::kWidth) {
+  IST_ROLLED for (int i = team.lane(); i < capacity; i += Team::kWidth) {
     const float value = -memory.distance[i];
     const std::uint32_t reversed = ~memory.tag[i];
     if (value < least || (value == least && reversed < tag)) {
@@ -176,7 +176,7 @@ IST_HD void add_nearer(const Team& team, const Constraint& c, int room, const Sa
 
 /// Adds the constraints of the lanes that have one, and keeps the nearest if not all fit.
 template <class Team>
-IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& mine, int room,
+IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& mine, int capacity,
                                Sample s) {
   IST_ROLLED for (int lane = 0; lane < Team::kWidth; ++lane) {
     if (team.broadcast(has ? 1 : 0, lane) == 0) continue;
@@ -186,8 +186,8 @@ IST_HD_COLD Sample add_nearest(const Team& team, bool has, const Constraint& min
     c.distance = team.broadcast(mine.distance, lane);
     c.curvature = team.broadcast(mine.curvature, lane);
     c.tag = team.broadcast(mine.tag, lane);
-    if (s.size == room) {
-      add_nearer(team, c, room, s);
+    if (s.size == capacity) {
+      add_nearer(team, c, capacity, s);
     } else {
       if (team.lane() == 0) put(team, s.at, s.size, c);
       ++s.size;
@@ -205,7 +205,7 @@ IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& sph
   constexpr int kBatch = Team::kBatch;
   FeatureOffset offset[kBatch];
   float range[kBatch], distance[kBatch];
-  const int room = kSampleCapacity - spare;
+  const int capacity = kSampleCapacity - spare;
   int count = 0, batches = 0;
   Sample out{at, 0, spheres.reach()};
   team.sync();  // all lanes are done with the previous content
@@ -224,15 +224,15 @@ IST_HD_ONCE Sample sample_spheres(const Team& team, Float3 x, const Spheres& sph
       int total = 0;
       const int place = team.exclusive_count(near, total);
       if (total == 0) continue;
-      if (out.size + total > room) {
+      if (out.size + total > capacity) {
         team.sync();
         out = keep_near(team, window, out);
       }
-      if (out.size + total <= room) {
+      if (out.size + total <= capacity) {
         if (near) put(team, out.at, out.size + place, constraint_of(offset[i], range[i]));
         out.size += total;
       } else {
-        out = add_nearest(team, near, constraint_of(offset[i], range[i]), room, out);
+        out = add_nearest(team, near, constraint_of(offset[i], range[i]), capacity, out);
       }
     }
     count = 0;

@@ -50,8 +50,8 @@ IST_HD float certified_radius(const Team& team, Float3 centre, float radius, dou
                               const Spheres& spheres) {
   double r = double{radius} < gap ? double{radius} : gap;
   spheres.for_near(team, centre, [&](bool valid, std::uint32_t, const Sphere& s) {
-    const double room = gap_to_sphere(centre, s);
-    if (valid && room < r) r = room;
+    const double to_sphere = gap_to_sphere(centre, s);
+    if (valid && to_sphere < r) r = to_sphere;
   });
   return rounded_down(team.min(r));
 }

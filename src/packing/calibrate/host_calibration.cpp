@@ -28,19 +28,19 @@ class SiteLists {
   }
   double* powers() { return powers_.data(); }
 
-  void make_room(std::size_t count) {
-    const std::size_t room = size_ + count + kMostPowerLanes;
-    if (room <= numbers_.size()) return;
-    for (std::vector<double>& column : coordinates_) column.resize(2 * room);
-    weights_.resize(2 * room);
-    numbers_.resize(2 * room);
-    powers_.resize(2 * room);
+  void reserve(std::size_t count) {
+    const std::size_t needed = size_ + count + kMostPowerLanes;
+    if (needed <= numbers_.size()) return;
+    for (std::vector<double>& column : coordinates_) column.resize(2 * needed);
+    weights_.resize(2 * needed);
+    numbers_.resize(2 * needed);
+    powers_.resize(2 * needed);
   }
 
   void resize(std::size_t size) { size_ = size; }  ///< at most the capacity
 
   void append(const SiteArrays& sites, std::size_t count) {
-    make_room(count);
+    reserve(count);
     const SiteArrays to = list(size_);
     std::copy_n(sites.x, count, to.x);
     std::copy_n(sites.y, count, to.y);
@@ -64,7 +64,7 @@ class CellIntegrator {
 
   std::vector<PowerSums> run() {
     SiteLists lists;
-    lists.make_room(sites_.size());
+    lists.reserve(sites_.size());
     const SiteArrays all = lists.list(0);
     for (std::size_t k = 0; k < sites_.size(); ++k) {
       all.x[k] = sites_[k].x;
@@ -85,7 +85,7 @@ class CellIntegrator {
   /// `lists` ends with the parent's list, which starts at `first`; it is restored on return.
   void look_into(const PowerGridCell& cell, SiteLists& lists, std::size_t first) {
     const std::size_t end = lists.size();
-    lists.make_room(end - first);
+    lists.reserve(end - first);
     const std::size_t kept = keep_sites(PowerBox(grid_, cell), lists.list(first), end - first,
                                         lists.list(end), lists.powers());
     lists.resize(end + kept);

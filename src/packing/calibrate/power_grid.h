@@ -173,12 +173,12 @@ IST_HD inline bool is_empty(const PowerGrid& grid, const PowerGridCell& cell) {
 template <class Visit>
 IST_HD void for_flags(const PowerGrid& grid, const ColumnSpan& span, std::uint32_t i,
                       std::uint32_t j, Visit&& visit) {
-  constexpr double kRoom = 1e-6;  // steps; exceeds the rounding of planes
+  constexpr double kMargin = 1e-6;  // steps; exceeds the rounding of planes
   const auto step = [&](double x) {
     return static_cast<std::uint32_t>(x > 0 ? (x < grid.nx ? x : grid.nx) : 0);
   };
-  const std::uint32_t first = step((span.x0 - grid.x0) / grid.step_x - kRoom);
-  const std::uint32_t last = step((span.x1 - grid.x0) / grid.step_x + kRoom) + 1;
+  const std::uint32_t first = step((span.x0 - grid.x0) / grid.step_x - kMargin);
+  const std::uint32_t last = step((span.x1 - grid.x0) / grid.step_x + kMargin) + 1;
   for (std::uint32_t s = first >> kFlagLevel; s << kFlagLevel < last; ++s)
     if (s < PowerGrid::cells(grid.nx, kFlagLevel))
       visit(flag_of(grid, {s, i >> kFlagLevel, j >> kFlagLevel, kFlagLevel}));

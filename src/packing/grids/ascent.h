@@ -104,7 +104,7 @@ IST_HD GridCandidate converged_prototype(const Team& team, const GridScene& scen
 /// A candidate that no larger one overlaps, and the radius that it may keep, in double.
 struct GridWinner {
   GridCandidate candidate;
-  double room = 0;
+  double radius = 0;
 };
 
 /// Called between pieces of a round's work; false cancels it.
@@ -124,11 +124,11 @@ using GoOn = std::function<bool()>;
 /// The radius that surface and spheres leave to a candidate, in double (docs/design.md 3.2); 0 if
 /// its centre is not in the solid. overlap() checks the other winners of its round.
 template <class Team>
-IST_HD double certified_room(const Team& team, const GridScene& scene,
-                             const GridCandidate& candidate) {
+IST_HD double certified_clearance(const Team& team, const GridScene& scene,
+                                  const GridCandidate& candidate) {
   if (!inside_solid(team, scene, candidate.centre)) return 0;
   const double p[3] = {candidate.centre.x, candidate.centre.y, candidate.centre.z};
-  double room = candidate.radius;
+  double radius = candidate.radius;
   for_primitives_near(
       team, scene.grid, candidate.centre, [&] { return candidate.radius; },
       [&](std::uint32_t tag) {
@@ -141,10 +141,10 @@ IST_HD double certified_room(const Team& team, const GridScene& scene,
         } else {
           gap = gap_to_sphere(candidate.centre, scene.spheres[tag]);
         }
-        room = gap < room ? gap : room;
+        radius = gap < radius ? gap : radius;
       },
       [] {});
-  return team.min(room);
+  return team.min(radius);
 }
 
 }  // namespace ist::packing

@@ -160,7 +160,7 @@ class HostRounds {
     const GridScene scene = grid_.scene(spheres_);
     std::vector<GridWinner> certified(winners.size());
     for_each_index(0, winners.size(), 8, [&](std::size_t i) {
-      certified[i] = {winners[i], certified_room(SerialTeam{}, scene, winners[i])};
+      certified[i] = {winners[i], certified_clearance(SerialTeam{}, scene, winners[i])};
     });
     return certified;
   }

@@ -104,7 +104,7 @@ class GridPacker {
     });
     std::vector<Sphere> inserted;
     for (const GridWinner& w : winners) {
-      const float r = rounded_down(w.room);
+      const float r = rounded_down(w.radius);
       if (!(r >= smallest)) continue;
       if (r < kFloatNoise) result_.below_float_noise = true;
       inserted.push_back({w.candidate.centre.x, w.candidate.centre.y, w.candidate.centre.z, r});
