@@ -7,7 +7,7 @@
 #include "gpu_solids.h"
 #include "solids.h"
 
-// Solids that rows of pairs choose from, where their answers are wanted.
+// Solids indexed by rows of pairs, in the memory where their answers are needed.
 
 namespace ist::python {
 
@@ -18,8 +18,8 @@ struct Solids {
   std::string device() const;
 
   std::size_t count;
-  std::vector<std::size_t> shapes;  ///< which of them are Shapes
-  // On the CPU, with whoever owns what they view:
+  std::vector<std::size_t> shapes;  ///< the indices of Shapes
+  // On the CPU, with the owners of their memory:
   std::vector<Solid> views;
   std::vector<py::object> owners;
   std::unique_ptr<DeviceSolids> on_device;  ///< null: on the CPU
@@ -28,7 +28,7 @@ struct Solids {
 /// ist.Solids[index].
 struct SolidRows {
   py::object solids;  ///< Solids
-  py::object index;   ///< a number for all rows, or an array of each row's
+  py::object index;   ///< a number for all rows, or an array with one for each
 
   Solids& among() const { return py::cast<Solids&>(solids); }
 };
@@ -39,7 +39,7 @@ struct DeviceSides {
   py::object a, b;  ///< indices
 };
 
-/// Refuses one solid on a device beside one that is elsewhere.
+/// Refuses one solid on a device and the other elsewhere.
 DeviceSides device_sides(const py::object& a, const py::object& b);
 
 /// The classes of both.

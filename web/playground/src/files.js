@@ -1,4 +1,4 @@
-// A visitor's files, dropped or chosen: what they hold, or a sentence on why nothing.
+// A visitor's files, dropped or chosen: their contents, or a sentence that explains the failure.
 
 import {Asset} from 'ist-query';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
@@ -57,7 +57,7 @@ function isMesh(name) {
       `${baked}. The solids shown have not changed.`);
 }
 
-/** Calls `take(files)` for what is dropped on the page; `hint` shows while it is held over it. */
+/** Calls `take(files)` for files dropped on the page; `hint` is visible while they are held over it. */
 export function acceptDrops(hint, take) {
   let depth = 0;
   const holdsFiles = (event) => event.dataTransfer?.types.includes('Files');

@@ -1,4 +1,4 @@
-// The overlap of two solids as it is: the surface of each inside the other, and the outline on which
+// The exact overlap of two solids: the surface of each inside the other, and the outline on which
 // the surfaces cross.
 
 import * as THREE from 'three';
@@ -32,7 +32,7 @@ export class Overlap {
     }
   }
 
-  /** Takes two solids; nothing is drawn where one holds no mesh. */
+  /** Sets the two solids; nothing is drawn if one has no mesh. */
   hold(a, b) {
     const drawn = a.info.meshTriangles > 0 && b.info.meshTriangles > 0;
     [[a, b], [b, a]].forEach(([own, other], k) => {
@@ -91,7 +91,7 @@ export function paint(colour = 0xffffff, material = new THREE.MeshStandardMateri
   return material;
 }
 
-/** Leaves of a surface what lies in the columns' solid. */
+/** Draws only the part of a surface inside the columns' solid. */
 function drawInside(shader, uniforms) {
   Object.assign(shader.uniforms, uniforms);
   shader.vertexShader = 'uniform mat4 toColumns;\nuniform float below;\nvarying vec3 vInColumns;\n' +

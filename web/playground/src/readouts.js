@@ -2,7 +2,7 @@
 
 import {digits, range, vector, whole} from './format.js';
 
-// By name: what is told of the meshes and of the spheres; `wide` of both at once.
+// By name: the rows for meshes and spheres; `wide` ones for both.
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
   ['error', 'Error', '%'],
@@ -16,7 +16,7 @@ const kRows = [
 const kOften = 100;  // [ms] numbers are written at most so often
 const kCalm = 900;   // [ms] words are said once nothing moved for so long
 
-/** What is told of a contact: written often, and said once nothing moves. */
+/** The readouts of a contact: written often, and announced once nothing moves. */
 export class Told {
   constructor(live) {
     this.live = live;
@@ -48,7 +48,7 @@ export class Told {
   }
 
   say(text) {
-    // The same words again are said again.
+    // Repeated words are announced again.
     this.live.textContent = this.live.textContent === text ? `${text} ` : text;
   }
 }
