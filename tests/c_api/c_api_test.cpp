@@ -66,7 +66,7 @@ void expect_same(const double (&c)[3], const Eigen::Vector3d& cpp) {
   for (int k = 0; k < 3; ++k) EXPECT_SAME(c[k], cpp[k]);
 }
 
-/// Of two answers.
+/// Compares two answers.
 template <class C, class Cpp>
 requires std::is_class_v<C>
 void expect_same(const C& c, const Cpp& cpp) {

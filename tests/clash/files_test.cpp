@@ -184,7 +184,7 @@ TEST_F(ClashFiles, PartsThatAreNoSolidsAreReportedAndTheRestIsAnswered) {
   ASSERT_EQ(report.at("faults").size(), 1u);
   EXPECT_EQ(report["faults"][0]["part"], "open");
   EXPECT_EQ(pairs(report), Words{"twice cube overlapping"});
-  // What both copies fill counts once.
+  // Volume inside both copies counts once.
   EXPECT_NEAR(report["pairs"][0]["volume"].get<double>(), 0.1 * std::pow(edge_, 3), 1e-9);
   EXPECT_NE(report["notes"].dump().find("twice: "), std::string::npos);
   // Nobody may take silence for clean …
@@ -232,7 +232,7 @@ TEST_F(ClashFiles, BaselineTellsWhatIsNew) {
     }
   }
   EXPECT_EQ(report["resolved"], Json::parse(R"([{"a": "c", "b": "d"}])"));
-  // Of a part that cannot be answered nothing is known: its clashes are not resolved.
+  // A part without an answer is unknown: its clashes are not resolved.
   std::string text = read("cube.obj");
   write("open.obj", text.erase(text.find("\nf ") + 1));
   text = part("b", 0.75);

@@ -3,7 +3,7 @@
 #include "cli/program.h"
 #include "support/shared_data.h"
 
-// What a mesh file declares about its axes and unit: said by the bake, and turned by nobody.
+// A mesh file's declared axes and unit are reported by the bake, and not applied.
 
 namespace {
 

@@ -10,7 +10,7 @@
 
 #include "cli/program.h"
 
-// What befalls a bake from outside: killed, interrupted, a full disk, files it may not touch,
+// External faults of a bake: killed, interrupted, a full disk, files it may not touch,
 // another bake to the same place. Always the old asset is intact or the new one whole, and nothing
 // else is there.
 
@@ -175,7 +175,7 @@ TEST_F(Faults, AnUnreadableAsset) {
 }
 
 TEST_F(Faults, BakesToOneOutputAtOnce) {
-  // Of different lengths, so that a mixture would be neither.
+  // The lengths differ, so a mixture would be neither.
   ASSERT_EQ(ist(bake_to("other.ist", "200")).exit_code, 0);
   const std::string other = read("other.ist");
   std::filesystem::remove(folder_ / "other.ist");

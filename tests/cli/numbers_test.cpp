@@ -24,7 +24,7 @@ struct Option {
   Arguments refused;
 };
 
-/// Of every option that takes a number.
+/// A case for every option that takes a number.
 const std::vector<Option> kWhole = {
     {kBake, "--spheres", "from 0 to 2147483647", {"2147483648"}},
     {kBake, "--grid-resolution", "from 0 to 1024", {"1025"}},

@@ -213,7 +213,7 @@ TEST_F(QueryCommand, OnePoseIsAnsweredForAPerson) {
   EXPECT_EQ(outcome.exit_code, 0);
   for (const char* word : {"volume", "sum range", "force/k", "torque/k", "distance", "µs"})
     EXPECT_NE(outcome.out.find(word), std::string::npos) << word;
-  // By spheres nothing is told that could be taken for accuracy.
+  // Spheres report nothing that could be mistaken for accuracy.
   EXPECT_EQ(outcome.out.find("bounds"), std::string::npos) << outcome.out;
 }
 

@@ -143,7 +143,7 @@ TEST_F(RobotCommands, PlannersGetAWholeRobot) {
   EXPECT_EQ(curobo["cspace"]["joint_names"].as<Words>(), joints);
   EXPECT_EQ(curobo["cspace"]["default_joint_position"].as<std::vector<double>>(),
             (std::vector<double>{1.5, 0, 0.04}));
-  // What cuRobo's converter of XRDF asks for.
+  // The requirements of cuRobo's converter of XRDF.
   EXPECT_TRUE(xrdf["collision"]["buffer_distance"].IsMap());
   EXPECT_EQ(xrdf["self_collision"]["geometry"].as<std::string>(),
             xrdf["collision"]["geometry"].as<std::string>());
@@ -428,7 +428,7 @@ TEST_F(RobotCommands, SpheresAreFineWhereLinksPassClose) {
     EXPECT_TRUE(link["covered"].get<bool>());
   }
   EXPECT_LE(count, 96u);
-  // As many false meetings as there are poses take no more memory.
+  // Even a false meeting in every pose takes no more memory.
   const Outcome coarse = ist({"spheres", "near.urdf", "-o", "n.json", "--count", "1"});
   EXPECT_EQ(coarse.exit_code, 0) << coarse.err;
   EXPECT_LT(coarse.peak_memory, 1'000'000'000u);
@@ -544,7 +544,7 @@ TEST_F(RobotCommands, InnerAndMatchedSpheres) {
   EXPECT_NEAR(volume, 2, 0.01);
 }
 
-/// As other programs read them: every corner of the link lies in one of its three shapes.
+/// Read like other programs: every corner of the link lies in one of its three shapes.
 TEST_F(RobotCommands, CapsulesHoldTheLink) {
   ASSERT_EQ(ist({"sample", "bolt", "-o", "bolt.obj"}).exit_code, 0);
   write(

@@ -22,7 +22,7 @@
 #include "support/shared_data.h"
 #include "support/test_meshes.h"
 
-// What the card answers about a mesh, against the CPU's own hierarchy: the same bits.
+// The device's answers about a mesh equal those of the CPU's hierarchy, bit for bit.
 
 namespace ist {
 namespace {

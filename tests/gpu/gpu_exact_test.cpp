@@ -134,7 +134,7 @@ TEST_F(GpuExactTest, AnswersAreTheCpus) {
     expect_near(compare_exactly(exact_assets(), pairs, ask_device(exact_solids(), pairs)));
 }
 
-/// Where parts touch, the area and the normal of the faces that lie on each other too.
+/// For touching parts, also the area and normal of the faces that lie on each other.
 TEST_F(GpuExactTest, MatesTouchAsOnTheCpu) {
   const MatedBatch mated(52, 2000);
   const Differences worst =

@@ -164,7 +164,7 @@ TEST_F(GpuQueryTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(many.get(), repeated);
 }
 
-/// Of one of a few pairs each: only what is compared is kept.
+/// Answers of one of a few pairs each: only compared members are kept.
 class RepeatedPairs {
  public:
   RepeatedPairs(const std::vector<BatchPair>& some, std::size_t size)

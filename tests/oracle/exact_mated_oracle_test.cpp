@@ -107,7 +107,7 @@ class ExactMated : public ::testing::Test {
   Workspace workspace_;
 };
 
-/// Those whose faces in contact are all square to the direction of the mate.
+/// Mates whose touching faces are all perpendicular to the direction of the mate.
 const std::set<std::string> kPlanar = {"bolt_in_plate",  "bracket_on_plate", "brick_beside",
                                        "brick_on_brick", "brick_shifted",    "brick_turned",
                                        "fillet_stack",   "plate_cross",      "plate_on_plate"};
@@ -134,7 +134,7 @@ TEST_F(ExactMated, EveryRow) {
       if (!found.touching || mirror) continue;
       const double faces = area_of_faces(part_mesh(row.mesh_a), part_mesh(row.mesh_b), row.pose);
       EXPECT_NEAR(found.contact_area, faces, 1e-9 * faces);
-      // What a millionth of the unit cuts off, by the faces it is cut from.
+      // The volume that a millionth of the unit cuts off, from the area of the faces.
       const auto moved = std::find_if(rows.begin(), rows.end(), [&](const MatedRow& other) {
         return other.name == row.name && other.moved == 1e-6;
       });

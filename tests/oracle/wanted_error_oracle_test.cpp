@@ -43,7 +43,7 @@ double quantile(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
 }
 
-/// Of a class, in parts of the wanted error, and degrees.
+/// The errors of a class, relative to the wanted error, and in degrees.
 struct Found {
   std::vector<double> error, angle;
 };

@@ -54,7 +54,7 @@ class CoincidentInstances : public ::testing::Test {
   CoincidenceWeight weight(const PlacedAsset& b) const {
     return coincidence_weight(tree_.root, tree_.mean_radius, relative_pose(still(), b)->a_from_b);
   }
-  /// What is answered, over all pairs of spheres in double.
+  /// The expected answer, over all pairs of spheres in double.
   double reference(const PlacedAsset& b) const {
     const double w = weight(b).weight;
     return (1 - w) * reference_sum(still(), b, Measure::matched, 0, 0).volume +
@@ -192,7 +192,7 @@ TEST(CoincidentInstancesOfASolid, ACopyOnItselfReadsItsVolume) {
     const PlacedAsset one{asset.view(), {}, 1};
     Workspace workspace;
     EXPECT_NEAR(penetration(one, one, {}, workspace).volume, volume, 0.025 * volume) << name;
-    // What it is to avert.
+    // The effect that it prevents.
     EXPECT_GT(reference_sum(one, one, Measure::matched).volume, 1.05 * volume) << name;
     // Elsewhere in memory it is the same asset.
     const Asset copy(asset.bytes(), "copy");

@@ -31,7 +31,7 @@ class ExactLoop : public ::testing::Test {
     return penetration({a.view(), {}, 1}, {b.view(), pose, 1}, settings, workspace_);
   }
 
-  /// Of all that an exact query gives, but for the nodes that it opened.
+  /// Compares all results of an exact query except node visits.
   std::uint64_t bits(const Asset& a, const Asset& b, const Pose& pose, std::uint32_t pair_id) {
     ContactSettings settings;
     settings.measure = Measure::exact;
@@ -121,7 +121,7 @@ TEST_F(ExactLoop, InClearanceNothingIsSearchedAndNothingTouches) {
   EXPECT_LE(searched, 80);
 }
 
-// Of a contact whose force is the gradient of ½ V², at 1 kHz: once around in a second.
+// The energy of a contact whose force is the gradient of ½ V², at 1 kHz: one turn a second.
 TEST_F(ExactLoop, AClosedPathGivesNoEnergy) {
   double sum = 0, all = 0;
   Eigen::Vector3d force, place;

@@ -58,7 +58,7 @@ class ExactPlaces : public ::testing::Test {
   const Asset cube_ = surface(box_mesh(Point::Zero(), Point::Ones()));
 };
 
-/// Of [0, 1] and [t, 1 + t].
+/// The overlap of [0, 1] and [t, 1 + t].
 double common(double t) { return std::max(0.0, 1 - std::abs(t)); }
 
 TEST_F(ExactPlaces, CubesOnALattice) {
@@ -96,13 +96,13 @@ TEST_F(ExactPlaces, PlatesFlushWithACube) {
         for (const double x : {0.0, 0.25, 0.5, -0.5, 1.0}) {
           const double top = std::min(1.0, z + thick), low = std::max(0.0, z);
           const double along = std::min(1.0, x + width) - std::max(0.0, x);
-          // As the pose adds to the plate, and the plate's own thickness, in double.
+          // The pose and the plate's own thickness are added in double.
           const double truth = std::max(0.0, along) * std::min(width, 1.0) *
                                (z >= 0 && z + thick <= 1 ? thick : std::max(0.0, top - low));
           SCOPED_TRACE(::testing::Message() << thick << ' ' << width << ' ' << z << ' ' << x);
           const Penetration found =
               ask({cube_.view(), {}, 1}, {plate.view(), shifted({x, 0, z}), 1});
-          // Where the frame of the plate rounds its place, its thickness is off by that.
+          // If the plate's frame rounds its place, its thickness has that error.
           EXPECT_NEAR(found.volume, truth, 1e-13 * truth + 4e-16 * width * width);
           EXPECT_LE(found.volume_min, truth + 1e-16 * width * width);
           EXPECT_GE(found.volume_max, truth - 1e-16 * width * width);
@@ -272,7 +272,7 @@ TEST_F(ExactMotions, TheSameWithAAndBExchanged) {
               std::min(found.volume_max, other.volume_max));
     EXPECT_TRUE(found.force.isApprox(other.force, 1e-12) ||
                 (found.force + other.force).norm() < 1e-13);
-    // Of the other solid, about the other origin.
+    // The wrench on the other solid, about the other origin.
     const Point torque = other.torque + (origin(a) - origin(b)).cross(other.force);
     EXPECT_LE((found.torque + torque).norm(), 1e-13);
     EXPECT_LE((found.centroid - other.centroid).norm() * found.volume, 1e-13);
@@ -324,7 +324,7 @@ TEST_F(ExactMotions, GradientsAreThoseOfTheVolume) {
 }
 
 TEST_F(ExactMotions, CentroidIsThatOfTheOverlap) {
-  // Of boxes it is known; of the whole of a contained solid, its own.
+  // Known for boxes; for a contained solid, its own volume.
   const Penetration found =
       ask({cube_.view(), {}, 1}, {cube_.view(), shifted({0.5, 0.25, -0.75}), 1});
   EXPECT_LE((found.centroid - Point(0.75, 0.625, 0.125)).norm(), 1e-15);
@@ -370,7 +370,7 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
     EXPECT_EQ(found->force, matched.force);
     EXPECT_EQ(found->torque, matched.torque);
     EXPECT_EQ(found->centroid, matched.centroid);
-    // What is certain of the true volume.
+    // Certain bounds of the true volume.
     EXPECT_LE(found->volume_min, truth.volume);
     EXPECT_GE(found->volume_max, truth.volume);
   }

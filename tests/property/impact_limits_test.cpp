@@ -178,7 +178,7 @@ TEST(TimeOfImpact, KnowsNoScaleOrPlace) {
         EXPECT_NEAR(found.time, want.time, far == 0 ? 0 : 1e-4);
       }
     }
-    // As fast again in half the time.
+    // Twice as fast in half the time.
     Motion fast = motion;
     fast.velocity *= 1e6;
     fast.angular_velocity *= 1e6;

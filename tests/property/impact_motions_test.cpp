@@ -11,7 +11,7 @@
 #include "query/impact/moving_frame.h"
 #include "support/impact_bodies.h"
 
-// What times of impact are made of: motions, and pairs of convex parts.
+// The parts of times of impact: motions, and pairs of convex parts.
 
 namespace ist {
 namespace {

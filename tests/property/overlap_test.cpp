@@ -14,7 +14,7 @@ namespace {
 using testing::make_random_asset;
 using testing::random_pose;
 
-/// Of all pairs of inner spheres and of covers, in double: what is certain.
+/// The certain answer, from all pairs of inner spheres and of covers, in double.
 struct Truth {
   bool spheres_meet = false, covers_meet = false;
 };

@@ -168,7 +168,7 @@ struct Slices {
   double volume = 0, moment_z = 0;
 };
 
-/// By slices along z, split at the corners.
+/// Integrates slices along z, split at the corners.
 Slices by_slices(const TriangleMesh& mesh, const Ball& ball) {
   std::vector<double> at = {ball.centre.z() - ball.r, ball.centre.z() + ball.r};
   for (const Vector3d& v : mesh.vertices)

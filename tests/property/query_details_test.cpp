@@ -65,7 +65,7 @@ class QueryDetails : public ::testing::Test {
             SphereTree(b.asset.header(), matched_tree(b.asset.header(), pair.b))};
   }
 
-  /// What a quick look sees, summed in double.
+  /// The coarse estimate of quick_look(), summed in double.
   static QuickLook look(const PlacedAsset& a, const PlacedAsset& b) {
     const auto [tree_a, tree_b] = coarsest(a, b);
     const Similarity map = relative_pose(a, b)->a_from_b;
@@ -206,7 +206,7 @@ TEST_F(QueryDetails, AnswerTheBlendedSumAndItsGradient) {
   EXPECT_GE(blended, 12) << "the poses blend nothing";
 }
 
-// Where a quick look makes half sure of the finest level, and the coarse estimate of none.
+// A pose where the quick look gives the finest level half the weight, and the coarse estimate none.
 TEST_F(QueryDetails, AnswerWhatAQuickLookBlendsAndItsGradient) {
   int blended = 0;
   for (int i = 0; i < 150 && blended < 12; ++i) {
@@ -269,7 +269,7 @@ TEST_F(QueryDetails, NothingJumpsAlongAPath) {
   }
 }
 
-// What the coarsest level does not see is not lost.
+// An overlap that the coarsest level misses is not lost.
 TEST(QueryDetailsAlone, WithoutACoarseEstimateTheFinestAnswers) {
   // The finest reaches out to x = 1, the coarser level stops far short of it.
   AssetArrays arrays;

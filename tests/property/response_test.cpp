@@ -156,7 +156,7 @@ TEST(Response, FrictionNeverGivesMoreThanItHolds) {
   }
 }
 
-/// Where B is on a closed way through a contact, s in [0, 1).
+/// B's pose on a closed path through a contact, s in [0, 1).
 struct Way {
   Vector3d centre, amplitude;
   Vector3d turn;  ///< [rad]

@@ -79,7 +79,7 @@ double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d
   return sum / (4 * std::numbers::pi);
 }
 
-/// Where a ray meets the triangles first, edges aside.
+/// The first hit of a ray with the triangles, except near edges.
 double first(const std::vector<exact::FlatTriangle>& triangles, const Ray& ray) {
   double least = kInfinity;
   const Vector3d d = ray.direction.normalized();
@@ -274,7 +274,7 @@ TEST(Surface, WhatIsNotUsableOrHeldIsNotAnswered) {
   EXPECT_NEAR(closest_point(good, {1e30, 0, 0}).distance, 1e30, 1e20);
 }
 
-// Of shapes: along the ray to the hit all is outside, or inside; distances grow by the gradient.
+// For shapes: the ray up to the hit is all outside, or all inside; distances grow by the gradient.
 TEST(Surface, ShapesAnswerByTheirDistances) {
   std::mt19937_64 random(5);
   int hits = 0;
@@ -459,7 +459,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
   EXPECT_GT(touch, 25);
 }
 
-/// What is kept of a pair changes no bit, whatever way the motion goes.
+/// Kept data of a pair changes no bit, whatever the direction of the motion.
 TEST(Surface, SeparationOfAMotionsStepsIsThatFromScratch) {
   std::mt19937_64 random(55);
   Workspace kept, scratch;
@@ -519,7 +519,7 @@ TEST(Surface, SeparationNeedsNoCapacity) {
   }
 }
 
-/// What is held as a whole is at no distance; what lies in a cavity is.
+/// A solid wholly inside another has distance 0; one in a cavity does not.
 TEST(Surface, SeparationOfWhatIsInside) {
   Workspace workspace;
   const Body box(testing::box_mesh({-1, -1, -1}, {1, 1, 1}));

@@ -176,7 +176,7 @@ class Certified : public ::testing::Test {
     EXPECT_LE(gap, found.distance_max * (1 + 1e-9));
     if (found.kind == ImpactKind::impact) {
       EXPECT_LE(gap, settings.tolerance);
-      // Of a pair that comes to the tolerance; another may be nearer by a part of it.
+      // The distance of a pair that reaches the tolerance; another may be nearer by a part of it.
       const double between = (found.point_b - found.point_a).norm();
       EXPECT_GE(between, gap - 1e-9);
       EXPECT_LE(between, found.distance_max + 1e-9);
@@ -291,7 +291,7 @@ TEST(TimeOfImpact, NoBulletPassesAThinWall) {
         const TimeOfImpact found =
             time_of_impact(PlacedAsset{sheet.view(), {}, size},
                            {torus().view(), start, size * scale}, {{}, motion}, {}, workspace());
-        // What the rounding of so long a way hides is said, never passed over.
+        // An impact hidden by the rounding of so long a path is reported, never skipped.
         const bool told = 1e-15 * speed < 1e-4 * scale;
         EXPECT_EQ(found.kind, told ? ImpactKind::impact : ImpactKind::unresolved)
             << scale << " " << speed << " " << size;

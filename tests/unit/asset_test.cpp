@@ -56,7 +56,7 @@ TEST(Asset, RoundTrip) {
   EXPECT_EQ(folder.files(), 1u);
 }
 
-/// What was moved from is empty, and may be asked anything.
+/// A moved-from asset is empty, and every function may be called.
 TEST(Asset, MovedFromAssetsAndWorkspacesAreSafe) {
   Asset asset(small_asset(40), "memory");
   Asset taken = std::move(asset);

@@ -243,7 +243,7 @@ TEST(CoverSpheres, ATotalGoesWhereItIsNeeded) {
   EXPECT_THROW(cover_with_spheres(meshes, settings), Error);
 }
 
-/// Of all ways to share out, none has a smaller largest estimate.
+/// No other distribution has a smaller maximum of estimates.
 TEST(CoverSpheres, SharesAreTheBestOfTheEstimates) {
   const std::vector<TriedCounts> tried = {{{2, 0.5}, {6, 0.1}}, {{1, 0.3}}, {{3, 0.05}, {4, 0.2}}};
   EXPECT_EQ(estimated_protrusion(tried[0], 2), 0.5);
@@ -436,7 +436,7 @@ TEST(ExtendCover, ContainsASheetBesideTheSolid) {
   for (std::size_t k = 1; k < cover.spheres.size(); ++k)
     EXPECT_LE(cover.spheres[k].radius, cover.protrusion.largest);
 
-  // What is covered stays as it is.
+  // A covered surface stays unchanged.
   for (Eigen::Vector3d& x : sheet.vertices) x *= 0.2;
   cover.spheres = {{{0, 0, 0}, 1.2}};
   cover.protrusion.largest = 0.2;

@@ -98,7 +98,7 @@ TEST(GpuExactPatches, OfManyPartsAreTheCpus) {
   }
 }
 
-/// Which lane does what, and when, must not show.
+/// Results must not depend on which lane does what, and when.
 TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
   const ManyParts many;
   const MatedBatch mated(64, 6);
@@ -128,7 +128,8 @@ TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
   }
 }
 
-/// What the first pass has no room for the second answers alike; what that has none for says so.
+/// The second pass answers pairs that do not fit into the first; pairs that fit into none are
+/// reported.
 TEST(GpuExactPatches, LittleRoomDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(68, 100);
   for (const BatchPair& pair : aligned_pairs(69, 100)) pairs.push_back(pair);

@@ -259,7 +259,7 @@ TEST(GpuFields, ProbesOfAnySize) {
     std::printf("%8g: volume %.1e push %.1e turn %.1e centroid %.1e; %d crossed\n", scale,
                 off.volume, off.push, off.turn, off.centre, met);
     EXPECT_GE(met, 5) << scale;
-    // Where a probe is, is told in the field's digits.
+    // A probe's place has the precision of the field's coordinates.
     const double allowed = std::max(1e-11, 1e-15 / scale);
     EXPECT_LE(off.volume, allowed) << scale;
     EXPECT_LE(off.push, allowed) << scale;

@@ -35,7 +35,7 @@ bool same_regions(std::span<const ContactPatch> x, std::span<const ContactPatch>
                     [](const auto& p, const auto& q) { return p.id == q.id; });
 }
 
-/// What patches differ by from the CPU's, which are float sums.
+/// The difference of patches from the CPU's, which are float sums.
 struct PatchDifference {
   double volume = 0;    ///< relative
   double force = 0;     ///< of area, or of volume^(2/3) if more
@@ -50,7 +50,7 @@ struct PatchDifference {
     force = std::max(force, (x.force - y.force).norm() / reach);
     torque = std::max(torque, (x.torque - y.torque).norm() / (reach * size));
     centroid = std::max(centroid, (x.centroid - y.centroid).norm() / (size + 2 * pair.scale_a));
-    // What is left of the torque once the force acts at the point is the torsion about the normal.
+    // The remaining torque of a force at the point is the torsion about the normal.
     const Eigen::Vector3d left =
         x.torque - (x.point - Eigen::Vector3d(pair.pose_b.t)).cross(x.force) - x.torsion * x.normal;
     const Eigen::Vector3d arm = x.point - x.centroid;

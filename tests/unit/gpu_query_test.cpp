@@ -88,7 +88,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
   const std::vector<BatchPair> pairs = poses.pairs(400);
   double worst = 0, worst_push = 0, worst_turn = 0, worst_centre = 0;
   std::size_t met = 0;
-  // As batches of few pairs are cut up, and of many.
+  // Split like batches of few pairs, and of many.
   for (const auto& [measure, most_pairs] :
        {std::pair{Measure::matched, 1}, {Measure::matched, 1'000'000}, {Measure::inner, 1}}) {
     HostBatch batch(batch_solids());
@@ -106,7 +106,7 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
       const double size = 2 * pairs[i].scale_b;
       worst = std::max(worst, std::abs(answers[i].volume / sum.volume - 1));
       worst_centre = std::max(worst_centre, (answers[i].centroid - sum.centroid()).norm() / size);
-      // Of a ball that all but lies in another the force is a small rest.
+      // If a ball is almost inside another, the force is a small remainder.
       const double area = sum.force_scale + std::cbrt(sum.volume * sum.volume);
       worst_push = std::max(worst_push, (answers[i].force - sum.force).norm() / area);
       worst_turn = std::max(worst_turn, (answers[i].torque - sum.torque).norm() / (area * size));
@@ -145,7 +145,7 @@ TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   }
 }
 
-/// Of few, within a factor of two; many keep their order.
+/// Few are sorted, within a factor of two; many keep their order.
 TEST(GpuQuery, TheLargestPairsBegin) {
   constexpr std::uint32_t kPairs = 1000;
   RandomPairs random(8);

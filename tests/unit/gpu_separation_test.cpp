@@ -180,7 +180,7 @@ TEST(GpuSeparation, LanesOfAWarpNeedNoLuck) {
   expect_same_bits(narrow.run(pairs, 3, {200}), roomy.run(pairs, 0, {200}));
 }
 
-/// What a limit leaves out may be as near as the interval says.
+/// Pairs that a limit leaves out may be as near as the interval states.
 TEST(GpuSeparation, IntervalsOfALimitHoldTheFinishedOnes) {
   const std::vector<BatchPair> pairs = RandomPairs(25).pairs_at_all_distances(300);
   const std::vector<Separation> finished = HostSeparations(batch_solids()).run(pairs);

@@ -20,7 +20,7 @@
 #include "mesh/samples/samples.h"
 #include "support/test_meshes.h"
 
-// What a repair is judged by, the judgement itself, and wraps.
+// The measures of a repair, its quality, and wraps.
 
 namespace ist {
 namespace {
@@ -178,7 +178,7 @@ TEST(Judge, ConfidenceFallsAsTheHoleGrows) {
     const double confidence = closed.report.judged.value().confidence;
     EXPECT_LT(confidence, last) << z;
     last = confidence;
-    // What a ball lost is at most three times what confidence lacks.
+    // The loss of a ball is at most three times the missing confidence.
     EXPECT_LT(1 - volume_of(closed) / volume_of(close_mesh(icosphere_mesh(3), "whole")),
               3 * (1 - confidence) * (1 - confidence) + 1.4 * (1 - confidence));
   }

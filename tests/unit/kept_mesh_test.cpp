@@ -56,7 +56,7 @@ TEST(KeptMesh, IsAllOfTheMeshsOwnTriangles) {
   }
 }
 
-// Where the map into the unit frame is exact nothing was rounded; elsewhere the bound is tight.
+// If the map into the unit frame is exact, nothing was rounded; otherwise the bound is tight.
 /// More than 256 blocks share the tip of a cone: they do not all name each other.
 TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
   constexpr std::uint32_t kSides = 9000;
@@ -126,7 +126,7 @@ TEST(KeptMesh, OfWhatCountsVolumeTwiceIsResolved) {
       EXPECT_EQ(found.violations, 0u) << found.name;
   }
   EXPECT_NEAR(bake(nested, few_spheres()).view().self_overlap_volume(), 1, 1e-6);
-  // Of parts that touch the wall between them goes; cavities are as they should be.
+  // The wall between touching parts is removed; cavities stay correct.
   const ClosedMesh touching =
       closed(testing::joined(testing::box_mesh(-one, one),
                              testing::box_mesh(Point(1, -0.5, -0.5), Point(2, 0.5, 0.5))),

@@ -52,7 +52,7 @@ struct Reference {
   }
 };
 
-/// By the divergence theorem in another form, ∫ x² = ∮ x³/3 n_x and so on, over each triangle by
+/// Another form of the divergence theorem, ∫ x² = ∮ x³/3 n_x and so on, over each triangle by
 /// quadrature that is exact for cubic functions.
 Reference by_quadrature(const TriangleMesh& mesh) {
   using Point = std::array<long double, 3>;
@@ -190,7 +190,7 @@ TEST(MassProperties, OffsetsAndSizesDoNotMatter) {
     }
 }
 
-/// What shells share counts once, as it does in the volume.
+/// Volume shared by shells counts once, as in the volume.
 TEST(MassProperties, OfSolidsThatMeetThemselves) {
   const Vector3d zero = Vector3d::Zero(), one = Vector3d::Ones(), half = one / 2;
   Reference two = of_box(-half, half);

@@ -119,7 +119,7 @@ TriangleMesh prism(const std::uint32_t n, const double low, const double high, c
   return mesh;
 }
 
-/// What a prism fits into; its outer radius is 2.
+/// A cavity that a prism fits into; its outer radius is 2.
 TriangleMesh tube(const std::uint32_t n, const double low, const double high) {
   TriangleMesh mesh;
   mesh.vertices = joined(prism(n, low, high, 0), prism(n, low, high, 0)).vertices;
@@ -425,7 +425,7 @@ TEST(Resolve, ReportsAndIsCancelled) {
   EXPECT_THROW(bake(closed, {.max_spheres = 100}, no), Error);
   EXPECT_THROW(bake_mesh_only(closed, 0, no), Error);
   EXPECT_THROW(bake_to_error(closed, {}, {}, no), Error);
-  // What meets nothing is not looked at.
+  // Parts that meet nothing are skipped.
   EXPECT_EQ(resolve(close_mesh(testing::cube_mesh(), "cube"), no).resolution.how, How::as_it_is);
 }
 
