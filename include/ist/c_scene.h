@@ -113,12 +113,12 @@ typedef struct ist_scene_step {
   size_t boxes_met; /* pairs of bodies whose boxes meet */
 } ist_scene_step_t;
 
-/* Asks all pairs that may have changed. `parallel`: null is the calling thread.
- * IST_BUDGET_EXHAUSTED: not all pairs had room (max_pairs); nothing was asked and no pair ended. */
+/* Queries all pairs that may have changed. `parallel`: null is the calling thread.
+ * IST_BUDGET_EXHAUSTED: there were too many pairs (max_pairs); none was queried, no pair ended. */
 ist_status_t ist_scene_take_step(ist_scene_t* scene, const ist_parallel_t* parallel,
                                  ist_scene_step_t* step);
 
-/* Answers to a pair of the last step: all zero where its rule asks no such thing. Each returns the
+/* Answers to a pair of the last step: all zero if its rule requests none. Each returns the
  * status of the answer. */
 ist_status_t ist_scene_get_penetration(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                        ist_penetration_t* answer);
@@ -126,7 +126,7 @@ ist_status_t ist_scene_get_separation(const ist_scene_t* scene, const ist_scene_
                                       ist_separation_t* answer);
 ist_status_t ist_scene_get_impact(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                   ist_impact_t* answer);
-/* As many as there is room for. */
+/* As many as fit. */
 ist_status_t ist_scene_get_patches(const ist_scene_t* scene, const ist_scene_pair_t* pair,
                                    ist_contact_patches_t* patches);
 

@@ -100,10 +100,10 @@ struct GpuPenetrationSettings {
   std::uint32_t pair_budget = 0;
   /// Exact measure only. What is kept of pair i of the last batch serves pair i of this one while
   /// the solids are the same and have moved little against each other since they were searched: by
-  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and what is near is kept
-  /// anew if it has room and steps are short. Solids and poses may change at will: answers have the
-  /// bits that they have without it, but for node_visits, which is 0 where nothing was searched.
-  /// Null: nothing is kept.
+  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and near triangles are
+  /// kept anew if they fit and steps are short. Solids and poses may change at will: answers have
+  /// the bits that they have without it, but for node_visits, which is 0 where nothing was
+  /// searched. Null: nothing is kept.
   GpuKept* kept = nullptr;
 };
 

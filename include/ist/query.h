@@ -164,9 +164,9 @@ struct Penetration {
   /// Non-empty lenses summed, spheres tested against a shape, and spheres that lie wholly in the
   /// other solid. With Measure::exact: crossing triangles.
   std::uint32_t sphere_pairs = 0;
-  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. What is nearer
-  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touches.
-  /// So does what crosses by a volume that is lost in its rounding. Spheres cannot tell: false.
+  /// Measure::exact: the solids meet in points, edges or faces, and the volume is 0. Solids nearer
+  /// than the rounding of poses and vertices, some 1e-14 of both sizes and their distance, touch.
+  /// So do solids that cross by a volume within its rounding. By spheres: false.
   bool touching = false;
 };
 
@@ -337,8 +337,8 @@ struct ContactPatches {
   std::size_t count = 0;  ///< patches written
 };
 
-/// Condenses the contact into a manifold of at most patches.size() patches; without room for one
-/// the answer is invalid_input.
+/// Condenses the contact into a manifold of at most patches.size() patches; if that is 0, the
+/// answer is invalid_input.
 ///
 /// Volumes, forces and torques sum to the whole's to about 1e-15.
 ///

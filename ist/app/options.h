@@ -45,7 +45,7 @@ CLI::Option* add_input(CLI::App* command, const std::string& name, std::string& 
 CLI::Option* add_file(CLI::App* command, const std::string& name, std::string& path,
                       const std::string& help);
 
-/// What "-" means as an output.
+/// The meaning of "-" as an output.
 enum class Dash { refused, standard_output };
 
 /// The required option -o,--output; "" is refused, and "-" unless it means standard output.

@@ -41,8 +41,8 @@ enum class SettingKind {
 struct Setting {
   std::string name;      ///< "min-radius": --min-radius, or a key of a manifest
   std::string type;      ///< of its value, for help
-  std::string meaning;   ///< what it takes: "a whole number from 0 to 10"
-  std::string fallback;  ///< what it is if not given, for help; "": help says it
+  std::string meaning;   ///< its valid values: "a whole number from 0 to 10"
+  std::string fallback;  ///< the default, for help; "": stated in help
   std::string help;
   SettingKind kind;
   /// Returns false if the text does not match `meaning`. A flag's text is "true" or "false".

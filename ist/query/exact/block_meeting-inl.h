@@ -397,7 +397,7 @@ class Meeting {
   mutable const PlacedPlanes* planes_[2] = {};  ///< computed at the first use
   float apart_ = 0;    ///< bounds the differences of coordinates of both blocks
   double beyond_;      ///< the separation that planes through edges must exceed
-  bool flat_[2] = {};  ///< whose edges are asked
+  bool flat_[2] = {};  ///< the block is flat: its edges are tested
   Columns columns_, edges_, touch_, flush_;
 };
 

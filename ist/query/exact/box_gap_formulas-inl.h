@@ -65,8 +65,8 @@ IST_FORMULA bool measure_boxes(const BoxLook<typename Of::T, S>& look, const See
   V at_middle = zero, at_box = zero, other_at_box = zero, to_box = zero, of_slab = zero;
   V rest[3];
   for (int i = 0; i < 3; ++i) {
-    const V rest = Of::set(look.lane_direction[0][i]) - steep * n[i];
-    of_slab = of_slab + (rest * away[i] + Of::magnitude(rest) * half[i]);
+    const V across_slab = Of::set(look.lane_direction[0][i]) - steep * n[i];
+    of_slab = of_slab + (across_slab * away[i] + Of::magnitude(across_slab) * half[i]);
     rest[i] = n[i] - turn * set(one.normal[i]);
     const V other_rest = set(one.normal[i]) - turn * n[i];
     at_middle = at_middle + n[i] * set(one.middle[i]);

@@ -227,7 +227,7 @@ class TriangleSearch : PairSigns {
       const OneBox box(a.low, a.high, i, reach_);
       std::uint32_t lanes = in_a & meeting(b.low, b.high, box.low, box.high);
       if (lanes == 0) continue;
-      // Where floats decide nothing, they are not used again.
+      // Floats that decided nothing are not used again.
       const Straddling found = flush ? Straddling{0, lanes} : straddling(a, i, b, lanes, reach_);
       flush |= found.clear == 0 && found.doubtful != 0;
       if ((found.clear | found.doubtful) == 0) continue;

@@ -341,7 +341,7 @@ class OverlapJoins : public Overlap {
 
   /// Returns the element to which the middle of the edge belongs. `first`: of the list of its ends.
   ///
-  /// Where copies coincide, ends may be nearer to each other than their error, and their order may
+  /// If copies coincide, ends may be nearer to each other than their error, and their order may
   /// show nothing inside in the middle. The nearest end then represents it, so sums lose nothing.
   IST_HD std::uint32_t join_edge(std::uint32_t r, std::uint32_t edge,
                                  std::uint32_t first) noexcept {

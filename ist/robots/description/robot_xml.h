@@ -66,7 +66,7 @@ class RobotXml {
     return name;
   }
 
-  /// As many numbers as `otherwise`, which is the default of a missing value.
+  /// Reads as many numbers as `otherwise`, which is the default of a missing value.
   std::vector<double> numbers(std::uint32_t e, std::string_view name,
                               std::vector<double> otherwise) const {
     const std::string words = text(e, name);
