@@ -196,7 +196,7 @@ TEST_F(OracleRows, HaveTheBitsOfCpp) {
   EXPECT_GT(answered, 20);
 }
 
-/// A surface alone is told of, and answers no query of spheres.
+/// A mesh-only asset is reported, and answers no query of spheres.
 TEST(CApi, SurfaceAlone) {
   const Asset asset = bake_mesh_only(close_mesh(testing::cube_mesh(), "cube"));
   const ist_asset_t tree = viewed(asset);
@@ -337,7 +337,7 @@ void expect_closed(std::span<const ist_outline_segment_t> segments, std::size_t 
   EXPECT_EQ(from, to);
 }
 
-// The bits of C++, with room for all and for less.
+// The bits of C++, with memory for all and for less.
 TEST(CApi, OutlinesHaveTheBitsOfCpp) {
   const Asset a = bake_mesh_only(close_mesh(make_sample("gear"), "gear"));
   const Asset b = bake_mesh_only(close_mesh(make_sample("torus_knot"), "knot"));
@@ -470,7 +470,7 @@ TEST_F(OracleRows, LensesSumToTheVolume) {
   EXPECT_GT(held, 10);
 }
 
-/// A floor on which a cube's spheres stand: flat faces that hardly touch lose most, from C too.
+/// A floor on which a cube's spheres rest: flat faces that hardly touch lose most, from C too.
 TEST(CApi, PatchesWithoutProtrusion) {
   const Asset cube = bake(close_mesh(testing::cube_mesh(), "cube"), {.max_spheres = 500});
   const ist_asset_t tree = viewed(cube);

@@ -357,7 +357,7 @@ TEST_F(ClashFiles, FarFromTheOriginRoundingIsTold) {
   EXPECT_EQ(pairs(doubles), Words{"a b overlapping"});
   EXPECT_EQ(doubles.at("notes"), Json::array());
   EXPECT_NE(clash("doubles.gltf").out.find("at (500000.75, 4000001, 1)"), std::string::npos);
-  // A pose of a TOML is of doubles, whatever its mesh is of.
+  // A pose of a TOML is in doubles, whatever its mesh's precision.
   ASSERT_EQ(ist({"sample", "cube", "-o", "cube.stl"}).exit_code, 0);
   write("far.toml",
         "[[part]]\nname = \"a\"\nmesh = \"cube.stl\"\npose = [1,0,0,0, 500000,4000000,0]\n"
@@ -545,7 +545,7 @@ TEST_F(ClashFiles, BadFilesSayWhereAndWhatToDo) {
   EXPECT_EQ(ist({"clash"}).exit_code, 2);
 }
 
-/// The page's files and commands, as they stand there.
+/// The page's files and commands, verbatim.
 TEST_F(ClashFiles, ThePageOfTheDocumentation) {
   std::ifstream page(IST_SOURCE_DIR "/docs/clash.md");
   std::string line, block, kind;

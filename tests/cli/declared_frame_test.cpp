@@ -19,7 +19,7 @@ class DeclaredFrame : public CommandLine {
   }
 };
 
-/// A tetrahedron that tells its axes apart: 1 × 2 × 3.
+/// A tetrahedron with distinguishable axes: 1 × 2 × 3.
 std::string collada(const std::string& asset) {
   return "<COLLADA version=\"1.4.1\"><asset>" + asset +
          "</asset><library_geometries><geometry id='g'><mesh><source id='p'>"

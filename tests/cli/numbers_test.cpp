@@ -109,7 +109,7 @@ TEST_F(Numbers, LeadingZerosAreNotOctal) {
   EXPECT_EQ(asked(with(hybrid, "--grid-start", "08")).at("grid_start"), 8);
   EXPECT_EQ(asked(with(hybrid, "--grid-refinements", "01")).at("grid_refinements"), 1);
   EXPECT_EQ(asked(with(hybrid, "--grid-rounds", "010")).at("grid_rounds"), 10);
-  // Elsewhere an 8 tells: it is no octal digit.
+  // Elsewhere an 8 shows it: it is not an octal digit.
   for (const Option& option : kWhole) {
     if (option.name.starts_with("--grid") || option.name == "--detail") continue;
     const Outcome outcome = ist(with(option.command, option.name, "08"));

@@ -413,7 +413,7 @@ TEST_F(QueryCommand, AnswersThatCannotBeWrittenAreAnError) {
   EXPECT_NE(read("err").find("standard output"), std::string::npos) << read("err");
 }
 
-/// The program speaks the C locale whatever the user's is.
+/// The program uses the C locale whatever the user's locale.
 TEST_F(QueryCommand, NumbersDoNotDependOnTheLocale) {
   const std::string command =
       "localedef -i de_DE -f UTF-8 " + (folder_ / "de_DE.UTF-8").string() + " >/dev/null 2>&1";

@@ -200,7 +200,8 @@ TEST_F(RobotCommands, TheDefaultPoseIsAskedFor) {
   expect_error({"spheres", "cube.obj", "-o", "o.json", "--pose", "j2=1"}, 2, "is not a robot");
 }
 
-/// An arm that reaches into its base at most angles: that is told, until an SRDF excludes the pair.
+/// An arm that reaches into its base at most angles: this is reported until an SRDF excludes the
+/// pair.
 TEST_F(RobotCommands, PairsThatMostlyCollideAreToldOrExcluded) {
   write(
       "dip.urdf",
@@ -502,7 +503,7 @@ TEST_F(RobotCommands, WarningsOfAKindAreOneLine) {
   EXPECT_EQ(outcome.err.find("link second"), std::string::npos) << outcome.err;
 }
 
-/// Links and spheres stand where the joints put them, and are read back as meshes.
+/// Links and spheres are placed by the joints, and are read back as meshes.
 TEST_F(RobotCommands, AScene) {
   write("arm.urdf", kArm);
   ASSERT_EQ(ist({"spheres", "arm.urdf", "-o", "a.glb", "--count", "3"}).exit_code, 0);

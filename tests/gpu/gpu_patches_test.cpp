@@ -68,7 +68,7 @@ TEST_F(GpuPatchesTest, ManyPairsHaveTheSameBitsInEveryRun) {
   expect_same_bits(on_device(solids, pairs, Measure::matched, 4), repeated);
 }
 
-/// Patches and penetrations may follow each other in one workspace, and a graph may hold them.
+/// Patches and penetrations may follow each other in one workspace, and a graph may contain them.
 TEST_F(GpuPatchesTest, AGraphMayCaptureThemBesidePenetrations) {
   const std::vector<BatchPair> pairs = RandomPairs(55).pairs(500);
   const GpuSolids solids(batch_solids());

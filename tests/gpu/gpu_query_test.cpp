@@ -109,7 +109,7 @@ TEST_F(GpuQueryTest, ManyPairsInFieldsHaveTheSameBitsInEveryRun) {
   ask_for_few_and_many(scene.solids, scene.pairs, 300000);
 }
 
-/// More than a round has room for, and some more than any has.
+/// More pairs than fit into a round, and some that fit into none.
 TEST_F(GpuQueryTest, LargePairsAmongTrianglesHaveTheSameBitsHoweverManyThereAre) {
   const MixedScene scene(500);
   std::vector<BatchPair> some;

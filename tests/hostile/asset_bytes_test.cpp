@@ -208,7 +208,7 @@ TEST(AssetBytes, CheckEndsOnHostileAssets) {
   }
 }
 
-// Each field the query stands on is looked at by name too: chance may miss one.
+// Each field that the query relies on is damaged by name too: random changes may miss one.
 TEST(AssetBytes, EveryOffsetAndCountIsLookedAt) {
   const auto bytes = small_asset(40, 1);
   const auto tree_fields = [](std::size_t tree) {

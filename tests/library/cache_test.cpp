@@ -110,7 +110,7 @@ TEST_F(Cache, ALimitKeepsWhatWasUsedLast) {
   EXPECT_EQ(counts().at("baked"), 5);
   const std::uint64_t bytes = cache_of().at("bytes");
   write("cache/README", "mine");
-  // cube.obj is asked for again, much later than the rest.
+  // cube.obj is requested again, much later than the rest.
   using namespace std::chrono_literals;
   for (const auto& file : std::filesystem::recursive_directory_iterator(folder_ / "cache"))
     if (file.is_regular_file())

@@ -198,7 +198,7 @@ double shadow(const TriangleMesh& mesh, const Point& way) {
 }
 
 /// A solid and its copy d away have the volume V − d · shadow + O(d²) in common, never less, and
-/// the same if the copy goes the other way.
+/// the same if the copy moves in the opposite direction.
 class ExactCopies : public ::testing::TestWithParam<const char*> {
  protected:
   static bool is_sample() { return path().string() == "gear"; }

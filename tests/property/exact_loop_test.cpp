@@ -170,7 +170,8 @@ TEST_F(ExactLoop, AnyUseOfNumbersGivesTheSameBits) {
     }
 }
 
-// A list that the workspace has no room for is given up. With less room yet nothing is finished.
+// A list that does not fit into the workspace is given up. With even less memory nothing is
+// finished.
 TEST_F(ExactLoop, RoomChangesNoBit) {
   const Asset ball = testing::surface(testing::icosphere_mesh(4));
   for (std::size_t capacity = 4000; capacity < 40000; capacity += capacity / 8) {

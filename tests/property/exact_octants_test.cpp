@@ -187,7 +187,7 @@ TEST_F(ExactOctants, AFineFaceIsDividedLikeACoarseOne) {
       EXPECT_LE((one[i].centroid - other[i].centroid).norm(), 1e-11);
       EXPECT_LE((one[i].force - other[i].force).norm(), 1e-13);
       EXPECT_LE((one[i].torque - other[i].torque).norm(), 1e-13);
-      // The same either way round.
+      // The same in either order.
       if (!a_is_table) {
         EXPECT_LE((one[i].force + before[i].force).norm(), 1e-13);
       }
@@ -336,7 +336,7 @@ TEST_F(ExactOctants, WhatIsDeepIsOne) {
             1u);
 }
 
-/// The largest change of a patch over a step along a path, patches told by their octants.
+/// The largest change of a patch over a step along a path, patches identified by their octants.
 TEST_F(ExactOctants, AreContinuous) {
   struct Case {
     Asset a, b;

@@ -29,7 +29,7 @@ TriangleMesh joined(const std::vector<TriangleMesh>& meshes) {
   return all;
 }
 
-/// Four legs of 0.2 × 0.2, 1 high, that stand at the corners of a square.
+/// Four legs of 0.2 × 0.2, 1 high, at the corners of a square.
 TriangleMesh legs() {
   std::vector<TriangleMesh> all;
   for (const double x : {-1.0, 0.8})
@@ -55,7 +55,7 @@ class ExactPatches : public ::testing::Test {
   const std::vector<ContactPatch>& patches() const { return patches_; }
 
  private:
-  /// The patches sum to what a penetration answers.
+  /// The patches sum to a penetration's answer.
   void expect_whole(const PlacedAsset& a, const PlacedAsset& b, const OverlapOutline& found,
                     std::size_t room) {
     const Penetration whole = testing::exactly(a, b, workspace_);
@@ -116,7 +116,7 @@ TEST_F(ExactPatches, FourLegsOnAPlate) {
     EXPECT_NEAR(patch.depth, 0.1, 1e-13);
     EXPECT_NEAR(patch.centroid.z(), -0.05, 1e-14);
   }
-  // The other way round, and where there is room for two alone.
+  // In the other order, and with memory for only two.
   ask({table.view(), {}, 1}, {plate.view(), {{1, 0, 0, 0}, {0.1, 0.05, 0.1}}, 1});
   EXPECT_EQ(patches().size(), 4u);
   ask({plate.view(), {}, 1}, {table.view(), {{1, 0, 0, 0}, {0.1, 0.05, -0.1}}, 1}, 2);

@@ -399,7 +399,7 @@ TEST_F(ExactLimits, WithoutAMeshNothingIsHeld) {
   EXPECT_EQ(testing::exactly(b, a, workspace_).status, QueryStatus::missing_data);
 }
 
-// However much room there is, once it is enough.
+// The amount of memory does not matter once it is enough.
 TEST_F(ExactLimits, RoomNeverChangesAnAnswer) {
   const PlacedAsset a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
   const Penetration truth = ask(a, b);

@@ -112,7 +112,7 @@ TEST(FieldQuery, TwoFieldsHoldNoSpheres) {
 
 TEST(FieldQuery, CylindersRimIsMetByEveryBall) {
   // Past the rim a ball is beside the mantle and above the end, and has a part of either: nodes may
-  // not be left out by their way to the rim.
+  // not be left out by their distance to the rim.
   Workspace workspace;
   const Asset one = make_random_asset({300, 0.3, {}, 0}, 5);
   const PlacedShape a{CylinderShape{0.4, 0.3}, {}, 1};
@@ -258,10 +258,10 @@ TEST(UnlikePairs, CarriedThroughAWall) {
         }
         std::printf("%s wall, way %d: worst error %.3f of the most\n", thin ? "thin" : "thick", way,
                     error / most);
-        // A section of the cube is no larger than √3 · side² (turned); the balls that stand for it
+        // A section of the cube is no larger than √3 · side² (turned); the balls that represent it
         // have sections some tenths larger where their layers are.
         EXPECT_LE(worst_jump, 1.5 * std::sqrt(3.0) * 0.25 * 1.4 / kSteps) << thin << ' ' << way;
-        // Balls of a layer cross a thin wall together: the cube's own faces are what is off.
+        // Balls of a layer cross a thin wall together: the error is that of the cube's own faces.
         EXPECT_LE(error, (way > 0 ? 1e-12 : thin ? 0.08 : 0.01) * most) << thin << ' ' << way;
       }
     }

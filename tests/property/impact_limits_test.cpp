@@ -8,8 +8,8 @@
 #include "support/float_traps.h"
 #include "support/impact_bodies.h"
 
-// Times of impact at the edge: solids that hold or slide along each other, limits that bind, input
-// that is none, sizes and places far off.
+// Times of impact at the edge: solids that contain or slide along each other, limits that bind,
+// input that is none, sizes and places far off.
 
 namespace ist {
 namespace {

@@ -337,7 +337,7 @@ TEST(Probe, CuttingTrianglesChangesNothing) {
       worst_moment = std::max(worst_moment, (a.moment - b.moment).norm() / (r * r * r * r));
     }
     // Rounding grows as the mesh's size over the ball's, 200 at most, and as the ball's radius over
-    // its centre's way to the nearest edge, some 100 in so many tries.
+    // its centre's distance to the nearest edge, some 100 in so many tries.
     EXPECT_LE(worst, 1e-11) << shape.name;
     EXPECT_LE(worst_pull, 1e-12) << shape.name;
     EXPECT_LE(worst_moment, 1e-12) << shape.name;
@@ -370,7 +370,7 @@ TEST(Probe, FarInsideIsAllAndFarOutsideNothing) {
     Ball out = in;
     out.centre[i % 3] += 2.1;
     EXPECT_EQ(part_of(box, out).volume, 0);
-    // A ball that holds the whole box.
+    // A ball that contains the whole box.
     const Ball around{in_box(random, Vector3d::Ones()), 4};
     EXPECT_NEAR(part_of(box, around).volume, 8, 1e-13 * 64);
     EXPECT_LE(part_of(box, around).gradient.norm(), 1e-13 * 16);

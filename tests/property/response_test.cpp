@@ -112,7 +112,7 @@ TEST(Response, StiffnessRestsWhereItWasAskedTo) {
 }
 
 // Friction alone: at every step the work that it gives and what its springs hold is no more than
-// what they held before, whatever the way, the limit, the area and the normal do.
+// what they held before, whatever the path, the limit, the area and the normal do.
 TEST(Response, FrictionNeverGivesMoreThanItHolds) {
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -177,7 +177,8 @@ struct Cycle {
   double most = 0;  ///< [force·u] held by the springs where they hold most
 };
 
-/// The work of the law round `way`, by the trapezoidal rule over `steps` steps of 1/steps s.
+/// The work of the law along the closed path, by the trapezoidal rule over `steps` steps of 1/steps
+/// s.
 template <class Placed>
 Cycle go_round(const ContactLaw& law, const Placed& a, const AssetView& tree, const Way& way,
                int steps, std::size_t patch_count, ContactMemory& memory) {

@@ -157,7 +157,7 @@ TEST(SceneRecord, NoBytesDoMoreThanRaise) {
     if (changed != record) {
       EXPECT_NE(fault_of(changed, assets), "");
     }
-    // With a hash that agrees, as someone who means it would write.
+    // With a matching hash, as an attacker would write.
     const std::uint64_t hash = XXH3_64bits(changed.data() + kHeader, changed.size() - kHeader);
     std::memcpy(changed.data() + kHash, &hash, sizeof hash);
     try {

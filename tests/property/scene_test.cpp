@@ -21,7 +21,7 @@
 #include "support/surface_queries.h"
 #include "support/test_meshes.h"
 
-// Scenes against all pairs, asked one by one.
+// Compares scenes with single queries of all pairs.
 
 namespace ist {
 namespace {
@@ -259,7 +259,7 @@ TEST(Scene, FindsWhatAllPairsHave) {
   for (unsigned seed = 1; seed <= scenes; ++seed) {
     Pile pile(seed);
     Scene scene({.max_bodies = 60, .workers = 1});
-    // The same bodies, added the other way round, by several threads.
+    // The same bodies, added in reverse order, by several threads.
     Scene other({.max_bodies = 60, .workers = 3});
     set_rules(scene);
     set_rules(other);
@@ -358,7 +358,7 @@ TEST(Scene, BoxesOfAllSizesMeetWhereTheirNumbersSay) {
     std::map<std::uint32_t, SceneBody> bodies;
     const auto body = [&](std::uint32_t number) {
       SceneBody out = block_at(number, 0, pile.below(3) != 0);
-      // A floor, and what is 1e4 times as small; in a corner, or on a lattice.
+      // A floor, and bodies 1e4 times as small; in a corner, or on a lattice.
       const double size = number == 0 ? 10 : std::exp2(pile.uniform(-10, seed % 2 == 0 ? 0 : -3));
       out.solid = PlacedSolid(block().view(), pile.pose(), size);
       return out;

@@ -67,7 +67,7 @@ double nearest(const std::vector<exact::FlatTriangle>& triangles, const Vector3d
   return least;
 }
 
-/// How often a surface goes around a point, by solid angles.
+/// The winding number of a surface around a point, by solid angles.
 double winding(const std::vector<exact::FlatTriangle>& triangles, const Vector3d& x) {
   double sum = 0;
   for (const exact::FlatTriangle& t : triangles) {
@@ -423,7 +423,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
         take_nearest(x, y, {}, {}, least);
         cross = cross || exact::cross_exactly(x.corner, y.corner);
       }
-    // Ties of what touches decide one way or the other.
+    // Ties of touching surfaces are decided either way.
     const bool overlap = testing::exactly(a, b, workspace).volume > 1e-14 ||
                          (cross && std::sqrt(least.squared) > 1e-12);
     const double want = overlap ? 0 : std::sqrt(least.squared);

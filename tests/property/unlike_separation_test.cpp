@@ -1,5 +1,5 @@
 // Distances of solids of unlike sizes, far apart for their size, that touch, or that fit into each
-// other: none is dear.
+// other: none is expensive.
 
 #include <gtest/gtest.h>
 #include <ist/query.h>

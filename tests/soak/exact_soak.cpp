@@ -33,7 +33,7 @@ using namespace ist;
 using Point = Eigen::Vector3d;
 
 constexpr std::size_t kChunk = 250;  // poses drawn from one stream of random numbers
-/// What may not happen, and what did.
+/// Forbidden events, and their counts.
 struct Tally {
   std::uint64_t poses = 0, crossing = 0, contained = 0, apart = 0, pairs = 0;
   std::uint64_t unfinished = 0;    ///< status other than ok

@@ -32,7 +32,7 @@ using namespace ist;
 constexpr std::size_t kChunk = 1000;  // queries drawn from one stream of random numbers
 constexpr std::size_t kRounds = 10;
 
-/// What may not happen, and what did; summed over threads.
+/// Forbidden events, and their counts; summed over threads.
 struct Tally {
   std::uint64_t not_numbers = 0;    ///< answers with NaN, or with Inf where that means nothing
   std::uint64_t disordered = 0;     ///< a value outside its own bounds, or a negative one

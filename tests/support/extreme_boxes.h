@@ -27,7 +27,7 @@ constexpr std::size_t kExtremeSpheres = 1000;
 constexpr double kNoPromise = std::numeric_limits<double>::infinity();
 inline const Vector3d kHalfA(0.5, 0.4, 0.3), kHalfB(0.3, 0.5, 0.6);
 
-/// Largest of what it is shown; NaN stays.
+/// The largest value so far; NaN stays.
 class Worst {
  public:
   void add(double value) {

@@ -17,7 +17,7 @@ namespace ist::testing {
 /// of 32.
 class HostBatch {
  public:
-  /// Room for what is split: so many of each kind.
+  /// The capacity for split pairs, by kind.
   explicit HostBatch(HostSolids solids, std::uint32_t room = 1 << 16)
       : solids_(std::move(solids)), room_(room) {
     cut_for(1);

@@ -283,7 +283,7 @@ std::vector<PatchedPair> HostPatches::run(const std::vector<BatchPair>& pairs, M
                   vectors,
                   vectors,
                   numbers};
-  // What teams that come before left in their room must not matter.
+  // The memory's content from earlier teams must not matter.
   std::vector<std::byte> memory_of_team(gpu::PatchWorkspace::bytes(solids_.most_bins()),
                                         std::byte{0xA5});
   gpu::PatchArrays batch = {};

@@ -25,7 +25,7 @@ class HostPatches {
 
   // Of Measure::exact:
   gpu::ExactCounters exact_counters;  ///< of the last run
-  /// [bytes] of a pass's room for parts, at most.
+  /// [bytes] of a pass's memory for parts, at most.
   std::ptrdiff_t part_bytes[gpu::kExactPasses] = {0, PTRDIFF_MAX, PTRDIFF_MAX};
 
  private:

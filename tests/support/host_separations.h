@@ -14,7 +14,7 @@ namespace ist::testing {
 /// The GPU's batch of separations on the host, as HostBatch runs penetrations.
 class HostSeparations {
  public:
-  /// Room for what is split: so many of each kind.
+  /// The capacity for split pairs, by kind.
   explicit HostSeparations(HostSolids solids, std::uint32_t room = 1 << 16)
       : solids_(std::move(solids)), room_(room) {}
 

@@ -37,7 +37,7 @@ struct MateWork {
   std::string what;
 };
 
-/// Asks random mates in a few poses each, and checks what is known of the answers.
+/// Asks random mates in a few poses each, and checks known properties of the answers.
 class MateChecks {
  public:
   /// `cost` of the query that `ask` makes; by default node pairs and crossing triangles.

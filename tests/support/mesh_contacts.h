@@ -10,7 +10,7 @@ namespace ist::testing {
 struct MeshContacts {
   std::size_t count = 0;
   double depth_sum = 0;  ///< [u] Σ depth, ≥ 0
-  /// [u] Σ depth · unit normal, the way B is pushed, world.
+  /// [u] Σ depth · unit normal, the direction in which B is pushed, world.
   Eigen::Vector3d push_b = Eigen::Vector3d::Zero();
 
   bool any() const { return count > 0; }

@@ -82,7 +82,7 @@ struct Extrusion {
     return out;
   }
 
-  /// Likewise with another corner half way between two, nearer to the axis; a fan about the axis.
+  /// Likewise with another corner halfway between two, nearer to the axis; a fan about the axis.
   static Extrusion fan(std::uint32_t spikes, double radius, double inner, double low, double high) {
     Extrusion out;
     out.low = low, out.high = high;
@@ -159,7 +159,7 @@ struct Extrusion {
   }
 };
 
-/// Of two triangles: area of what they have in common.
+/// The common area of two triangles.
 inline double common_area(const std::array<Eigen::Vector2d, 3>& a,
                           const std::array<Eigen::Vector2d, 3>& b) {
   using Point = Eigen::Vector2d;

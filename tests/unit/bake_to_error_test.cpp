@@ -152,7 +152,7 @@ TEST(BakeToError, AMissedTargetIsSaidWithItsReason) {
   EXPECT_FALSE(thin.asset.view().predicted_errors().target_met());
 }
 
-// The truth is the solid's, whatever surface the asset keeps.
+// The truth is the solid's, whatever mesh the asset stores.
 TEST(BakeToError, MeasuresByTheMeshThatTheAssetDoesNotKeep) {
   const ClosedMesh torus = testing::closed(testing::torus_mesh(1.0, 0.4, 40, 20), "torus");
   PackingSettings settings = {.max_spheres = 200};

@@ -48,7 +48,7 @@ TEST(GpuExactPatches, OfMatesAreTheCpus) {
 
 TEST(GpuExactPatches, WhatGrazesIsTheCpus) { ask(exact_assets(), grazing_pairs(), 4); }
 
-/// Legs on a plate, teeth in a block whose sides are single triangles, a cavity in what overlaps.
+/// Legs on a plate, teeth in a block whose sides are single triangles, a cavity in the overlap.
 struct ManyParts {
   std::vector<Asset> assets;
   std::vector<BatchPair> pairs;
@@ -114,7 +114,7 @@ TEST(GpuExactPatches, LanesOfAWarpNeedNoLuck) {
   }
 }
 
-/// The whole is that of a batch of penetrations; without patches it is all that is asked.
+/// The whole is that of a batch of penetrations; without patches it is the only result.
 TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
   const std::vector<BatchPair> pairs = aligned_pairs(67, 200);
   const std::vector<Penetration> expected = HostBatch(exact_solids()).run(pairs, Measure::exact);

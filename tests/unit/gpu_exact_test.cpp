@@ -46,7 +46,7 @@ TEST(GpuExact, MatesTouchAsOnTheCpu) {
   expect_near(worst);
 }
 
-/// An edge that goes into a face by 1e-9 has next to no volume, but touches no more.
+/// An edge that enters a face by 1e-9 has next to no volume, but touches no more.
 TEST(GpuExact, WhatGrazesIsToldAsOnTheCpu) {
   const std::vector<BatchPair> pairs = grazing_pairs();
   HostBatch batch(exact_solids());
@@ -120,7 +120,7 @@ TEST(GpuExact, AnyRatioOfSizes) {
 }
 
 /// Copies about one middle: in place and next to it few blocks cross, turned all do, for which the
-/// first two passes have no room.
+/// first two passes have no memory.
 TEST(GpuExact, LargeCopiesAreAnswered) {
   std::vector<Asset> assets;
   assets.push_back(surface(icosphere_mesh(5), "ball"));

@@ -146,7 +146,7 @@ TEST(GpuFields, AlignedSolidsToo) {
   EXPECT_LE(off.centre, 1e-9);
 }
 
-/// A ball whose centre lies on an edge cannot tell from there on which side of a triangle it is.
+/// A ball whose centre lies on an edge does not determine its side of a triangle.
 TEST(GpuFields, CentresOnEdges) {
   static const std::vector<float> slope = [] {
     std::vector<float> h;
@@ -285,7 +285,7 @@ TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
   }
 }
 
-/// However many rounds there are, and whether pairs find room in one.
+/// However many rounds there are, and whether pairs fit into one.
 TEST(GpuFields, RoomChangesNoBit) {
   const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
@@ -393,7 +393,7 @@ TEST(GpuFields, ABatchMixesPairsInAnyOrder) {
   expect_same_bits(HostBatch(solids).run(pairs, Measure::matched, 1), expected);
 }
 
-/// Two fields hold no spheres, and a query of two trees takes no field.
+/// Two fields have no spheres, and a query of two trees takes no field.
 TEST(GpuFields, WhatHoldsNoSpheresIsNotHeld) {
   const std::vector<GpuSolid> solids = mixed_solids();
   std::vector<BatchPair> pairs(4);

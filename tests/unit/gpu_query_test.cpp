@@ -132,7 +132,7 @@ HostBatch splitting(std::uint32_t room = 1 << 16) {
   return batch;
 }
 
-/// Splitting, and who does what in which order, must not show.
+/// Results must not depend on splitting, or on which team does what in which order.
 TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   RandomPairs poses(4);
   const std::vector<BatchPair> pairs = poses.pairs(100);

@@ -9,7 +9,7 @@
 #include "query/ball_triangle/disc.h"
 #include "support/random_pairs.h"
 
-// Triangles as the GPU's queries see them, in floats: what they tell must hold exactly.
+// Triangles as the GPU's queries see them, in floats: their results must be exactly true.
 
 namespace ist::testing {
 namespace {

@@ -158,7 +158,7 @@ TEST(GpuSeparation, OfTwinsTheNearerOrTheFirstAnswers) {
   expect_same_bits(batch.run(pairs, 1), answers);
 }
 
-/// Splitting, and who does what in which order, must not show.
+/// Results must not depend on splitting, or on which team does what in which order.
 TEST(GpuSeparation, SameBitsHoweverItIsSplit) {
   const std::vector<BatchPair> pairs = RandomPairs(23).pairs_at_all_distances(400);
   HostSeparations roomy(batch_solids());

@@ -112,7 +112,7 @@ TEST(SoupWinding, IsTheSolidAngleOfAnOpenSurface) {
 TEST(OutwardWinding, TurnsWhatFacesInward) {
   std::mt19937_64 random(3);
   for (const bool some : {false, true}) {
-    // A bowl, inside out or with triangles that face any way.
+    // A bowl, inside out or with triangles of random orientation.
     TriangleMesh bowl = cut_above(icosphere_mesh(3), 0.2);
     if (some)
       flip_some(bowl, random);
@@ -122,7 +122,7 @@ TEST(OutwardWinding, TurnsWhatFacesInward) {
     EXPECT_GT(winding.at({0, 0, -0.5}), 0.7);
     EXPECT_LT(winding.at({0, 0, -1.5}), 0.1);
   }
-  // Triangles that share no edge: only what is seen of them tells.
+  // Triangles that share no edge: only their visibility decides.
   TriangleMesh apart;
   for (const auto& t : icosphere_mesh(2).triangles) {
     for (const auto v : t) apart.vertices.push_back(1.001 * icosphere_mesh(2).vertices[v]);

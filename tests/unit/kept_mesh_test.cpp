@@ -14,7 +14,7 @@
 #include <ist/asset_layout.h>
 #include "support/test_meshes.h"
 
-// The mesh that an asset holds for exact queries, and assets of a mesh alone.
+// The mesh that an asset stores for exact queries, and mesh-only assets.
 
 namespace ist {
 namespace {
@@ -73,7 +73,7 @@ TEST(KeptMesh, OfALargeFanGrowsWithItsTriangles) {
   const Asset asset = bake_mesh_only(mesh);
   expect_sound(asset, mesh);
   EXPECT_LT(asset.bytes().size(), 100u * 2 * kSides);
-  // Half a cone and, of the other half, what a box leaves.
+  // Half a cone, and the part of the other half outside a box.
   const Asset box = bake_mesh_only(closed(testing::box_mesh({-2, -2, -2}, {0, 2, 2}), "box"));
   const Asset other = bake_mesh_only(closed(testing::box_mesh({0, -2, -2}, {2, 2, 2}), "box"));
   PenetrationSettings exact;

@@ -143,7 +143,7 @@ TEST(MassProperties, OfBoxesInClosedForm) {
   }
 }
 
-/// Rounding does not grow with the triangles, nor with what is hollow.
+/// Rounding does not grow with the triangles, nor with cavities.
 TEST(MassProperties, OfPolyhedraByAnotherFormula) {
   TriangleMesh off_centre = testing::torus_mesh(2, 0.5, 120, 60);
   const Matrix3d turn = Eigen::AngleAxisd(0.7, Vector3d(1, 2, 3).normalized()).toRotationMatrix();

@@ -100,7 +100,7 @@ void expect_same(const std::vector<Sphere>& a, const std::vector<Sphere>& b) {
 
 ClosedMesh sample_mesh(const char* name) { return close_mesh(make_sample(name), name); }
 
-/// A cube: most of what is compared in it is equal.
+/// A cube: most comparisons in it are ties.
 ClosedMesh cube_mesh() {
   ClosedMesh cube;
   cube.name = "cube";
@@ -196,7 +196,7 @@ TEST(PackingOrder, ATeamOfLanesDoesWhatOneThreadDoes) {
 }
 
 TEST(PackingOrder, AFullSampleKeepsTheNearestOfAnyOrder) {
-  // More spheres within the window than there is room for.
+  // More spheres within the window than fit.
   std::mt19937 random(3);
   std::uniform_real_distribution<float> unit(-1, 1);
   for (int round = 0; round < 20; ++round) {

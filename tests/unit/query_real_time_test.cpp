@@ -1,4 +1,4 @@
-// Nothing inside a query may wait: every way to the heap, to a lock and to the system is trapped
+// Nothing inside a query may wait: every path to the heap, to a lock and to the system is trapped
 // while queries of all kinds run, and every trap is shown to spring.
 #include <gtest/gtest.h>
 #include <ist/bake.h>
@@ -154,7 +154,7 @@ class RealTime : public ::testing::Test {
   ~RealTime() override { ist_workspace_release(&c_workspace_); }
 };
 
-// The first one, so that a process's first query is among what it looks at.
+// The first one, so that it covers a process's first query.
 TEST_F(RealTime, QueriesMakeNoSystemCall) {
   if (!testing::kTrapsWork) GTEST_SKIP() << "the sanitizer owns the traps";
   const auto all = [&] {

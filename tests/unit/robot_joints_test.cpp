@@ -13,7 +13,7 @@
 #include "robots/description/self_collision.h"
 #include "support/temp_file.h"
 
-// Joints, and what a planner is told about links that touch each other.
+// Joints, and the planner's data about links that touch each other.
 
 namespace ist::testing {
 namespace {
@@ -269,7 +269,7 @@ TEST(SelfCollision, TheDefaultPoseIsFree) {
   wanted.positions.clear();
   EXPECT_EQ(study(robot.robot, robot.links, 0.45, wanted).pose.from, "ready");
 
-  // Nothing is free: that is told.
+  // No pose is free: this is reported.
   wanted.states.clear();
   wanted.positions = {{0, 0}, {1, 0}};
   self = study(robot.robot, robot.links, 0.45, wanted);
