@@ -24,7 +24,7 @@ class DeviceGuard {
 /// backend; not shared by threads. Its device must be current (DeviceGuard) wherever it is used.
 class Queue {
  public:
-  /// `waits`: this queue's work precedes that of other queues, if the stream is its own. Throws
+  /// `waits`: the work of other queues takes precedence, if the stream is this queue's own. Throws
   /// Error if the device cannot be used.
   explicit Queue(const GpuSettings& settings, bool waits = false);
   ~Queue();

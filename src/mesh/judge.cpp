@@ -32,9 +32,8 @@ Eigen::Vector3d cube_point(std::size_t i) {
 }
 
 struct VolumeSums {
-  double agreed = 0, all = 0;  ///< Σ w in the solid; points there, and other points with w ≥ ½
-  double solid = 0,
-         wound = 0;  ///< points in the solid and with w ≥ ½ (each counted if the other is ≥ ½)
+  double agreed = 0, all = 0;   ///< Σ w in the solid; points in either set
+  double solid = 0, wound = 0;  ///< points in the solid; points with w ≥ ½
 };
 
 VolumeSums operator+(const VolumeSums& a, const VolumeSums& b) {

@@ -201,7 +201,7 @@ class MeshGapSearch {
       const double least = measure(pair.a, pair.b, std::sqrt(pair.squared));
       if (keep_ != nullptr && least <= limit_)
         keep(std::uint64_t{pair.a} << 32 | pair.b, kept_least(least));
-      // Measures a few pairs only when eight are full.
+      // A few pairs stay pending until eight are full.
       if (scratch_.pairs->count > kFew) measure_added();
     } else if (single_) {
       open(pair, single_a_, single_b_);

@@ -61,7 +61,7 @@ struct NearestTriangles {
   static constexpr std::uint64_t kNone = ~std::uint64_t{0};
 
   double rounding;                            ///< of a distance
-  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to `alike`, distances equal `least`
+  double least = HUGE_VAL, alike = HUGE_VAL;  ///< squared; up to `alike` all count as equal
   double squared = HUGE_VAL;
   std::uint64_t pair = kNone;            ///< A's << 32 | B's
   exact::Point on_a = {}, between = {};  ///< from there to B's

@@ -59,8 +59,7 @@ IST_HD inline std::uint32_t power_from(std::uint32_t n) {
 /// - load(at), store(at, to), add(at, by), exchange(at, to), replace(at, from, to), least(at, x),
 ///   most(at, x): atomic accesses. add(), exchange() and replace() return the value before
 /// - mesh(side), memory(), pieces(), whole(): PartMemory, PieceMemory, the whole's ExactSums
-/// - crossings(), triangle(side, i), end_of(i, e), share_of_edge(i, e), place_of(i, e): crossings
-/// in the
+/// - crossings(), triangle(side, i), end_of(i, e), share_of_edge(i, e), place_of(i, e): in the
 ///   order of the meshes; an end's position on its edge, 0 to 1, and its place from the origin
 /// - first_record(side), end_record(side), side_of(r), record_of(side, block): crossed blocks,
 ///   those of a side among these numbers

@@ -380,7 +380,7 @@ class OverlapOctants : public OverlapParts<Overlap> {
   }
 
   /// Appends the octants of a part. Returns the new number; `first` if they do not sum to the part,
-  /// as if rounding exceeds it.
+  /// for example if rounding exceeds it.
   IST_HD std::uint32_t write_octants(const ExactPart& part, double small, double near,
                                      std::uint32_t first) noexcept {
     const auto in_frame = [&](const Point& v) {
