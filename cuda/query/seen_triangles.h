@@ -7,7 +7,7 @@
 
 namespace ist::gpu {
 
-constexpr int kSeen = 32;  ///< triangles looked at together, a bit each
+constexpr int kSeen = 32;  ///< triangles tested together, a bit each
 
 /// The error of lengths, relative to the reach within which triangles are staged.
 constexpr float kSeenTolerance = 1e-5f;

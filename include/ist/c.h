@@ -274,7 +274,7 @@ typedef struct ist_shape_sample {
   double gradient[3]; /* of the distance: outward */
 } ist_shape_sample_t;
 
-/* A plain view: what it points to must outlive its use. */
+/* A plain view: its memory must outlive its use. */
 typedef struct ist_shape {
   uint32_t size;
   ist_shape_kind_t kind;

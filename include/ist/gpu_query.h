@@ -118,7 +118,7 @@ struct GpuPenetrationSettings {
 /// CPU's, or 1e-15 of the asset's size³ if that is more; gradients likewise. node_visits counts
 /// opened nodes of the asset.
 ///
-/// Measure::exact, of two assets that keep their meshes: the true volume as penetration() has it,
+/// Measure::exact, of two assets with meshes: the true volume as in penetration(),
 /// within 1e-12 of the smaller solid's size³, force and torque likewise, between volume_min and
 /// volume_max, at any pose, flush, coaxial and copied ones too. sphere_pairs counts crossing
 /// triangles. Solids that touch have a volume of 0, `touching`, contact_area and contact_normal, as

@@ -86,7 +86,7 @@ struct PairAlgorithm::State {
       : meeting(first, second, &world) {}
 
   // A step of a pair that stays apart reads only these, which share few cache lines.
-  btTransform second_in_first;  // when last asked
+  btTransform second_in_first;  // at the last query
   double still = -1;            // [u] the answer is valid until a point has moved by more than this
   bool apart = true;            // it has no points
   bool has_before = false;

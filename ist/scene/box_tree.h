@@ -160,8 +160,8 @@ class BoxTree {
     if (2 * added_ > leaves_) build();
   }
 
-  /// visit(body) of the leaves below the boxes that enter(box) lets in; it may be asked again of a
-  /// box.
+  /// visit(body) of the leaves below the boxes that enter(box) lets in; it may be called again for
+  /// a box.
   template <class Enter, class Visit>
   void each(const Enter& enter, const Visit& visit) const noexcept {
     visit_lanes(
@@ -179,7 +179,7 @@ class BoxTree {
     visit_lanes([&](const BoxNode& node) { return node.meeting(box); }, visit);
   }
   /// visit(k, body) of the leaves whose boxes meet the k-th. Nodes of one box are fetched while
-  /// those of others are looked at: a large hierarchy is not in the cache.
+  /// those of others are examined: a large hierarchy is not in the cache.
   template <class Visit>
   void each_meeting(std::span<const SceneBox> boxes, const Visit& visit) const noexcept {
     if (root_ == kNone) return;

@@ -10,7 +10,8 @@
 
 #include "scene/scene_impl.h"
 
-// Converts a scene before a step to bytes and back: pass() lists once what is written and read.
+// Converts a scene before a step to bytes and back: pass() lists once the members to write and
+// read.
 
 namespace ist {
 namespace {

@@ -17,7 +17,7 @@ import ist
 __all__ = ["CollisionManager", "ContactData", "DistanceData", "scene_to_collision"]
 
 _ASIDE, _WAY = 1e-9, np.array([0.36, 0.48, 0.8])  # of an object's size, and where to
-_FIRST = 16  # distances that are asked first: the best of them bounds the others
+_FIRST = 16  # distances that are queried first: the best of them bounds the others
 
 
 class _Data:

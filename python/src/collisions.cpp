@@ -9,7 +9,7 @@
 #include "query/find_solid_box.h"
 #include "query/kernel/lens.h"
 
-// What ist.trimesh asks of many pairs at every call.
+// Queries of many pairs that ist.trimesh makes at every call.
 
 namespace ist::python {
 namespace {

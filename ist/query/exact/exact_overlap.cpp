@@ -257,7 +257,7 @@ ExactOverlap ExactQuery::run(std::uint32_t max_visits, std::uint32_t pair_id) no
       out_.complete = false;
       return out_;
     }
-  // All of small meshes at once instead of line after line, first what is read first.
+  // Prefetches all of small meshes at once, in reading order, instead of line after line.
   for (const Side& side : sides_)
     if (side.mesh.top == 1) prefetch(side.mesh.level[1].boxes, side.mesh.level[1].boxes + 1);
   for (const Side& side : sides_)

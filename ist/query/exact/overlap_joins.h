@@ -7,7 +7,7 @@
 #include "query/exact/exact_sums.h"
 #include "query/exact/mesh_tree.h"
 
-// Joins what is connected in an overlap, on the host and on a GPU.
+// Joins the connected elements of an overlap, on the host and on a GPU.
 
 namespace ist {
 
@@ -254,7 +254,7 @@ class OverlapJoins : public Overlap {
     }
   }
 
-  /// Joins a curve that is in one triangle and surrounds what is outside to the narrowest curve
+  /// Joins a curve that is in one triangle and surrounds an outside region to the narrowest curve
   /// around it there, or to the triangle's corners.
   IST_HD void join_holes(int side) noexcept {
     CurveExtent* const curves = memory().curves;

@@ -32,7 +32,7 @@ typedef struct desk {
   ist_impact_t impact;
   ist_size_match_t fit;
   ist_wrenches_t wrenches;
-  double numbers[8]; /* of whatever is asked */
+  double numbers[8]; /* of any query */
   ist_workspace_t workspace;
 } desk_t;
 extern desk_t desk;

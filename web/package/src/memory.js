@@ -167,7 +167,7 @@ export function describe(status) {
   return new TextDecoder().decode(memory.subarray(start, memory.indexOf(0, start)));
 }
 
-/** Throws if `status` is an error; `what` was asked or read. */
+/** Throws if `status` is an error; `what`: the query or the object read. */
 export function check(status, what) {
   if (status < 0) throw new IstError(`ist: ${what}: ${describe(status)}`, status);
 }

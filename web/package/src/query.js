@@ -22,8 +22,8 @@ function assetsOf(a, b, query, what) {
 }
 
 /**
- * Puts a question on the desk and asks it: `question` names an export. Returns the status, no
- * error.
+ * Writes a query to the desk and runs it: `question` names an export. Returns the status, which is
+ * no error.
  */
 export function ask(question, who, a, b, poseB, options, more) {
   const wasm = functions(who);

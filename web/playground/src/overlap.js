@@ -10,7 +10,7 @@ import {kIsInside} from './columns.js';
 import {colour} from './theme.js';
 
 const kLineWidth = 1.5;  // [px]
-/** Of a solid's radius: points of its surface are looked at so far below, lest flush faces flicker. */
+/** Share of a solid's radius: surface points are tested this far below, so that flush faces do not flicker. */
 const kBelow = 1e-4;
 
 export class Overlap {

@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 
 export class Player {
-  /** The form with its button, slider and output; `facts`: a list for what is known of a scene. */
+  /** The form with its button, slider and output; `facts`: a list for a scene's properties. */
   constructor({form, play, moment, told, facts, leave}, onLeave) {
     Object.assign(this, {form, play, moment, told, facts});
     play.onclick = () => this.setPlaying(!this.playing);

@@ -33,7 +33,7 @@ export class Told {
     this.stale = true;
   }
 
-  /** Every frame: writes what is due. */
+  /** Every frame: writes due readouts. */
   tick(now) {
     if (this.stale && now - this.written >= kOften) this.write(now);
     if (this.contact && !this.said && now - this.changed > kCalm) {

@@ -15,8 +15,8 @@ const kMargin = 0.05;
 
 export class Tray extends Hand {
   /**
-   * `on`: what to call when the scene was asked (`asked`), when a step's time was taken (`timed`),
-   * when a visitor moved a part (`moved`) and when one was taken in hand (`taken`).
+   * `on`: callbacks after a query of the scene (`asked`), after a step was timed (`timed`), after a
+   * visitor moved a part (`moved`), and after one was taken in hand (`taken`).
    */
   constructor(view, on) {
     super(view, on);

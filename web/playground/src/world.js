@@ -11,8 +11,8 @@ import {colour} from './theme.js';
 
 export class World extends Hand {
   /**
-   * `on`: what to call when a contact was asked (`asked`), when its times were taken (`timed`),
-   * when a visitor moved B (`moved`) and when B was let go or held (`held`).
+   * `on`: callbacks after a query of a contact (`asked`), after it was timed (`timed`), after a
+   * visitor moved B (`moved`), and after B was let go or held (`held`).
    */
   constructor(view, on) {
     super(view, on);
