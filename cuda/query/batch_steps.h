@@ -157,7 +157,6 @@ IST_HD inline void list_pair(const BatchArrays& batch, std::uint32_t i, std::uin
   batch.list[std::uint64_t{size} * batch.size_capacity + at] = i;
 }
 
-/// The k-th listed pair.
 IST_HD inline std::uint32_t listed_pair(const BatchArrays& batch, std::uint32_t k) {
   if (batch.size_capacity == 0) return batch.list[k];
   std::uint32_t size = 0;
@@ -325,7 +324,6 @@ IST_HD inline int look_for_task(const BatchArrays& batch, std::uint32_t k, std::
   return k < tasks && k < batch.task_capacity ? -1 : 0;
 }
 
-/// A pair of the list and its place.
 struct PlacedPair {
   PairPlace place;
   std::uint32_t pair;  ///< in the batch

@@ -22,7 +22,6 @@ IST_HD constexpr std::size_t exact_bytes(int pass) {
   return pass == 0 ? 80u << 10 : pass == 1 ? 512u << 10 : 16u << 20;
 }
 
-/// The state of a pair.
 enum class ExactState : std::uint32_t {
   ok,
   nothing,        ///< answered, but the volume may be 0: do the solids touch?

@@ -14,7 +14,6 @@
 
 namespace ist::gpu {
 
-/// Two triangles that cross.
 struct CrossingRef {
   exact::Point from[2], offset[2];  ///< of an end (exact::EdgeEnd)
   double share[2];            ///< the end's position on the edge, from its first corner: 0 to 1
@@ -268,7 +267,6 @@ class OverlapRef {
   }
 
  private:
-  /// Calls work(l) for `count` pieces.
   template <class Work>
   IST_HD void for_each_lane(std::uint32_t count, const Work& work) {
     for (std::uint32_t l = lane(); l < count; l += width()) work(l);

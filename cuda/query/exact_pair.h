@@ -10,7 +10,6 @@
 
 namespace ist::gpu {
 
-/// The signs that decide a pair.
 enum class Signs {
   doubles,
   settled,  ///< doubles that stay the same wherever points move within the tolerance

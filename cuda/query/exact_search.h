@@ -146,7 +146,6 @@ class WaitingTriangles {
   std::uint32_t head_ = 0, count_ = 0;
 };
 
-/// Empties the lists of found triangles.
 template <class Team>
 IST_HD void begin_sifting(const Team& team, ExactSearchMemory& memory, const ExactPool& pool) {
   if (team.lane() != 0) return;

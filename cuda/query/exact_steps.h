@@ -237,7 +237,6 @@ IST_HD inline void leave_to_next(const ExactArrays& batch, int pass, std::uint32
     write_nothing(batch.answers, i, QueryStatus::budget_exhausted);
 }
 
-/// The counters of the n-th round.
 IST_HD inline ExactRound& round_of(const ExactArrays& batch, std::uint32_t n) {
   return batch.counters->round[n % 2];
 }
@@ -291,7 +290,6 @@ IST_HD void end_search(const Team& team, const ExactArrays& batch, ExactRound& r
   atomic_add(&round.found, 1);
 }
 
-/// Searches the k-th pair of a round.
 template <class Team>
 IST_HD void search_query(const Team& team, const ExactArrays& batch, ExactRound& round,
                          std::uint32_t k, ExactPair& pair, ExactSearchMemory& memory) {

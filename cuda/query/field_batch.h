@@ -31,7 +31,6 @@ struct FieldCounters {
 
 constexpr std::uint32_t kNoPart = ~0u;
 
-/// A pair of a round.
 struct TriangleQuery {
   PairPlace place;
   LensTotals walked;  ///< sums of balls that no triangle intersects
@@ -49,7 +48,6 @@ struct MetPart {
   LensTotals totals;
 };
 
-/// The memory of a round.
 struct TriangleWorkspace {
   TriangleQuery* queries;
   MetPart* parts;
@@ -69,7 +67,6 @@ IST_HD inline std::uint32_t& listed_pair(const FieldBatch& batch, int group, std
   return batch.list[group == kSmooth ? 0 : 1][k];
 }
 
-/// The sides of pair i.
 struct FieldSides {
   GpuPlacedSolids field, tree;
   bool turned;  ///< the field is B

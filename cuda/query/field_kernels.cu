@@ -15,7 +15,6 @@ constexpr unsigned kWholeWarps = 3;
 constexpr unsigned kWholeThreads = 32 * kWholeWarps;
 constexpr int kWholeBlocksEach = 4;  ///< 168 a thread
 
-/// Begins round n.
 __global__ void __launch_bounds__(kThreadsEach)
     place_queries(const FieldBatch batch, const std::uint32_t n) {
   const std::uint32_t first = end_of(batch, round_of(batch, n + 1));

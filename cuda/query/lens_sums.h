@@ -54,7 +54,6 @@ enum Term {
   kTerms = 10
 };
 
-/// A ball of a lens.
 struct LensBall {
   double at[3], r;
 };
@@ -126,7 +125,6 @@ IST_HD constexpr int power_of(int term) {
   return term < kForce ? 3 : term < kTorque ? 2 : term < kMoment ? 3 : 4;
 }
 
-/// A factor to the power of a term.
 IST_HD inline double term_factor(double factor, int term) {
   double out = factor * factor;
   for (int p = power_of(term); p > 2; --p) out *= factor;

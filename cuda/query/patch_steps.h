@@ -394,7 +394,6 @@ class PatchWriter {
   double deepest_;  ///< [u] of any patch
 };
 
-/// Sums pair i and divides it.
 template <class Team>
 IST_HD void patch_pair(const Team& team, const PatchArrays& batch, std::uint32_t i,
                        const PatchWorkspace& work, PatchMemory& memory) {

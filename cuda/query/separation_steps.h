@@ -19,7 +19,6 @@ namespace ist::gpu {
 // The steps of distances of a batch's meshes, for the threads and warps of kernels and for tests on
 // the host. Answers are those of SurfaceGap (query/separation.cpp).
 
-/// The placed solid that is A or B in the query.
 IST_HD inline const GpuPlacedSolids& side_of(const SolidPairs& batch, const MeshGapQuery& query,
                                              int side) {
   return (side == 0) == (query.swapped == 0) ? batch.pairs.a : batch.pairs.b;
@@ -38,7 +37,6 @@ IST_HD inline SeparationRow farther_row(double most) {
   return row;
 }
 
-/// The counters of the n-th round.
 IST_HD inline MeshGapRound& round_of(const MeshGapArrays& meshes, std::uint32_t n) {
   return meshes.rounds[n % 2];
 }
@@ -318,7 +316,6 @@ IST_HD inline int sift_separation(const SeparationArrays& batch, std::uint32_t i
   return precision == Precision::float32 ? 0 : 1;
 }
 
-/// Loads pair i into memory.
 template <class Team, class Real>
 IST_HD void load_separation(const Team& team, const SeparationArrays& batch, std::uint32_t i,
                             GapMemory<Real>& memory) {

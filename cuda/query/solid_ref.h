@@ -84,7 +84,6 @@ struct CutsRef {
   int shift;  ///< a sphere's number >> shift is its bin
 };
 
-/// A matched tree at a level of detail.
 struct DetailRef {
   TreeRef tree;
   LevelCost level;

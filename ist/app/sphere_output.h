@@ -29,7 +29,6 @@ struct ClosePair {
   std::size_t spheres;  ///< approximate number of both together
 };
 
-/// Input and result of `ist spheres`.
 struct SphereRobot {
   std::string name, input, output;  ///< of the robot or the mesh; paths
   std::vector<SphereLink> links;    ///< those with shapes
@@ -53,7 +52,6 @@ struct SphereRobot {
 using SphereWriter = std::string (*)(const SphereRobot&);
 SphereWriter sphere_writer(const std::string& output);
 
-/// The report: a table, or JSON.
 std::string spheres_table(const SphereRobot& robot, const std::string& output, double seconds);
 std::string spheres_report_json(const SphereRobot& robot, const std::string& output,
                                 double seconds);

@@ -167,7 +167,6 @@ document.querySelector('input').oninput = event => rows.forEach(row => {
 });
 </script>)";
 
-/// Links to the other pages, for page `page`.
 std::string links_of_pages(const std::vector<std::string>& files, std::size_t page) {
   std::string out;
   for (std::size_t i = 0; i < files.size() && files.size() > 1; ++i) {

@@ -47,7 +47,6 @@ class Meeting {
   double thickness_of(const Settings& settings) const;  ///< [u] Settings::thickness, or its default
   /// For overlapping solids: true if one is wholly inside the other, with the shortest exit.
   bool find_way_out(const Solids& solids, const Places& at, Contact& contact) const;
-  /// The solids at the beginning of a motion.
   Solids placed(const Places& from, const Places& to, const Settings& settings) const;
   /// The first impact of a motion of both bodies in a time of 1.
   TimeOfImpact impact(const Places& from, const Places& to, const Places& in_body,

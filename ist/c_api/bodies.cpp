@@ -77,7 +77,6 @@ ist_status_t find_wrenches(const Contact* contact, const ist_pose_t* b, const do
   return IST_OK;
 }
 
-/// A C++ contact with this wrench.
 Penetration with_wrench(const Wrench& on_b) noexcept {
   Penetration contact;
   contact.force = on_b.force;

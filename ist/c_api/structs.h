@@ -138,7 +138,6 @@ static_assert(offsetof(ist_contact_patch_t, torque) == offsetof(ContactPatch, to
 static_assert(offsetof(ist_contact_patch_t, point) == offsetof(ContactPatch, point));
 static_assert(offsetof(ist_contact_patch_t, torsion) == offsetof(ContactPatch, torsion));
 
-// Segments of outlines, too.
 static_assert(std::is_standard_layout_v<OutlineSegment>);
 static_assert(sizeof(ist_outline_segment_t) == sizeof(OutlineSegment));
 static_assert(offsetof(ist_outline_segment_t, from) == offsetof(OutlineSegment, from));

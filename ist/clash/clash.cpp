@@ -337,7 +337,6 @@ class PairQuery {
     return whole;
   }
 
-  /// The overlap after B has moved.
   Penetration aside(const Vector3d& by) {
     return penetration(a_.part.solid, moved(by), kExactly, scratch_.workspace);
   }

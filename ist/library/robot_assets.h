@@ -10,7 +10,6 @@
 
 namespace ist {
 
-/// How a robot's description is read.
 struct RobotOptions {
   std::map<std::string, std::string> packages;  ///< folders by package
   bool visual = false;

@@ -141,7 +141,6 @@ class MeshOverlap : public ExactQuery {
   PartMemory memory_ = scratch_.part_memory();
 };
 
-/// An overlap, its connected parts and their octants.
 class ExactParts : public OverlapOctants<MeshOverlap> {
  public:
   using OverlapOctants::OverlapOctants;

@@ -174,7 +174,6 @@ bool finds_sphere_around(const SphereTree& tree, const Eigen::Vector3d& point, d
   return false;
 }
 
-/// The inner spheres of two solids.
 class InnerSpheres {
  public:
   InnerSpheres(const PlacedAsset& a, const PlacedAsset& b, const RelativePose& pose)

@@ -51,7 +51,6 @@ using Floats = Array<float>;
 Doubles take_doubles(const py::handle& value, const std::string& name, const std::string& wanted);
 Floats take_floats(const py::handle& value, const std::string& name, const std::string& wanted);
 
-/// Integers, likewise.
 Integers take_integers(const py::handle& value, const std::string& name, const std::string& wanted);
 
 /// "(3, 7)"

@@ -22,7 +22,6 @@ inline constexpr ElementType kInt32 = py::dtype<std::int32_t>();
 inline constexpr ElementType kUInt64 = py::dtype<std::uint64_t>();
 inline constexpr ElementType kInt64 = py::dtype<std::int64_t>();
 
-/// The requirements for an argument.
 struct WantedArray {
   std::string name;                       ///< of the argument, for messages
   std::vector<ElementType> types;         ///< any of them

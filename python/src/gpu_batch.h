@@ -44,7 +44,6 @@ struct DeviceColumn {
   bool unasked() const { return name != "node_visits" && name != "sphere_pairs"; }
 };
 
-/// The columns of a kind of answers.
 template <class Answers>
 std::vector<DeviceColumn>& columns_of() {
   static std::vector<DeviceColumn> all;
@@ -144,7 +143,6 @@ class PairArguments {
   std::vector<std::unique_ptr<cuda::Repeated>> repeated_;  // until the batch is launched
 };
 
-/// The set of wanted columns.
 template <class Answers>
 std::vector<bool> wanted_columns(const py::object& wanted) {
   std::vector<bool> asked;
@@ -202,7 +200,6 @@ DevicePlaces<Answers> new_columns(const Answers& blank, const std::vector<bool>&
   return places;
 }
 
-/// The given arrays.
 template <class Answers>
 DevicePlaces<Answers> given_columns(const Answers& blank, const py::object& out, std::size_t count,
                                     int device, cuda::Stream stream,

@@ -17,7 +17,6 @@ using namespace std::chrono_literals;
 constexpr auto kLook = 50ms;       // between checks for signals
 constexpr auto kPatience = 100ms;  // for a stage that was told to stop
 
-/// Progress for Python.
 struct CallProgress : Progress {
   double total = 0;
 };

@@ -19,7 +19,6 @@ namespace ist::python {
 
 inline constexpr std::pair<const char*, Measure> kMeasures[] = {
     {"matched", Measure::matched}, {"inner", Measure::inner}, {"exact", Measure::exact}};
-/// The measures by the spheres of an asset.
 inline constexpr std::pair<const char*, Measure> kSphereMeasures[] = {{"matched", Measure::matched},
                                                                       {"inner", Measure::inner}};
 
@@ -28,7 +27,6 @@ ContactSettings contact_settings(const std::string& measure, bool spheres_only,
                                  std::uint32_t pair_budget, std::uint32_t max_visits,
                                  double relative_error, std::uint32_t pair_id);
 
-/// Penetrations as columns.
 struct Penetrations {
   Shape rows;
   Column<double> volume{rows}, volume_min{rows}, volume_max{rows};
@@ -44,7 +42,6 @@ struct Penetrations {
   void write(std::size_t i, const Row& row, const Penetration& answer) const;
 };
 
-/// Separations as columns.
 struct Separations {
   Shape rows;
   Column<double> distance{rows}, distance_min{rows}, distance_max{rows};
@@ -52,7 +49,6 @@ struct Separations {
   Column<std::uint32_t> status{rows}, node_visits{rows}, sphere_pairs{rows};
 };
 
-/// Times of impact as columns.
 struct Impacts {
   Shape rows;
   Column<double> time{rows}, distance_min{rows}, distance_max{rows};

@@ -12,7 +12,6 @@
 
 namespace ist::python {
 
-/// One of the solids of a row.
 struct Side {
   const Solid* solid = nullptr;
   Pose pose;

@@ -33,7 +33,6 @@ struct PyScene {
   std::map<std::uint32_t, py::object> owners;
 };
 
-/// One step's pairs as columns.
 struct SceneAnswers {
   Shape rows;
   Column<std::uint32_t, 2> pairs{rows}, ended{};

@@ -11,7 +11,6 @@
 
 namespace ist::python {
 
-/// ist.Solids.
 struct Solids {
   Solids(const py::sequence& solids, const std::string& device);
 
@@ -42,7 +41,6 @@ struct DeviceSides {
 /// Refuses one solid on a device and the other elsewhere.
 DeviceSides device_sides(const py::object& a, const py::object& b);
 
-/// The classes of both.
 void add_solid_rows(py::module_& module);
 
 }  // namespace ist::python

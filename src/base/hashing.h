@@ -26,7 +26,6 @@ inline std::uint64_t spread_bits(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249u;
 }
 
-/// Hash of a point's bits.
 IST_HD inline std::uint32_t point_hash(Float3 point, std::uint64_t seed) {
   std::uint64_t hash = mixed(seed + 0x9E3779B97F4A7C15ull);
   hash = mixed(hash ^ (bits_of(point.x) | std::uint64_t{bits_of(point.y)} << 32));

@@ -12,7 +12,6 @@
 
 namespace ist {
 
-/// Closest point of a triangle mesh.
 struct ClosestPoint {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< unit frame
   double distance = 0;                              ///< unit frame, ≥ 0

@@ -83,7 +83,6 @@ void look_along(const std::vector<std::array<double, 3>>& points,
       }
 }
 
-/// The vertices in the unit frame of the triangles.
 std::vector<Eigen::Vector3d> unit_vertices(const TriangleMesh& soup) {
   const UnitFrame frame = unit_frame(bounds_of(soup.vertices, soup.triangles));
   const double scale = frame.scale();

@@ -116,7 +116,6 @@ class Sampler {
  public:
   Sampler(const Wrap& wrap, DistanceGrid& grid) : wrap_(wrap), grid_(grid) {}
 
-  /// Fills all points in [first, first + size).
   void fill(const std::array<std::uint32_t, 3>& first, std::uint32_t size) const {
     for (std::size_t k = 0; k < 3; ++k)
       if (first[k] >= grid_.size[k]) return;

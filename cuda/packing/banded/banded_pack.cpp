@@ -30,7 +30,6 @@ class Watch {
 
   Mailbox* mailbox() const { return mailbox_; }
 
-  /// Waits for the queue's work.
   void wait(Queue& queue) {
     if (mailbox_ == nullptr) return queue.wait();
     for (;;) {

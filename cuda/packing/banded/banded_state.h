@@ -9,7 +9,6 @@
 
 namespace ist::gpu {
 
-/// A candidate in a chain of its bucket.
 struct alignas(16) BucketNode {
   packing::Candidate candidate;
   std::uint32_t cell;

@@ -51,7 +51,6 @@ class BlockTeam {
     return earlier + before;
   }
 
-  /// The value of lane `from`.
   __device__ std::uint32_t broadcast(std::uint32_t value, int from) const {
     if (lane() == from) shared_.words[0] = value;
     __syncthreads();
@@ -84,7 +83,6 @@ struct PowerTask {
   std::uint32_t first, count;
 };
 
-/// Device memory of one round.
 struct PowerRound {
   PowerGrid grid;
   const PowerSite* sites;
@@ -239,7 +237,6 @@ __global__ void __launch_bounds__(kThreads) look_into_cells(PowerRound round, in
   }
 }
 
-/// The sums' total length.
 __global__ void __launch_bounds__(kThreads)
     sum_lengths(const PowerSums* sums, std::uint32_t count, unsigned long long* total) {
   const std::uint32_t k = blockIdx.x * kThreads + threadIdx.x;

@@ -87,7 +87,6 @@ struct Extent {
   }
 };
 
-/// The extent of the warp's points.
 __device__ Extent extent_of_warp(const WarpTeam& warp, bool present, const float point[3]) {
   Extent extent;
   for (int k = 0; k < 3; ++k) {

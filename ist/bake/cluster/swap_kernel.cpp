@@ -187,7 +187,6 @@ class SwapSearch {
   double gain(double cost_a, double cost_b) const { return now_ - cost_a - cost_b; }
   bool gains(double cost_a, double cost_b) const { return gain(cost_a, cost_b) > best_.gain; }
 
-  /// One bit a lane.
   std::uint32_t gaining(const LaneValues& costs_a, const LaneValues& costs_b) const {
     const BallTag d;
     std::uint32_t bits = 0;

@@ -275,7 +275,6 @@ std::optional<SettingFault> idle_setting(const PackingSettings& settings,
   return std::nullopt;
 }
 
-/// The fault of a packing setting for a mesh-only bake.
 std::optional<SettingFault> mesh_only_fault(const BakeSettings& settings,
                                             const std::set<std::string>& own,
                                             const std::string& prefix) {

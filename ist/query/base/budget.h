@@ -8,7 +8,6 @@
 
 namespace ist {
 
-/// The limits of a traversal.
 struct DescentLimits {
   static constexpr std::uint32_t kNoLimit = ~0u;
 

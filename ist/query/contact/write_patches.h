@@ -7,7 +7,6 @@
 
 namespace ist {
 
-/// The filled bins of a contact.
 struct Binned {
   ContactBins& bins;
   std::uint32_t filled;

@@ -38,7 +38,6 @@ HWY_INLINE Vec3 all_lanes(const exact::Point& x) {
   return {hn::Set(d, x.x), hn::Set(d, x.y), hn::Set(d, x.z)};
 }
 
-/// The plane of a triangle.
 struct SeenPlane {
   Vec3 at, normal;
 
@@ -107,7 +106,6 @@ HWY_INLINE std::uint32_t beyond_edges_of(const PlacedPlanes& planes, std::uint32
   return out;
 }
 
-/// The planes of a block.
 inline const PlacedPlanes& placed_planes(const MeshTree& tree, std::uint32_t number,
                                          const Similarity* map, PlacedMesh& kept) {
   const auto [found, held] = kept.planes.find(number);

@@ -3,7 +3,6 @@
 // its numbers: V, lanes of numbers T or a single one, with set(), magnitude(), lesser(), greater()
 // and all().
 
-/// A box and its slab.
 template <class V>
 struct LaneBox {
   V low[3], high[3], normal[3], slab_low, slab_high;

@@ -44,7 +44,6 @@ struct SurfaceContact {
   exact::Point moment = {};  ///< ∫ x dA over them
 };
 
-/// Finds the pairs of blocks.
 BlockPairs find_block_pairs(const CrossingSearch& search, ExactScratch& scratch) noexcept;
 
 /// Finds all crossing triangles of `count` pairs of blocks (ExactScratch::keys), in the order of

@@ -62,7 +62,6 @@ class ExactQuery {
   CrossedBlock& crossed_block(Side& side, std::uint32_t triangle) noexcept {
     return side.marks.blocks[side.marks.place[triangle / kWidth]];
   }
-  /// The edge of a triangle that is opposite to its apex.
   static std::uint32_t opposite_edge(const CrossedBlock& crossed, std::uint32_t triangle) noexcept {
     return 9u >> 2 * crossed.apex[triangle] & 3;  // the next one, without a branch
   }

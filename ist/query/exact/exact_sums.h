@@ -80,7 +80,6 @@ struct CurveExtent {
   exact::Point area;       ///< twice the vector area that it encloses
 };
 
-/// The working memory of parts and octants.
 struct PartMemory {
   static constexpr std::uint32_t kMostParts = 1024;
   static constexpr std::uint32_t kMostSplit = 64;  ///< parts that are divided into octants
@@ -117,7 +116,6 @@ struct alignas(64) OctantPieces {
   std::uint8_t octant[6][8];  ///< a bit an axis: the corner's coordinate is not less than 0
   std::uint8_t of_b[4][8];    ///< the triangle is of B's surface
 
-  /// Corner k of a triangle.
   IST_HD int corner(int triangle, int k, std::uint32_t lane) const noexcept {
     if (k == 0) return of_b[triangle][lane];
     return triangle < 2 ? kEnd + (k == 1 ? triangle : 1 - triangle)

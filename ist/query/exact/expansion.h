@@ -94,7 +94,6 @@ IST_HD inline Expansion<kA + kB> sum(const Expansion<kA>& a, const Expansion<kB>
   add_parts(a, b, factor, [&](double part) { out.part[out.count++] = part; });
   return out;
 }
-/// The sign of the sum alone.
 template <int kA, int kB>
 IST_HD inline int sign_of_sum(const Expansion<kA>& a, const Expansion<kB>& b, double factor) {
   double largest = 0;
@@ -122,7 +121,6 @@ IST_HD inline Expansion<2 * kA> scaled(const Expansion<kA>& a, double b) {
   return out;
 }
 
-/// a − b of two doubles.
 IST_HD inline Expansion<2> difference(double a, double b) {
   Expansion<2> out;
   double high, low;

@@ -53,7 +53,6 @@ struct FlatTriangle {
         squared_normal(dot(normal, normal)) {}
 };
 
-/// The nearest point of a triangle.
 inline Point nearest_on_triangle(const Point& p, const FlatTriangle& t) noexcept {
   double weight[3];
   bool inside = t.squared_normal > 0;

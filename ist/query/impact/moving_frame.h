@@ -61,7 +61,6 @@ struct MovingFrame {
   }
 };
 
-/// Both bodies at a time.
 struct Placement {
   double time = -1;
   Eigen::Matrix3d a, b;     ///< unit · R

@@ -86,7 +86,6 @@ struct LevelQueries {
     return coincidence_weight(tree.root, tree.mean_radius, pose.a_from_b);
   }
 
-  /// The answer with the counts of all queries.
   Penetration with_counts(Penetration answer) const noexcept {
     answer.node_visits = visits;
     answer.sphere_pairs = pairs;
@@ -172,7 +171,6 @@ Penetration stopped_blend(LevelQueries& queries, const LevelChain& chain,
   return result;
 }
 
-/// The shares of levels and measures in a blend.
 struct BlendShares {
   WantedError::Shares wanted;        ///< by errors; none of the exact measure if it can't answer
   LevelChain::Weights weights = {};  ///< of levels, as far as the pair budget affords `wanted`
@@ -337,7 +335,6 @@ Penetration blend_levels(const PlacedAsset& a, const PlacedAsset& b, const Relat
   const bool with_error = by_error(settings);
   if (!with_error && settings.pair_budget == 0) return queries.ask(LevelPair(), true);
   const LevelChain chain(a.asset.header(), b.asset.header(), pose.a_from_b.scale);
-  // There is one level.
   if (!with_error && chain.size() == 1) return queries.ask(chain[0], true);
   LevelWeight sure = {};
   if (!with_error) {

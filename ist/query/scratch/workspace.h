@@ -16,7 +16,6 @@
 
 namespace ist {
 
-/// A pair of nodes with the bound by which it is ranked.
 struct RankedPair {
   double bound;
   std::uint32_t a, b;

@@ -54,14 +54,12 @@ class Descent {
 
   void open_leaves();
 
-  /// Sums pairs [from, from + n) of the current list.
   void add_leaves(std::size_t from, std::size_t n);
 
   /// If the current list is longer than the visits left, moves the pairs of the largest bounds to
   /// its front. Both parts stay in order, since neighbours share nodes.
   void choose();
 
-  /// Estimates the pairs of a list from `from` on.
   void estimate_unopened(const PairList& list, std::size_t from);
 
   const SphereTree& a_;

@@ -285,7 +285,6 @@ struct CoverDescent::Balls {
   std::vector<double> radii, trust;
 };
 
-/// All balls at the level of the surface.
 class CoverDescent::Round {
  public:
   Round(const PointGrid& targets, const OffsetSurface& surface, Balls& balls)

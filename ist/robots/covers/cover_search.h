@@ -23,7 +23,6 @@ struct LevelCover {
   double level = 0;                      ///< unit frame
 };
 
-/// A cover at its level, and its balls as examined.
 struct LookedCover {
   LevelCover cover;
   std::vector<CoverSphere> balls;  ///< unit frame

@@ -17,7 +17,6 @@ using Positions = std::vector<double>;
 /// 0 if the joint's limits allow it, else the middle between them.
 Positions default_positions(const RobotModel& robot);
 
-/// The middle of all limits.
 Positions middle_positions(const RobotModel& robot);
 
 /// The frame of the joint's child in its parent's frame.
@@ -31,7 +30,6 @@ std::vector<Eigen::Isometry3d> link_frames(const RobotModel& robot, const Positi
 /// A limb ends before a hand: where it forks into limbs with fewer moving joints than lead there.
 std::vector<std::size_t> tool_links(const RobotModel& robot);
 
-/// Joints from the root to a link.
 std::vector<std::size_t> path_to(const RobotModel& robot, std::size_t link);
 
 /// Free joints of grippers: hands with at most two joints.

@@ -7,7 +7,6 @@
 
 namespace ist {
 
-/// Finds the packages in file names.
 class PackagePaths {
  public:
   /// `urdf`: the robot's file; relative names are relative to its folder. `named`: folders of

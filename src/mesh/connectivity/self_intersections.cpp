@@ -320,7 +320,6 @@ struct Sums {
 
 enum class Look { apart, candidates, met };
 
-/// Examines the candidates of one part.
 template <class LookAt>
 class Visitor {
  public:

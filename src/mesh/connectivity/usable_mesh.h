@@ -35,7 +35,6 @@ inline double area_of(const std::vector<Eigen::Vector3d>& vertices, const Triang
 
 double largest_coordinate(const Eigen::AlignedBox3d& bounds);
 
-/// The spacing of doubles at `size`.
 inline double spacing_at(double size) { return std::ldexp(1.0, std::ilogb(size) - 52); }
 
 /// close_mesh() for a closed surface whose triangles already face outward: flips none. Shells that

@@ -35,7 +35,6 @@ IST_HD inline Real dot3(const Real a[3], const Real b[3]) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// a × b.
 template <class Real>
 IST_HD inline void cross3(const Real a[3], const Real b[3], Real out[3]) {
   for (int k = 0; k < 3; ++k) {

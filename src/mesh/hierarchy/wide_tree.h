@@ -76,7 +76,6 @@ IST_HD constexpr int wide_depth(std::uint32_t block_count) {
   return depth;
 }
 
-/// The float frame of the triangle in a slot.
 IST_HD inline TriangleFrame<float> frame_in(const WideBlock& block, int lane) {
   TriangleFrame<float> f;
   for (int k = 0; k < 3; ++k) {

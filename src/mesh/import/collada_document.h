@@ -39,7 +39,6 @@ class ColladaDocument {
   std::unordered_map<std::string_view, Index> by_id_;
 };
 
-/// Reads the faces of <geometry> elements.
 class ColladaGeometries {
  public:
   explicit ColladaGeometries(const ColladaDocument& document) : document_(document) {}

@@ -30,7 +30,6 @@ class GltfDocument {
   std::size_t most_corners() const { return 12'000'000 + file_.bytes.size(); }
   /// Member `index` of the top-level array `name`; `from`: the referring object, for messages.
   const Json& at(const std::string& name, std::size_t index, const std::string& from) const;
-  /// A nonnegative integer under `key`.
   std::size_t whole(const Json& object, const std::string& key,
                     std::optional<std::size_t> fallback = std::nullopt) const;
   /// Nonnegative integers under `key`; none if it is missing.

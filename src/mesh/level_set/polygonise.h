@@ -67,7 +67,6 @@ void find_loops(SurfaceCell& cell);
 const SurfaceCell* cell_at(const std::vector<SurfaceCell>& cells,
                            const std::array<std::int32_t, 3>& at);
 
-/// A mesh that approximates a solid.
 struct Polygonised {
   /// [u] a closed, oriented surface: every edge is used equally often in both directions
   TriangleMesh mesh;

@@ -53,7 +53,6 @@ struct RoundedPoint {
   Eigen::Vector3d at = Eigen::Vector3d::Zero(), rest = Eigen::Vector3d::Zero();
 };
 
-/// A point for queries.
 struct PointView {
   const RoundedPoint* rounded;
   const ExactPoint* exact;  ///< null: `rounded->at` is exact
@@ -97,7 +96,6 @@ class ExactPoints {
   int turn(int k, std::uint32_t a, std::uint32_t b, std::uint32_t c) const {
     return a == b || b == c || c == a ? 0 : turn(k, view(a), view(b), view(c));
   }
-  /// Sign of a_k − b_k.
   int compare(int k, std::uint32_t a, std::uint32_t b) const;
   /// 1 if p is in front of a triangle of vertices, 0 in its plane.
   int side(const Triangle& given, const PointView& p) const;

@@ -6,7 +6,6 @@
 
 namespace ist::packing {
 
-/// The next step of a band.
 enum class BandStep : std::uint32_t {
   work,     ///< process the cells whose bound reaches the margin
   restart,  ///< drop all cells and begin at the root; spheres and grid stay

@@ -27,7 +27,6 @@ struct Cell {
 /// parent's. Each gives a constraint without a search; a new one replaces the oldest.
 constexpr int kRingCapacity = 8;
 
-/// A cell as stored.
 template <class Feature>
 struct StoredCell {
   Cell cell;

@@ -33,7 +33,6 @@ class FieldSurface {
     return {feature, static_cast<float>(std::fabs(s)), true};
   }
 
-  /// The offset of x from a remembered feature.
   FeatureOffset offset(const Feature& feature, Float3 x) const {
     return ball_offset(feature.centre, feature.radius, kSurfaceTag, x);
   }

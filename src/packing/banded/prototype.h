@@ -6,7 +6,6 @@
 
 namespace ist::packing {
 
-/// Outcome of processing a cell.
 enum class CellState : std::uint8_t {
   settled,    ///< bound below the margin
   candidate,  ///< prototype's radius reaches the threshold
@@ -211,7 +210,6 @@ class PrototypeField {
 
   // The steps pass their results by value: the device keeps them in registers.
 
-  /// Spheres and surface as sampled from a point.
   struct View {
     Sample sample;
     float surface_at_least = 0;  ///< lower bound of the point's distance to the surface

@@ -48,7 +48,6 @@ IST_HD inline FeatureOffset ball_offset(Float3 centre, float radius, std::uint32
   return {away, dot(away, away), radius, tag};
 }
 
-/// `range` = √range2.
 IST_HD inline Constraint constraint_of(const FeatureOffset& offset, float range) {
   const float inverse = range > 0 ? 1 / range : 0;
   return {inverse * offset.away, range - offset.radius, range > 0 ? 0.5f * inverse : 1e30f,

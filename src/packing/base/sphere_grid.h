@@ -15,7 +15,6 @@ class SphereGrid {
 
   const SphereGridLayout& layout() const { return layout_; }
 
-  /// Adds sphere `index` = s to the lists.
   void insert(std::uint32_t index, const Sphere& s);
 
   /// Calls visit(index) for the spheres in the list of x's cell: all within reach of x, or the one

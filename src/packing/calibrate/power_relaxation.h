@@ -23,7 +23,6 @@ IST_HD inline bool columns_measure(double seen, double volume) {
   return seen > 0 && miss <= kLargestMiss * volume;
 }
 
-/// Radius of the ball of a volume.
 IST_HD inline double radius_of(double volume) {
   return cube_root(3 * volume / (4 * std::numbers::pi));
 }

@@ -9,9 +9,8 @@
 
 namespace ist::packing {
 
-/// A range of cells, inclusive.
 struct CellRange {
-  int lo[3], hi[3];
+  int lo[3], hi[3];  ///< inclusive
   IST_HD std::uint32_t count() const {
     return static_cast<std::uint32_t>(hi[0] - lo[0] + 1) *
            static_cast<std::uint32_t>(hi[1] - lo[1] + 1) *
@@ -96,7 +95,6 @@ class TriangleCells {
 /// there.
 constexpr float kCoverMargin = 2e-5f;
 
-/// The relation of a sphere to a cell.
 enum class SphereCell { away, meets, covers };
 
 IST_HD inline CellRange sphere_range(const GridLayout& g, const Sphere& s) {

@@ -165,7 +165,6 @@ IST_HD inline std::uint8_t start_distance(const CellRecord& record) {
   return record.triangle_count + record.sphere_count > 0 ? 0 : kFarCell;
 }
 
-/// Sweeps `count` cells from `first`, `stride` apart.
 IST_HD inline void sweep_distances(std::uint8_t* cells, std::int64_t first, std::int64_t stride,
                                    int count) {
   int reach = kFarCell;
