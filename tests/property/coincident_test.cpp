@@ -85,9 +85,9 @@ TEST_F(CoincidentInstances, TheWeightFollowsTheMeanSquareDisplacement) {
                      .squaredNorm();
           n += 1;
         }
-    const double way = std::sqrt(sum / n) / radius_;
-    const double t = std::clamp((1.6 - way) / 1.2, 0.0, 1.0);
-    EXPECT_NEAR(weight(b).weight, t * t * (3 - 2 * t), 0.02) << way;
+    const double offset = std::sqrt(sum / n) / radius_;
+    const double t = std::clamp((1.6 - offset) / 1.2, 0.0, 1.0);
+    EXPECT_NEAR(weight(b).weight, t * t * (3 - 2 * t), 0.02) << offset;
     between += t > 0.1 && t < 0.9 ? 1 : 0;
   }
   EXPECT_GE(between, 8);
@@ -136,9 +136,9 @@ TEST_F(CoincidentInstances, NothingJumpsAsTheyPart) {
       Penetration before;
       for (int i = 0; i <= steps; ++i) {
         // From where equal spheres no longer coincide.
-        const double way = (0.2 + 2.0 * i / steps) * radius_;
+        const double offset = (0.2 + 2.0 * i / steps) * radius_;
         const Penetration now =
-            penetration(still(), placed(small_pose(way * direction, {0, 0, 0.01})),
+            penetration(still(), placed(small_pose(offset * direction, {0, 0, 0.01})),
                         {.pair_budget = budget}, workspace_);
         const std::array changes = {std::abs(now.volume - before.volume),
                                     (now.force - before.force).norm(),

@@ -227,7 +227,7 @@ TEST(ContactPatchesTest, RefusesWhatPenetrationRefuses) {
   EXPECT_EQ(exact.count, 0u);
 }
 
-TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoRoom) {
+TEST(ContactPatchesTest, RefusesNumbersThatNameNothingAndNoCapacity) {
   Workspace workspace;
   const Asset a = make_random_asset({20, 0.5, {}, 0}, 90);
   const PlacedAsset placed{a.view(), {}, 1}, other{a.view(), {{1, 0, 0, 0}, {0.3, 0, 0}}, 1};

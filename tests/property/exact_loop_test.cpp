@@ -172,7 +172,7 @@ TEST_F(ExactLoop, AnyUseOfNumbersGivesTheSameBits) {
 
 // A list that does not fit into the workspace is given up. With even less memory nothing is
 // finished.
-TEST_F(ExactLoop, RoomChangesNoBit) {
+TEST_F(ExactLoop, CapacityChangesNoBit) {
   const Asset ball = testing::surface(testing::icosphere_mesh(4));
   for (std::size_t capacity = 4000; capacity < 40000; capacity += capacity / 8) {
     Workspace small(capacity);

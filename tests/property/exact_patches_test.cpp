@@ -40,14 +40,14 @@ TriangleMesh legs() {
 
 class ExactPatches : public ::testing::Test {
  protected:
-  OverlapOutline ask(const PlacedAsset& a, const PlacedAsset& b, std::size_t room = 64) {
-    patches_.assign(room, {});
+  OverlapOutline ask(const PlacedAsset& a, const PlacedAsset& b, std::size_t capacity = 64) {
+    patches_.assign(capacity, {});
     segments_.assign(5000, {});
     OverlapOutline found = overlap_outline(a, b, {}, workspace_, patches_, segments_);
     EXPECT_LE(found.segments, segments_.size());
     segments_.resize(std::min(found.segments, segments_.size()));
     patches_.resize(found.contact.count);
-    expect_whole(a, b, found, room);
+    expect_whole(a, b, found, capacity);
     expect_outlines(b.pose);
     return found;
   }
@@ -57,7 +57,7 @@ class ExactPatches : public ::testing::Test {
  private:
   /// The patches sum to a penetration's answer.
   void expect_whole(const PlacedAsset& a, const PlacedAsset& b, const OverlapOutline& found,
-                    std::size_t room) {
+                    std::size_t capacity) {
     const Penetration whole = testing::exactly(a, b, workspace_);
     EXPECT_EQ(found.contact.penetration.volume, whole.volume);
     double volume = 0;
@@ -76,7 +76,7 @@ class ExactPatches : public ::testing::Test {
     EXPECT_LE((torque - whole.torque).norm(), 1e-14 * area * size);
     EXPECT_LE((moment - whole.volume * whole.centroid).norm(), 1e-14 * area * area);
     // contact_patches() divides them.
-    std::vector<ContactPatch> same(room);
+    std::vector<ContactPatch> same(capacity);
     ContactSettings settings;
     settings.measure = Measure::exact;
     EXPECT_GE(contact_patches(a, b, settings, workspace_, same).count, patches_.size());

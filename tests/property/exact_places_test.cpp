@@ -189,12 +189,12 @@ TEST_F(ExactPlaces, RatiosToAMillionth) {
     for (int i = 0; i < 27; ++i) {
       const double at[3] = {-s / 2, 0.5, 1 - s / 4};
       const double inside[3] = {s / 2, s, s / 4};
-      const int way[3] = {i % 3, i / 3 % 3, i / 9};
+      const int cell[3] = {i % 3, i / 3 % 3, i / 9};
       double truth = 1;
       Point t;
       for (int axis = 0; axis < 3; ++axis) {
-        t[axis] = at[way[axis]];
-        truth *= inside[way[axis]];
+        t[axis] = at[cell[axis]];
+        truth *= inside[cell[axis]];
       }
       SCOPED_TRACE(::testing::Message() << k << ": " << t.transpose());
       expect_volume({cube_.view(), {}, 1}, {cube_.view(), shifted(t), s}, truth, 1e-13);
@@ -232,14 +232,14 @@ class ExactMotions : public ExactPlaces {
   std::vector<Pair> pairs() {
     std::mt19937_64 random(5);
     std::uniform_real_distribution<double> unit(-1, 1);
-    const auto way = [&] { return Point(unit(random), unit(random), unit(random)); };
+    const auto draw = [&] { return Point(unit(random), unit(random), unit(random)); };
     std::vector<Pair> made;
     for (int i = 0; i < 60; ++i) {
       const Asset& a = assets_[static_cast<std::size_t>(i) % assets_.size()];
       const Asset& b = assets_[static_cast<std::size_t>(i / 2) % assets_.size()];
       made.push_back(
-          {{a.view(), posed(testing::random_turn(random), way()), 1},
-           {b.view(), posed(testing::random_turn(random), way()), std::pow(2, unit(random))}});
+          {{a.view(), posed(testing::random_turn(random), draw()), 1},
+           {b.view(), posed(testing::random_turn(random), draw()), std::pow(2, unit(random))}});
     }
     return made;
   }
@@ -358,10 +358,10 @@ TEST_F(ExactLimits, GiveTheAnswerOfTheSpheres) {
   ASSERT_EQ(truth.status, QueryStatus::ok);
   PenetrationSettings limited = exact;
   limited.max_visits = 3;
-  const Penetration of_room = penetration(a, b, exact, small);
+  const Penetration of_capacity = penetration(a, b, exact, small);
   const Penetration of_visits = penetration(a, b, limited, workspace_);
-  for (const auto& [found, asked, workspace] :
-       {std::tuple(&of_room, &spheres, &small), std::tuple(&of_visits, &spheres, &workspace_)}) {
+  for (const auto& [found, asked, workspace] : {std::tuple(&of_capacity, &spheres, &small),
+                                                std::tuple(&of_visits, &spheres, &workspace_)}) {
     EXPECT_EQ(found->status, QueryStatus::budget_exhausted);
     PenetrationSettings same = *asked;
     same.max_visits = found == &of_visits ? 3 : 0;
@@ -400,13 +400,13 @@ TEST_F(ExactLimits, WithoutAMeshNothingIsHeld) {
 }
 
 // The amount of memory does not matter once it is enough.
-TEST_F(ExactLimits, RoomNeverChangesAnAnswer) {
+TEST_F(ExactLimits, MemoryNeverChangesAnAnswer) {
   const PlacedAsset a{ball_.view(), {}, 1}, b{ball_.view(), near_, 1};
   const Penetration truth = ask(a, b);
   int enough = 0;
   for (std::size_t capacity = 1; capacity < 1u << 16; capacity *= 2) {
-    Workspace room(capacity);
-    const Penetration found = testing::exactly(a, b, room);
+    Workspace memory(capacity);
+    const Penetration found = testing::exactly(a, b, memory);
     if (found.status == QueryStatus::budget_exhausted) {
       EXPECT_EQ(enough, 0);
       continue;

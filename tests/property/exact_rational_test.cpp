@@ -132,9 +132,9 @@ TEST_F(ExactRational, CopiesAndNeighboursOfTheSameMesh) {
         if (k == 1) pose.t[(axis + 1) % 3] = random.whole(-2, 2);
       } else {
         const int last = static_cast<int>(a.vertices.size()) - 1;
-        const Point way = a.vertices[static_cast<std::size_t>(random.whole(0, last))] -
-                          a.vertices[static_cast<std::size_t>(random.whole(0, last))];
-        std::copy(way.data(), way.data() + 3, pose.t);
+        const Point between = a.vertices[static_cast<std::size_t>(random.whole(0, last))] -
+                              a.vertices[static_cast<std::size_t>(random.whole(0, last))];
+        std::copy(between.data(), between.data() + 3, pose.t);
       }
       compare(a, asset, a, asset, pose, "neighbour " + std::to_string(i) + ' ' + std::to_string(k));
     }

@@ -69,7 +69,7 @@ ProbeBalls probes_of(const std::vector<Ball>& balls) {
   return probes;
 }
 
-/// The parts of at most sixteen balls, as a query takes them; ways to their centres begin at
+/// The parts of at most sixteen balls, as a query takes them; lines to their centres begin at
 /// `outside`.
 std::vector<Part> parts_of(const TriangleMesh& mesh, const std::vector<Ball>& balls,
                            const Vector3d& outside) {
@@ -128,14 +128,14 @@ double sector_area(const Eigen::Vector2d& p, const Eigen::Vector2d& q, double ra
   const auto arc = [&](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
     return 0.5 * radius * radius * std::atan2(cross(a, b), a.dot(b));
   };
-  const Eigen::Vector2d way = q - p;
-  const double a = way.squaredNorm(), b = p.dot(way), c = p.squaredNorm() - radius * radius;
+  const Eigen::Vector2d edge = q - p;
+  const double a = edge.squaredNorm(), b = p.dot(edge), c = p.squaredNorm() - radius * radius;
   const double root = b * b - a * c;
   if (!(a > 0)) return 0;
   if (!(root > 0)) return arc(p, q);
   const double t1 = std::clamp((-b - std::sqrt(root)) / a, 0.0, 1.0);
   const double t2 = std::clamp((-b + std::sqrt(root)) / a, 0.0, 1.0);
-  const Eigen::Vector2d u = p + t1 * way, v = p + t2 * way;
+  const Eigen::Vector2d u = p + t1 * edge, v = p + t2 * edge;
   if (t1 == t2) return arc(p, q);
   return arc(p, u) + 0.5 * cross(u, v) + arc(v, q);
 }
@@ -147,8 +147,8 @@ double section(const TriangleMesh& mesh, const Ball& ball, double z) {
   if (!(radius2 > 0)) return 0;
   double area = 0;
   for (const auto& t : mesh.triangles) {
-    // The outline enters through an edge that rises and leaves through one that falls, or the other
-    // way about; which, the triangle's order of corners tells.
+    // The outline enters through an edge that rises and leaves through one that falls, or the
+    // reverse, by the triangle's order of corners.
     Eigen::Vector2d up, down;
     int found = 0;
     for (int k = 0; k < 3; ++k) {
@@ -423,7 +423,7 @@ TEST(Probe, CentreNearAnEdge) {
     const Eigen::Quaterniond q = random_turn(random);
     const Part got = part_of(turned(box, q, Vector3d::Zero()),
                              {q * Vector3d(1 + a * r, 1 + b * r, 0.3 * uniform(random)), r});
-    // A quarter ball, and half discs over the ways; second order in them.
+    // A quarter ball, and half discs times the displacements; second order in them.
     const double want = 0.25 * 4 * std::numbers::pi / 3 - (a + b) * std::numbers::pi / 2;
     const double error = std::abs(got.volume / (r * r * r) - want) - 2 * away * away;
     if (error > worst) worst = error, at = away;

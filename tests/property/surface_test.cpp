@@ -423,7 +423,7 @@ TEST(Surface, SeparationOfSmallMeshesIsTheLeast) {
         take_nearest(x, y, {}, {}, least);
         cross = cross || exact::cross_exactly(x.corner, y.corner);
       }
-    // Ties of touching surfaces are decided either way.
+    // Ties of touching surfaces may be decided as inside or outside.
     const bool overlap = testing::exactly(a, b, workspace).volume > 1e-14 ||
                          (cross && std::sqrt(least.squared) > 1e-12);
     const double want = overlap ? 0 : std::sqrt(least.squared);

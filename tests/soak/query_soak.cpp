@@ -78,7 +78,7 @@ std::vector<Asset> make_assets() {
   return assets;
 }
 
-/// One thread's scratch. The small workspace stops queries half way.
+/// One thread's scratch. The small workspace stops queries before they end.
 struct Worker {
   Workspace large{1u << 12}, small{48};
   Tally tally;
@@ -148,9 +148,9 @@ class Chunk {
       }
       case 2: {
         ContactPatch patches[8];
-        const std::span<ContactPatch> room(patches, 1 + random_() % 8);
-        const ContactPatches answer = contact_patches(a, b, settings, workspace, room);
-        look_at(answer, room);
+        const std::span<ContactPatch> found(patches, 1 + random_() % 8);
+        const ContactPatches answer = contact_patches(a, b, settings, workspace, found);
+        look_at(answer, found);
         bits_.add(answer.penetration), bits_.add(std::uint64_t{answer.count});
         break;
       }

@@ -126,7 +126,7 @@ struct MatedBatch {
       const Mate mate = mates.next(12);
       for (const Extrusion* of : {&mate.a, &mate.b}) assets.push_back(surface(of->mesh(), "part"));
       const double off = mates.one_in(3) ? std::ldexp(1.0, -mates.whole(2, 40)) : 0;
-      const Eigen::Vector3d t = mate.t + (mates.one_in(2) ? off : -off) * mate.way;
+      const Eigen::Vector3d t = mate.t + (mates.one_in(2) ? off : -off) * mate.direction;
       const Pose still = {{1, 0, 0, 0}, {0, 0, 0}};
       const Pose placed = {{mate.q.w(), mate.q.x(), mate.q.y(), mate.q.z()}, {t.x(), t.y(), t.z()}};
       pairs.push_back({2 * k, 2 * k + 1, still, placed, 1, 1});

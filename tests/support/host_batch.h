@@ -18,8 +18,8 @@ namespace ist::testing {
 class HostBatch {
  public:
   /// The capacity for split pairs, by kind.
-  explicit HostBatch(HostSolids solids, std::uint32_t room = 1 << 16)
-      : solids_(std::move(solids)), room_(room) {
+  explicit HostBatch(HostSolids solids, std::uint32_t capacity = 1 << 16)
+      : solids_(std::move(solids)), capacity_(capacity) {
     cut_for(1);
   }
 
@@ -57,7 +57,7 @@ class HostBatch {
   void sum_rounds(const gpu::FieldBatch& batch, unsigned seed);
 
   HostSolids solids_;
-  std::uint32_t room_;
+  std::uint32_t capacity_;
   std::vector<gpu::TriangleQuery> queries_;
   std::vector<gpu::MetPart> parts_;
   std::vector<std::uint32_t> words_;

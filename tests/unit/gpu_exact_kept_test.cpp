@@ -150,7 +150,7 @@ TEST(GpuExactKept, SmallSolidsTurnBesideLargeOnes) {
 }
 
 /// Pairs without memory are searched in each call.
-TEST(GpuExactKept, LittleRoomDoesNotShow) {
+TEST(GpuExactKept, LittleMemoryDoesNotShow) {
   const std::vector<BatchPair> pairs = exact_pairs(68, 100);
   Beside both(exact_assets(), pairs.size(), 1024);
   both.kept.mesh_capacity = 7;

@@ -75,7 +75,7 @@ struct ManyParts {
       pairs.push_back(pair);
     };
     for (const double down : {-0.1, -1e-9, 0.0, -0.95}) add(0, 1, 0.01, 0.02, down);
-    add(1, 0, 0.01, 0.02, 0.1);  // the other way round
+    add(1, 0, 0.01, 0.02, 0.1);  // exchanged
     add(2, 1, 0.1, 0.1, 2.9);    // into a side of two triangles
     add(0, 2, 0, 0, 2.9);
     add(2, 0, 0, 0, 0.2);  // a cavity's wall
@@ -130,7 +130,7 @@ TEST(GpuExactPatches, WholesAreThoseOfPenetrations) {
 
 /// The second pass answers pairs that do not fit into the first; pairs that fit into none are
 /// reported.
-TEST(GpuExactPatches, LittleRoomDoesNotShow) {
+TEST(GpuExactPatches, LittleMemoryDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(68, 100);
   for (const BatchPair& pair : aligned_pairs(69, 100)) pairs.push_back(pair);
   HostPatches batch(exact_solids());

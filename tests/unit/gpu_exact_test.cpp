@@ -134,7 +134,7 @@ TEST(GpuExact, LargeCopiesAreAnswered) {
 }
 
 /// Later rounds and passes answer pairs that do not fit into a round.
-TEST(GpuExact, LittleRoomDoesNotShow) {
+TEST(GpuExact, LittleMemoryDoesNotShow) {
   std::vector<BatchPair> pairs = exact_pairs(38, 300);
   for (const BatchPair& pair : aligned_pairs(39, 100)) pairs.push_back(pair);
   HostBatch batch(exact_solids());

@@ -286,7 +286,7 @@ TEST(GpuFields, LanesOfAWarpNeedNoLuck) {
 }
 
 /// However many rounds there are, and whether pairs fit into one.
-TEST(GpuFields, RoomChangesNoBit) {
+TEST(GpuFields, CapacityChangesNoBit) {
   const auto count = static_cast<std::uint32_t>(batch_fields().size());
   std::vector<BatchPair> pairs;
   for (std::uint32_t f = 0; f < count; ++f)
@@ -306,25 +306,25 @@ TEST(GpuFields, RoomChangesNoBit) {
   const auto large = [](const HostBatch& batch) { return batch.field_counters.large; };
   EXPECT_GT(roomy.field_counters.listed[gpu::kFacets], 30u);
 
-  struct Room {
+  struct Capacities {
     const char* of;
     std::uint32_t queries, parts, words, most_rounds;
     bool more_are_large, many_rounds;
   };
-  for (const Room& room : {Room{"few pairs", 3, 300, 30000, ~0u, false, true},
-                           Room{"few parts", 40, 5, 30000, ~0u, true, false},
-                           Room{"few words", 40, 300, 520, ~0u, true, true},
-                           Room{"few rounds", 5, 300, 30000, 2, false, false},
-                           Room{"none", 5, 300, 30000, 0, false, false}}) {
+  for (const Capacities& capacities : {Capacities{"few pairs", 3, 300, 30000, ~0u, false, true},
+                                       Capacities{"few parts", 40, 5, 30000, ~0u, true, false},
+                                       Capacities{"few words", 40, 300, 520, ~0u, true, true},
+                                       Capacities{"few rounds", 5, 300, 30000, 2, false, false},
+                                       Capacities{"none", 5, 300, 30000, 0, false, false}}) {
     HostBatch batch(mixed_solids());
-    batch.query_capacity = room.queries;
-    batch.part_capacity = room.parts;
-    batch.word_capacity = room.words;
-    batch.most_rounds = room.most_rounds;
-    SCOPED_TRACE(room.of);
+    batch.query_capacity = capacities.queries;
+    batch.part_capacity = capacities.parts;
+    batch.word_capacity = capacities.words;
+    batch.most_rounds = capacities.most_rounds;
+    SCOPED_TRACE(capacities.of);
     expect_same_bits(batch.run(pairs, Measure::matched, 1), expected);
-    EXPECT_EQ(large(batch) > large(roomy), room.more_are_large) << large(batch);
-    EXPECT_EQ(batch.rounds > 20, room.many_rounds) << batch.rounds;
+    EXPECT_EQ(large(batch) > large(roomy), capacities.more_are_large) << large(batch);
+    EXPECT_EQ(batch.rounds > 20, capacities.many_rounds) << batch.rounds;
   }
 }
 

@@ -54,9 +54,9 @@ struct PatchDifference {
     const Eigen::Vector3d left =
         x.torque - (x.point - Eigen::Vector3d(pair.pose_b.t)).cross(x.force) - x.torsion * x.normal;
     const Eigen::Vector3d arm = x.point - x.centroid;
-    const double room = size + arm.norm() + 1e-6 * x.point.norm();  // world coordinates round
-    axis = std::max(axis, x.area > 0 ? left.norm() / (reach * room) : std::abs(x.torsion));
-    axis = std::max(axis, std::abs(arm.dot(x.normal)) / room);
+    const double extent = size + arm.norm() + 1e-6 * x.point.norm();  // world coordinates round
+    axis = std::max(axis, x.area > 0 ? left.norm() / (reach * extent) : std::abs(x.torsion));
+    axis = std::max(axis, std::abs(arm.dot(x.normal)) / extent);
   }
 };
 
@@ -146,18 +146,19 @@ class RegionSums {
         double moved[3];
         place.a_from_b.apply(y.centre, moved);
         const Vector3d from = Eigen::Map<const Vector3d>(x.centre);
-        const Vector3d way = Eigen::Map<const Vector3d>(moved) - from;
-        const Lens<double> l = lens(x.r, y.r * place.a_from_b.scale, way.norm());
+        const Vector3d between = Eigen::Map<const Vector3d>(moved) - from;
+        const Lens<double> l = lens(x.r, y.r * place.a_from_b.scale, between.norm());
         if (!(l.volume() > 0)) continue;
         const double unit = place.unit_a;
         Sum& sum = sums_[cuts_.rank[(of_b ? j : i) >> cuts_.shift]];
         const double volume = unit * unit * unit * l.volume();
-        const Vector3d force = -unit * unit * l.derivative() * (to_world * way.normalized());
+        const Vector3d force = -unit * unit * l.derivative() * (to_world * between.normalized());
         sum.volume += volume;
         sum.pushed += force.norm();
         sum.force += force;
-        sum.moment += volume * (unit * (to_world * (from + l.cap_b / (l.cap_a + l.cap_b) * way)) +
-                                vector(place.origin_a));
+        sum.moment +=
+            volume * (unit * (to_world * (from + l.cap_b / (l.cap_a + l.cap_b) * between)) +
+                      vector(place.origin_a));
       }
     }
   }

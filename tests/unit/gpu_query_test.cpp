@@ -125,8 +125,8 @@ TEST(GpuQuery, AnswersAreTheSumsInDouble) {
 }
 
 /// Splits early, into small tasks.
-HostBatch splitting(std::uint32_t room = 1 << 16) {
-  HostBatch batch(batch_solids(), room);
+HostBatch splitting(std::uint32_t capacity = 1 << 16) {
+  HostBatch batch(batch_solids(), capacity);
   batch.most_alone = 16;
   batch.task_weight = 4;
   return batch;
@@ -139,8 +139,8 @@ TEST(GpuQuery, SameBitsHoweverItIsSplit) {
   HostBatch roomy = splitting();
   const std::vector<Penetration> expected = roomy.run(pairs, Measure::matched);
   EXPECT_GT(roomy.counters.tasks, 20u);
-  for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostBatch narrow = splitting(room);
+  for (const std::uint32_t capacity : {0u, 30u, 300u}) {
+    HostBatch narrow = splitting(capacity);
     expect_same_bits(narrow.run(pairs, Measure::matched), expected);
   }
 }
@@ -151,12 +151,12 @@ TEST(GpuQuery, TheLargestPairsBegin) {
   RandomPairs random(8);
   std::vector<std::uint32_t> meet(kPairs), list(gpu::kSizes * kPairs);
   for (std::uint32_t& m : meet) m = static_cast<std::uint32_t>(std::exp2(random.uniform(0, 8)));
-  for (const std::uint32_t room : {kPairs, 0u}) {
+  for (const std::uint32_t capacity : {kPairs, 0u}) {
     gpu::BatchCounters counters = {};
     gpu::BatchArrays batch = {};
     batch.counters = &counters;
     batch.list = list.data();
-    batch.size_capacity = room;
+    batch.size_capacity = capacity;
     for (std::uint32_t i = 0; i < kPairs; ++i) gpu::list_pair(batch, i, meet[i], counters.listed++);
     std::vector<bool> seen(kPairs);
     std::uint32_t least = 1u << gpu::kSizes;
@@ -165,7 +165,7 @@ TEST(GpuQuery, TheLargestPairsBegin) {
       ASSERT_LT(pair, kPairs);
       EXPECT_FALSE(seen[pair]);
       seen[pair] = true;
-      EXPECT_TRUE(room > 0 ? meet[pair] < 2 * least : pair == k);
+      EXPECT_TRUE(capacity > 0 ? meet[pair] < 2 * least : pair == k);
       least = std::min(least, meet[pair]);
     }
   }

@@ -164,8 +164,8 @@ TEST(GpuSeparation, SameBitsHoweverItIsSplit) {
   HostSeparations roomy(batch_solids());
   const std::vector<Separation> expected = roomy.run(pairs);
   EXPECT_GT(roomy.counters[0].tasks, 50u);
-  for (const std::uint32_t room : {0u, 30u, 300u}) {
-    HostSeparations narrow(batch_solids(), room);
+  for (const std::uint32_t capacity : {0u, 30u, 300u}) {
+    HostSeparations narrow(batch_solids(), capacity);
     expect_same_bits(narrow.run(pairs), expected);
   }
 }

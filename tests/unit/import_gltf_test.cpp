@@ -87,7 +87,7 @@ TEST(ReadGltf, NodesPlaceMeshesInDouble) {
   EXPECT_NEAR((mesh.vertices[7] - Eigen::Vector3d(20, 0, -2)).norm(), 0, 1e-14);  // mirrored in z
   const ClosedMesh closed = close_mesh(mesh, "a");
   EXPECT_NEAR(closed.report.volume, 2 * 8.0 / 6, 1e-13);
-  EXPECT_EQ(closed.report.flipped_components, 0u);  // the mirror's faces were turned on the way in
+  EXPECT_EQ(closed.report.flipped_components, 0u);  // the import turned the mirror's faces
 }
 
 TEST(ReadGltf, StripsAndFansWindAsTheyShould) {
