@@ -7,7 +7,8 @@
 #include <ist/gpu_query.h>
 #include <ist/scene.h>
 
-// Which of many bodies may overlap, found on a GPU: for penetration_batch() and the other batches.
+// The pairs of many bodies that may overlap, found on a GPU for penetration_batch() and the other
+// batches.
 
 namespace IST_API ist {
 

@@ -101,8 +101,8 @@ class Volumes(Answers):
         self.found = self.ask(ist.penetration, ["volume", *names], self.scales[1])
         self.value = self.found["volume"].reshape(self.shape)
         if wants_scale:
-            # As in python/src/penetration.cpp; repeated here, since memory on a GPU is the caller's
-            # framework's.
+            # Repeats python/src/penetration.cpp, since memory on a GPU belongs to the caller's
+            # framework.
             step = self.scales[1] / 2048
             more, less = (self.ask(ist.penetration, ["volume"], self.scales[1] + by)["volume"]
                           for by in (step, -step))

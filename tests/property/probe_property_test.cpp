@@ -259,8 +259,8 @@ TEST(Probe, PartsAgainstSlices) {
           std::max(worst_moment, std::abs(got.moment.z() - want.moment_z) / (r3 * ball.r));
     }
     std::printf("%s: volume %.2g r³, moment %.2g r⁴\n", shape.name, worst, worst_moment);
-    // What the integral over slices itself is good for: its integrand has roots where a slice comes
-    // to touch an edge, and needles have many.
+    // The accuracy of the integral over slices: its integrand has square roots where a slice
+    // begins to touch an edge, and needles have many.
     EXPECT_LE(worst, 3e-8) << shape.name;
     EXPECT_LE(worst_moment, 3e-8) << shape.name;
   }

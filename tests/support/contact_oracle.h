@@ -119,7 +119,7 @@ struct ContactCase {
   bool meet() const { return cross() || held; }
 };
 
-/// What the three libraries said of a case.
+/// The verdict of the three libraries on a case.
 struct ContactVerdict {
   std::vector<std::string> wrong;  ///< statements above that are false: none may be
   bool matched = false;            ///< overlap > 0 in that measure

@@ -10,7 +10,7 @@
 
 namespace ist::testing {
 
-/// Of one to four levels; the last has the bytes of the first.
+/// Assets with one to four levels; the last has the bytes of the first.
 inline const std::vector<Asset>& detailed_assets() {
   static const std::vector<Asset> made = [] {
     std::vector<Asset> out;

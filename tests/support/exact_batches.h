@@ -86,7 +86,7 @@ inline Differences compare_exactly(const std::vector<Asset>& assets,
     EXPECT_EQ(gpu.touching, cpu.touching) << i;
     worst.touching += cpu.touching ? 1 : 0;
     worst.flush += cpu.contact_area > 0 ? 1 : 0;
-    // What is a rounding of nothing has no digits.
+    // An area that is only rounding has no correct digits.
     const double least = std::max(cpu.contact_area, 1e-9 * size2);
     worst.area = std::max(worst.area, std::abs(gpu.contact_area - cpu.contact_area) / least);
     if (cpu.contact_area > 1e-6 * size2)

@@ -25,7 +25,6 @@ inline Penetration exactly(const PlacedAsset& a, const PlacedAsset& b, Workspace
   return penetration(a, b, settings, workspace);
 }
 
-/// What a query knows of its own answer.
 struct ExactCheck {
   bool complete = false;
   bool consistent = false;

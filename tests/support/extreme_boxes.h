@@ -17,8 +17,6 @@
 #include "support/test_meshes.h"
 #include "support/turns.h"
 
-// What the extremes measure with.
-
 namespace ist::testing {
 
 using Eigen::Vector3d;
@@ -130,7 +128,7 @@ class Boxes {
       const Pose apart = pose(Eigen::Quaterniond::Identity(),
                               {kHalfA.x() + size_b_ / size_a_ * kHalfB.x() + gap, 0.1, -0.1});
       const Separation got = separation(a(), b(apart), {}, workspace);
-      // What t is rounded to moves B by that much.
+      // The rounding of t moves B by that much.
       const double rounding = 4e-16 * (centre_a_.norm() + centre_b_.norm());
       outside += got.distance_min > gap * size_a_ + rounding;
       outside += got.distance_max < gap * size_a_ - rounding;

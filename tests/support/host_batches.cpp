@@ -336,7 +336,7 @@ void HostPatches::divide_exactly(const gpu::SolidPairs& asked, const GpuContactP
       lists[gpu::kFirstPatchPass][exact_counters.listed[gpu::kFirstPatchPass]++] = i;
   const auto memory = std::make_unique<gpu::ExactWholeMemory>();
   for (int pass = gpu::kFirstPatchPass; pass < gpu::kExactPasses; ++pass) {
-    // What was there before must not matter.
+    // The contents of fresh memory must not matter.
     std::vector<std::uint64_t> bytes(batch.bytes_of_team(pass) / 8, 0xA5A5A5A5A5A5A5A5u);
     batch.memory = reinterpret_cast<std::byte*>(bytes.data());
     const gpu::ExactWorkspace work = batch.workspace(pass, 0);

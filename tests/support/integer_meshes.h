@@ -85,7 +85,7 @@ class IntegerMeshes {
     return box_mesh(low, high);
   }
 
-  /// Of an outline that runs counter-clockwise and its triangles.
+  /// `outline`: counter-clockwise; `inside`: its triangles.
   TriangleMesh prism(const std::vector<std::array<int, 2>>& outline,
                      const std::vector<std::array<std::uint32_t, 3>>& inside) {
     TriangleMesh mesh;
@@ -148,7 +148,7 @@ class IntegerMeshes {
     return joined(box_mesh(low, high), inverted(box_mesh(point(-3, -2), point(2, 3))));
   }
 
-  /// By a matrix of integers and determinant 1.
+  /// Applies a matrix of integers with determinant 1.
   void shear(TriangleMesh& mesh) {
     const int from = whole(0, 2), to = (from + whole(1, 2)) % 3, by = whole(0, 1) ? 1 : -1;
     for (Point& v : mesh.vertices) v[to] += by * v[from];

@@ -18,7 +18,7 @@
 
 namespace ist::testing {
 
-/// What may not happen, and how often it did.
+/// Failures that may not happen, with their counts.
 struct MateTally {
   std::uint64_t mates = 0, queries = 0, touching = 0;
   std::map<std::string, std::uint64_t> wrong;
@@ -61,7 +61,7 @@ class MateChecks {
     step();
   }
 
-  /// Of numbers of triangles of which there are a hundred queries.
+  /// Costs for those numbers of triangles that have at least a hundred queries.
   MateWork work() const {
     MateWork out;
     for (const auto& [triangles, costs] : costs_) {
@@ -90,7 +90,7 @@ class MateChecks {
     return exact_ && (q.array() == 0 || q.array() == 0.5 || q.array() == 1).all();
   }
 
-  /// As it lies, by right angles, by multiples of 15°, or anyhow.
+  /// Turns the world not at all, by right angles, by multiples of 15°, or by any angle.
   void choose_world() {
     static const std::vector<Eigen::Quaterniond> right = right_angled_turns();
     world_ = {};
@@ -130,7 +130,7 @@ class MateChecks {
     const double size = std::min(size_of(placed_a_), size_of(placed_b_));
     const double larger = std::max(size_of(placed_a_), size_of(placed_b_));
     const double faces = mate_.a.surface() + mate_.b.surface();
-    // Of the truth and of the pose after the world's turn.
+    // Covers the roundings of the truth and of the pose after the world's turn.
     const double tolerance = 1e-14 * faces * larger;
     const auto need = [&](bool right, const char* what) {
       if (right) return;

@@ -5,8 +5,8 @@
 
 namespace ist::testing {
 
-/// What a mesh library says about two surfaces: contact where triangles cross, no inside. Summed
-/// over all contacts it reports.
+/// A mesh library's answer for two surfaces: contacts where triangles cross, without an inside.
+/// Sums over all contacts that it reports.
 struct MeshContacts {
   std::size_t count = 0;
   double depth_sum = 0;  ///< [u] Σ depth, ≥ 0

@@ -14,7 +14,7 @@
 
 namespace ist::testing {
 
-/// What a made-up asset is like.
+/// Settings of a random asset.
 struct RandomAsset {
   std::size_t spheres = 500;
   double smallest = 0.2;  ///< smallest radius over largest

@@ -182,7 +182,7 @@ inline double common_area(const std::array<Eigen::Vector2d, 3>& a,
   return twice / 2;
 }
 
-/// What two extrusions have in common, both along z.
+/// The intersection of two extrusions along z.
 struct InCommon {
   double volume = 0;
   double area = 0;  ///< of faces on each other, where the volume is 0

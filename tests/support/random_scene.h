@@ -102,7 +102,7 @@ struct RandomScene {
       rule.margin = settings.margin;
       for (std::uint32_t a = 0; a < kSceneGroups; ++a)
         for (std::uint32_t b = a; b < kSceneGroups; ++b) scene.set_rule(a, b, rule);
-      // Of a group without bodies: boxes are as wide as the widest rule needs.
+      // A rule for a group without bodies: boxes are as wide as the widest rule needs.
       rule.answer = SceneAnswer::penetration;
       rule.penetration.measure = settings.measure;
       scene.set_rule(1, 1, rule);

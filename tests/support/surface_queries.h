@@ -73,7 +73,7 @@ struct Work {
   double most = 0;    ///< largest volume along the motion
 };
 
-/// By Simpson's rule from s = 0 to 1.
+/// Integrates by Simpson's rule from s = 0 to 1.
 inline Work work_of(const Ask& ask, const Sweep& motion, int steps) {
   Work work;
   for (int i = 0; i <= 2 * steps; ++i) {

@@ -66,8 +66,8 @@ Penetration by_cpu(const Shape& field, const BatchPair& pair, Measure measure) {
                      settings, workspace);
 }
 
-/// By how much an answer is off: parts of the volume, and of the surface or lever that go with the
-/// larger of it and of a thousandth of what the tree has.
+/// Errors of an answer, relative to the larger of its volume and 1e-6 size³, and to the area and
+/// lever that belong to it.
 struct FieldOff {
   double volume = 0, push = 0, turn = 0, centre = 0;
 

@@ -181,8 +181,8 @@ class RegionSums {
   std::vector<Sum> sums_;
 };
 
-/// What is too little for a patch of its own falls to one whose region it is not in: pairs that
-/// have such are left out.
+/// Volumes that are too small for a patch of their own go to a patch of another region: pairs with
+/// such volumes are left out.
 TEST(GpuPatches, AreTheRegionsSumsInDouble) {
   const std::vector<BatchPair> pairs = RandomPairs(47).pairs(150);
   const HostSolids solids(batch_solids());

@@ -232,7 +232,7 @@ TEST(Judge, TellsHowFarWhatWasAddedLies) {
   }
 }
 
-/// What was made lacks one of two equal boxes, which lie flush, a corner on a corner, or apart.
+/// The result lacks one of two equal boxes, which lie flush, corner on corner, or apart.
 TEST(Judge, CountsVolumeThatWasNotMade) {
   const TriangleMesh box = box_mesh({-1, -1, -1}, {1, 1, 1});
   const ClosedMesh made = close_mesh(box, "box");

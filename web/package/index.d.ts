@@ -55,7 +55,7 @@ export interface Pose {
 export type SphereMeasure = 'matched' | 'inner';
 
 /**
- * What represents the solid: a set of spheres, or its mesh. `exact`: the true volume and its
+ * The representation of the solid: a set of spheres, or its mesh. `exact`: the true volume and its
  * gradients, for two assets that both store their mesh (AssetInfo.meshTriangles > 0). `matched` goes
  * over to it where the spheres are too coarse for the contact of two solids of unlike sizes that
  * both store theirs (ContactOptions.spheresOnly).
@@ -463,8 +463,8 @@ export interface RayHits {
 }
 
 /**
- * Where rays first meet the surface of a solid at `pose`, on their way out if they start inside. No
- * ray passes between two triangles. Directions may have any length but 0. One origin or one direction
+ * The points where rays first meet the surface of a solid at `pose`; rays that start inside meet it
+ * from within. No ray passes between two triangles. Directions may have any length but 0. One origin or one direction
  * applies to all rays. Shapes: half-spaces, boxes, balls, capsules and cylinders.
  * `maxDistance` [u]: rays end there; default Infinity.
  */

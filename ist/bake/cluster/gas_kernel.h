@@ -29,7 +29,7 @@ GasPull pull_of(std::span<const Ball> balls, std::span<const std::uint32_t> part
 void measure_all(std::span<const Ball> balls, std::span<const std::uint32_t> part,
                  const Prototypes& prototypes, PrototypeValues* distances2);
 
-/// By how much prototype `own` is nearer to the members than each other one, for the member that
+/// The lead of prototype `own` over each other one (how much nearer it is), for the member that
 /// prefers it least. `members` are rows of measure_all().
 PrototypeValues least_leads(const PrototypeValues* distances2,
                             std::span<const std::uint32_t> members, std::size_t own);

@@ -19,7 +19,6 @@ namespace {
 constexpr std::uint32_t kNoCandidate = UINT32_MAX;
 constexpr std::int64_t kStepsAPair = 20;  ///< cost of finding and sorting it
 
-/// Which candidate contains which targets, in both directions.
 struct Incidence {
   std::vector<std::vector<std::uint32_t>> held;     ///< targets of a candidate
   std::vector<std::vector<std::uint32_t>> holders;  ///< candidates of a target, ascending

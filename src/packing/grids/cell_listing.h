@@ -4,7 +4,7 @@
 
 #include "packing/grids/distance_grid.h"
 
-// Which cells list a primitive. Conservative: a cell within kListMargin of a primitive lists it.
+// A cell within kListMargin of a primitive lists it.
 // The tests are the same on every machine, since they determine which cells are active.
 
 namespace ist::packing {

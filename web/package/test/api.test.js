@@ -587,7 +587,7 @@ test('rays and points against one solid', () => {
   assert.ok(feet.error.every((error) => error >= 0 && error < 1e-6));
   assert.deepEqual(Array.from(feet.gradient.subarray(0, 3)), [0, 0, -1]);
 
-  // Of a shape; NaN among many, a sentence for one alone.
+  // Shapes: NaN among many points, an error for one alone.
   const many = ist.closestPoint(ball, {}, [3, 0, 0, NaN, 0, 0]);
   assert.deepEqual(Array.from(many.distance), [1, NaN]);
   assert.deepEqual(Array.from(ist.contains(ball, {}, [1, 0, 0, NaN, 0, 0])), [1, 2]);

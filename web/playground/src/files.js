@@ -8,8 +8,8 @@ const kMost = 512 * 2 ** 20;  // bytes
 const kMeshes = ['obj', 'stl', 'ply', 'off', 'glb', 'gltf', 'dae'];
 
 /**
- * What a file is: {kind: 'solid', asset} or {kind: 'scene', scene, animations}. Throws an Error with
- * a sentence.
+ * Returns {kind: 'solid', asset} or {kind: 'scene', scene, animations}. Throws an Error whose message
+ * is a sentence.
  */
 export async function readFile(file) {
   const ending = file.name.toLowerCase().split('.').pop();

@@ -2,7 +2,7 @@
 
 import {digits, range, vector, whole} from './format.js';
 
-// By name: the rows for meshes and spheres; `wide` ones for both.
+// [name, label, unit, kind] of the rows for meshes and spheres; `wide` rows are for both.
 const kRows = [
   ['volume', 'Volume', 'u³', 'main'],
   ['error', 'Error', '%'],

@@ -7,8 +7,8 @@ import {balls} from './balls.js';
 import {Columns} from './columns.js';
 
 /**
- * What a cut lays open is filled: inner sides, which only a cut shows, are painted flat, and those
- * of balls at the depth of the plane. Where balls share a place that of the larger chord is seen.
+ * Fills cuts: inner sides, which only a cut shows, are painted flat, and those of balls at the depth
+ * of the plane. Where balls overlap, the one with the larger chord is visible.
  */
 function fillCuts(shader) {
   shader.vertexShader = 'varying vec4 vBall;\n' +

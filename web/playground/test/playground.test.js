@@ -161,7 +161,7 @@ test(
         }
         return times;
       });
-      // Of three rounds the best: others may be at work on this machine.
+      // The best of three rounds, as the machine may be busy.
       const means = [0, 1, 2].map(
           (round) => times.slice(150 * round, 150 * (round + 1)).reduce((a, b) => a + b) / 150);
       const [best, , worst] = means.toSorted((a, b) => a - b);
