@@ -26,7 +26,7 @@ enum class PairSays : std::uint32_t {
 struct CornerMemory {
   double x[2][3][3][32];                    ///< A's, B's; of a corner
   double value[2][3][32], error[2][3][32];  ///< heights above the other's plane
-  std::uint32_t asked[9];                   ///< exact signs that lanes need, a bit for each lane
+  std::uint32_t wanted[9];                  ///< exact signs that lanes need, a bit for each lane
 };
 
 /// A lane's part of CornerMemory.
@@ -98,7 +98,7 @@ IST_HD inline std::uint32_t edges_through(std::uint32_t above) {
 
 /// The signs of the volumes spanned by an edge of A and one of B, at bit 3 · A's + B's.
 struct EdgeOrientations {
-  std::uint32_t asked = 0, known = 0, positive = 0;
+  std::uint32_t wanted = 0, known = 0, positive = 0;
 };
 /// Computes the signs for edges that cross the other's plane.
 template <Signs kBy>
