@@ -98,12 +98,12 @@ struct GpuPenetrationSettings {
   /// The answer comes from the finest levels of detail that are expected to need no more, blended
   /// smoothly with the next coarser ones; see PenetrationSettings::pair_budget.
   std::uint32_t pair_budget = 0;
-  /// Exact measure only. What is kept of pair i of the last batch serves pair i of this one while
-  /// the solids are the same and have moved little against each other since they were searched: by
-  /// up to six steps and 0.3 of a triangle's side. Else they are searched, and near triangles are
-  /// kept anew if they fit and steps are short. Solids and poses may change at will: answers have
-  /// the bits that they have without it, but for node_visits, which is 0 where nothing was
-  /// searched. Null: nothing is kept.
+  /// Exact measure only. Keeps the near triangles of pair i of a batch for pair i of the next ones
+  /// while the solids are the same and have moved little relative to each other since they were
+  /// searched: by up to six steps and 0.3 of a triangle's side. Otherwise the pair is searched, and
+  /// its near triangles are kept if they fit and steps are short. Solids and poses may change at
+  /// will: answers have the same bits as without it, except node_visits, which is 0 for a pair that
+  /// was not searched. Null: nothing is kept.
   GpuKept* kept = nullptr;
 };
 

@@ -76,9 +76,9 @@ struct SeparationSettings {
   std::uint32_t max_visits = 0;  ///< count of node pairs opened, depth first
   bool inner_spheres = false;    ///< use the inner spheres even if both assets keep a mesh
 
-  /// [u] Of solids that are farther apart than this the answer says no more: distance and
-  /// distance_min are max_distance, distance_max is infinite, points and normal are NaN, the status
-  /// is ok. That is certified, and takes a few microseconds unless the distance is near it.
+  /// [u] For solids that are farther apart than this, distance and distance_min are max_distance,
+  /// distance_max is infinite, points and normal are NaN, and the status is ok. That is certified,
+  /// and takes a few microseconds unless the distance is near it.
   double max_distance = 0;
 
   /// Like PenetrationSettings::pair_id, for distances of surfaces: the nearest triangles are kept,
@@ -171,8 +171,8 @@ struct Penetration {
 };
 
 /// Gap of two placed solids: between their surfaces if both assets keep a mesh, else between inner
-/// spheres, or inner spheres and a shape. All zero once these overlap. Of solids that are farther
-/// than SeparationSettings::max_distance see there.
+/// spheres, or inner spheres and a shape. All zero once these overlap. For solids that are farther
+/// apart than SeparationSettings::max_distance see there.
 struct Separation {
   double distance = 0;      ///< [u] between surfaces or inner spheres
   double distance_min = 0;  ///< [u] lower bound of the true distance of the solids, certified

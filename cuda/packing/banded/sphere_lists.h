@@ -202,7 +202,7 @@ struct SphereLists {
 enum class Step : std::uint32_t {
   start,       ///< the root cell's side
   sweep,       ///< drop dead cells, find the largest bound; the schedule begins a band
-  clear_grid,  ///< lay the sphere grid out anew
+  clear_grid,  ///< rebuild the sphere grid
   touch_all,   ///< list every sphere
   count,       ///< the sphere grid's passes over the listed pairs
   reserve_lists,

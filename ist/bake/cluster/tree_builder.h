@@ -30,7 +30,7 @@ std::vector<std::uint32_t> tree_order(std::span<const Ball> spheres, bool swaps,
                                       bool last_stays = false);
 
 /// An order for spheres that are close to others, one for one, from the tree_order() of those: its
-/// groups of 16 exchange members, and groups of their balls are formed anew. Faster than a separate
+/// groups of 16 exchange members, and groups of their balls are formed again. Faster than a new
 /// order, and about as good (docs/tree_builders.md).
 std::vector<std::uint32_t> refined_order(std::span<const Ball> spheres,
                                          std::vector<std::uint32_t> order);

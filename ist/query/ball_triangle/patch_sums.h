@@ -71,8 +71,8 @@ struct ProbeSums {
 
 /// Adds the patch's integrals. Once all triangles that reach a ball are added, its part inside the
 /// closed surface has the volume [centre inside] · v + cones, the gradient −pull by the centre, and
-/// the first moment −shift about the centre. Exact but for rounding, some 1e-15 of r³. Same bits on
-/// every instruction set.
+/// the first moment −shift about the centre. Exact except for rounding, some 1e-15 of r³. Same bits
+/// on every instruction set.
 ///
 /// Each triangle subtracts (or adds, if its outer side faces the centre) the part of its cone
 /// between itself and the sphere: (r³ Ω − h A) / 3 over its part within the ball.

@@ -126,7 +126,8 @@ class ContactDivision {
   std::size_t size_ = 0;
 };
 
-/// Corrects the largest patch so that the patches' members sum to `whole`, but for the last digit.
+/// Corrects the largest patch so that the patches' members sum to `whole`, except for the last
+/// digit.
 template <class T>
 void complete(std::span<ContactPatch> patches, std::size_t largest, const T& whole,
               T ContactPatch::*member) {

@@ -51,7 +51,7 @@ struct alignas(64) PlacedPlanes {
   PointAnd corner[kWidth];
   PointAnd normal[kWidth];  ///< product of two sides, and a bound of the coordinates of these
   /// Along the plane out of the triangle, which lies below the number; its absolute coordinates add
-  /// up to 1, but for rounding.
+  /// up to 1, except for rounding.
   PointAnd edge[3][kWidth];
   /// The block's vertices are between these heights above the plane of `widest`, times the length
   /// of its normal.

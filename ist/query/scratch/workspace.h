@@ -23,7 +23,7 @@ struct RankedPair {
 
 /// A pair of nodes that waits to be opened.
 struct WaitingPair {
-  double gap;    ///< lower bound on the gap of spheres below, but for rounding
+  double gap;    ///< lower bound on the gap of spheres below, up to rounding
   double cover;  ///< the same for cover balls
   std::uint32_t a, b;
   std::int32_t level_a, level_b;

@@ -170,7 +170,7 @@ IST_HD_COLD int orient3d_exact(const double a[3], const double b[3], const doubl
 
 }  // namespace exact_sign
 
-/// Sign (−1, 0, 1) of the area of (a, b, q): +1 if q lies left of a → b. Exact but for overflow.
+/// Sign (−1, 0, 1) of the area of (a, b, q): +1 if q lies left of a → b. Exact unless it overflows.
 IST_HD inline int orient2d_sign(const double a[2], const double b[2], const double q[2]) {
   using namespace exact_sign;
   const double left = (a[0] - q[0]) * (b[1] - q[1]);

@@ -82,7 +82,7 @@ IST_HD TriangleFrame<Real> make_triangle_frame(const Real a[3], const Real b[3],
   f.height = std::sqrt(dot3(w, w));
   if (f.height > 4 * kSpacing<Real> * f.length) {
     for (int k = 0; k < 3; ++k) f.v[k] = w[k] / f.height;
-  } else {  // a segment but for rounding: any perpendicular direction is valid
+  } else {  // a segment up to rounding: any perpendicular direction is valid
     f.height = 0;
     const Real x = std::abs(f.u[0]), y = std::abs(f.u[1]), z = std::abs(f.u[2]);
     const int axis = x <= y && x <= z ? 0 : (y <= z ? 1 : 2);

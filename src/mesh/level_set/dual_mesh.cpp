@@ -89,7 +89,7 @@ class CellField {
   }
 
   /// The point where the surface crosses an edge with two signs, by false position (the Illinois
-  /// rule). The same for every cell at the edge, but for rounding.
+  /// rule). The same for every cell at the edge, except for rounding.
   Vector3d crossing(int edge) const {
     const int axis = edge / 4, corner = edge_corners(edge)[0];
     const auto at = [&](double t) {
